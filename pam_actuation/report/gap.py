@@ -48,6 +48,7 @@ from pam_sim.files import check_folder, StrPath, whole_files, write_text
 from pam_sim.gap import find_gap
 from pam_sim.gap.data.health import check_health, dead_signals, recorded_valve
 from pam_sim.gap.data.recording import Recording
+from pam_sim.gap.propose.proposal import MODEL_FILE
 from pam_sim.gap.select.memory import memories
 from pam_sim.gap.subsystems.simulation import free_run
 from pam_sim.identify.before_gap import numbers_block, numbers_first, numbers_text
@@ -58,7 +59,8 @@ if TYPE_CHECKING:
     from pam_sim.gap import GapResult
     from pam_sim.run import Run
 
-FILES = ('gap.json', 'model.yaml', 'next_experiment.yaml', 'compare.mcap', 'report.html')
+FILES = ('gap.json', 'model.yaml', 'next_experiment.yaml', 'compare.mcap', 'report.html',
+         'proposed_effect.py', MODEL_FILE)
 NUMBERS_SHARE = 0.3          # of the progress, where numbers are unknown
 FOLDERS = ('measured', 'simulated_before', 'simulated_refit', 'simulated_after',
            'residual_before', 'residual_after')
@@ -158,7 +160,8 @@ def save_gap(result: 'GapResult', run: 'Run', out_dir: StrPath, of: str = '') ->
     """
     Write gap.json, model.yaml, compare.mcap and report.html of a result.
 
-    Where rivals are left, next_experiment.yaml too, which ``pam run`` executes.
+    Where rivals are left, next_experiment.yaml too, which ``pam run`` executes. Where a term is
+    proposed, its effect file and the model with it.
     """
     with whole_files(out_dir) as folder:
         _save_into(folder, result, run, of)
@@ -171,6 +174,9 @@ def _save_into(out_dir: Path, result: 'GapResult', run: 'Run', of: str) -> None:
     if result.next_experiment:
         write_text(out_dir / 'next_experiment.yaml',
                    dump_yaml(result.next_experiment['experiment']))
+    if result.proposal:
+        write_text(out_dir / result.proposal.file, result.proposal.text)
+        write_text(out_dir / MODEL_FILE, result.proposal.model_yaml)
     if result.traces:
         write_compare(result, run.namespace, out_dir / 'compare.mcap')
     write_text(out_dir / 'report.html', render(

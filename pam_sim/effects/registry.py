@@ -16,6 +16,7 @@
 
 from functools import lru_cache
 from pathlib import Path
+from types import ModuleType
 
 from pam_sim.effects.effect import Effect
 from pam_sim.errors import InputError
@@ -26,6 +27,8 @@ _OWN_FOLDER = Path(__file__).parent
 _NOT_EFFECTS = ('effect', 'fitting', 'registry')
 # What several effects call.
 _SHARED = ('air_volume', 'lag', 'loop_level', 'presliding', 'progressive')
+_UNNAMED_FOLDER = _OWN_FOLDER / 'unnamed'
+_NOT_TERMS = ('terms',)
 
 
 def effect_files() -> list[Path]:
@@ -55,11 +58,33 @@ def effects() -> dict[str, Effect]:
         if effect.name in found or effect.name != path.stem:
             raise InputError(
                 f'effect `{effect.name}` must be defined once, in a file of its name', str(path))
-        effect.hooks.update(
-            {hook: getattr(module, hook) for hook in HOOKS if hasattr(module, hook)})
-        for hook, function in effect.hooks.items():
-            check_hook(hook, function, effect.states is not None, path)
-        found[effect.name] = effect
+        found[effect.name] = _with_hooks(effect, module, path)
+    return _in_order(found)
+
+
+@lru_cache(maxsize=None)
+def all_effects() -> dict[str, Effect]:
+    """
+    Return in kernel order the effects and the stand-ins for terms that have no name.
+
+    The latter are for `pam gap` alone, which tries forms with them; no list shows them.
+    """
+    found = dict(effects())
+    for path in plugin_files(_UNNAMED_FOLDER, '', _NOT_TERMS):
+        module = plugin_module(path, _UNNAMED_FOLDER, 'pam_sim.effects.unnamed', 'pam_term')
+        found[path.stem] = _with_hooks(module.EFFECT, module, path)
+    return _in_order(found)
+
+
+def _with_hooks(effect: Effect, module: ModuleType, path: Path) -> Effect:
+    """Return an effect with the functions of its file by which it acts."""
+    effect.hooks.update({hook: getattr(module, hook) for hook in HOOKS if hasattr(module, hook)})
+    for hook, function in effect.hooks.items():
+        check_hook(hook, function, effect.states is not None, path)
+    return effect
+
+
+def _in_order(found: dict[str, Effect]) -> dict[str, Effect]:
     return dict(sorted(found.items(), key=lambda item: (item[1].order, item[0])))
 
 
@@ -73,4 +98,4 @@ def get_effect(name: str, where: str = '') -> Effect:
         Unknown name; the message lists the names there are.
 
     """
-    return pick(effects(), name, 'effect', where)
+    return all_effects().get(name) or pick(effects(), name, 'effect', where)

@@ -215,6 +215,8 @@ class GapResult:
         What was found of unknown numbers before the look: the entry of gap.json.
     first_lines : list of str
         The same for a person.
+    proposal : pam_sim.gap.propose.proposal.Proposal, optional
+        A term without a name that the certify data confirm.
 
     """
 
@@ -244,6 +246,7 @@ class GapResult:
     noticed: list[Any] = field(default_factory=list)
     numbers_first: dict[str, Any] | None = None
     first_lines: list[str] = field(default_factory=list)
+    proposal: Any = None
 
     @property
     def place(self) -> str:
@@ -268,7 +271,8 @@ class GapResult:
         return _finite({
             'schema': SCHEMA, 'verdict': self.verdict,
             'subsystems': {name: one.to_dict() for name, one in self.subsystems.items()},
-            'proposal': None, 'effects': self.effects,
+            'proposal': self.proposal.to_dict() if self.proposal else None,
+            'effects': self.effects,
             'parameters': [p.to_dict() for p in self.parameters],
             'ambiguity_set': self.ambiguity_set, 'next_experiment': self.next_experiment,
             'where': [w.to_dict() for w in self.where],

@@ -26,6 +26,7 @@ from pam_sim.gap.data.split import FIT, SELECT
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit
 from pam_sim.gap.plan.detectable import least_sizes
+from pam_sim.gap.propose.proposal import propose
 from pam_sim.gap.report.by_subsystem import add_place, subsystem_verdicts
 from pam_sim.gap.report.fingerprint import fingerprint
 from pam_sim.gap.report.place import places
@@ -185,6 +186,7 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     result.reason = explain(result, outcome, harms)
     result.simulations = sum(
         one.simulations for one in (estimator, validation, own_runs))
+    propose(result, estimator, final, held_out, certify is not None, seed, context.out_of_time)
     progress(1.0)
     result.runtime_s = time.perf_counter() - started
     return result

@@ -26,7 +26,7 @@ compiler leaves nothing of the call.
 from collections.abc import Iterator
 
 from pam_sim.compiled import named_arguments
-from pam_sim.effects.registry import effects
+from pam_sim.effects.registry import all_effects
 from pam_sim.generated import generated_module
 from pam_sim.muscle.registry import laws
 from pam_sim.rollout.hooks import HOOKS
@@ -35,13 +35,13 @@ from pam_sim.rollout.places import law_codes
 _HEAD = '''"""Calls of the registered effects and laws; written by pam_sim.rollout.dispatch."""
 
 from pam_sim.compiled import compiled, inlined
-from pam_sim.effects.registry import effects
+from pam_sim.effects.registry import all_effects
 from pam_sim.muscle.registry import laws
 from pam_sim.records import part
 from pam_sim.rollout.places import (
     ACTING, ACTING_PLACE, LAW_PLACE, PACKED, PACKED_PLACE, STATES, STATES_PLACE)
 
-_EFFECTS = effects()
+_EFFECTS = all_effects()
 _LAWS = laws()
 '''
 _OWN = {'state': 'states.{}', 'par': 'packed.{}', 'plant': 'state'}
@@ -49,14 +49,14 @@ _OWN = {'state': 'states.{}', 'par': 'packed.{}', 'plant': 'state'}
 
 def _functions() -> Iterator[str]:
     """Write the names under which effects' functions are called."""
-    for name, effect in effects().items():
+    for name, effect in all_effects().items():
         for hook in effect.hooks:
             yield f'_{name}_{hook} = _EFFECTS[{name!r}].hooks[{hook!r}]'
 
 
 def _call(name: str, hook: str) -> str:
     """Write the call of an effect's hook with the arguments it names."""
-    function = effects()[name].hooks[hook]
+    function = all_effects()[name].hooks[hook]
     given = ', '.join(f'{one}={_OWN[one].format(name)}' if one in _OWN else f'{one}={one}'
                       for one in named_arguments(function))
     return f'_{name}_{hook}({given})'
@@ -67,7 +67,7 @@ def _hook(hook: str) -> Iterator[str]:
     declared = HOOKS[hook]
     given = ', '.join(declared.arguments)
     result = ', '.join(declared.returns)
-    users = [name for name, effect in effects().items() if hook in effect.hooks]
+    users = [name for name, effect in all_effects().items() if hook in effect.hooks]
     if users:
         yield from ('', '', '@compiled', f'def _acting_{hook}({given}, state, par):',
                     '    acting = part(par, ACTING_PLACE, ACTING)',

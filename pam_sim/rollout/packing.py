@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import interpreted
 from pam_sim.effects.effect import Numbers
-from pam_sim.effects.registry import effects
+from pam_sim.effects.registry import all_effects
 from pam_sim.errors import InputError
 from pam_sim.load import LOADS
 from pam_sim.records import put, put_some, size_of
@@ -64,7 +64,7 @@ def pack_rig(rig: 'Rig', dt_s: float, initial_pressure_pa: float,
 
 def _pack_effects(rig: 'Rig', numbers: Numbers, state: FloatArray, par: FloatArray) -> None:
     for setting in rig.effects:
-        effect = effects()[setting.name]
+        effect = all_effects()[setting.name]
         place, state_place = PLACES[setting.name]
         if effect.pack_into(setting.parameters, numbers, par, place, state, state_place):
             for flag in FLAGS[setting.name]:

@@ -19,12 +19,12 @@ What stands behind the rig's own records in ``state`` and ``par``: effects and f
 ``ACTING``, ``PACKED``, and last the record of the law, which may be of any length.
 """
 
-from pam_sim.effects.registry import effects
+from pam_sim.effects.registry import all_effects
 from pam_sim.muscle.registry import laws
 from pam_sim.records import place_of, record, size_of
 from pam_sim.rollout.layout import PARAMETERS, STATE
 
-_EFFECTS = effects()
+_EFFECTS = all_effects()
 ACTING = record(*_EFFECTS)                  # 1: the effect acts
 PACKED = record(*((name, effect.packed) for name, effect in _EFFECTS.items()))
 STATES = record(*((name, effect.states) for name, effect in _EFFECTS.items()

@@ -92,6 +92,10 @@ class Estimator:
             setattr(own, name, value)
         return own
 
+    def using(self, *parts: int) -> Self:
+        """Return a copy that fits other parts of the data; the subsystems are the same."""
+        return self._own(use=parts)
+
     def _slopes_at(self, found: Fit) -> None:
         """Take the slopes at a fit, of the subsystems that fitting it again looks at."""
         self.take_slopes(found.settings(), found.known_z, self._touched(found.hypothesis))

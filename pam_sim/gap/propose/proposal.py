@@ -1,0 +1,193 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A proposal: found beside what is named, proved by free run on the certify data, or none."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from pam_sim.gap.data.recording import Recording
+from pam_sim.gap.data.split import FIT, SELECT
+from pam_sim.gap.fit.estimator import Estimator
+from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
+from pam_sim.gap.propose.library import STAND_INS, StandIn
+from pam_sim.gap.propose.ranges import ranges_of, waves_in
+from pam_sim.gap.propose.search import find_terms, Sum
+from pam_sim.gap.propose.words import range_text
+from pam_sim.gap.propose.writing import EffectText
+from pam_sim.gap.result import GapResult
+from pam_sim.gap.select.comparison import gap
+from pam_sim.gap.subsystems.problem import SubsystemProblem
+from pam_sim.gap.verify.model import model_of
+from pam_sim.gap.verify.validation import Validation
+from pam_sim.located_yaml import dump_yaml
+import yaml
+
+MODEL_FILE = 'proposed_model.yaml'
+NONE = 'No simple term explains the rest on the data of the proof, so none is proposed.'
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """
+    A term without a name that the certify data confirm.
+
+    Parameters
+    ----------
+    equation : str
+        One line.
+    name : str
+        Of the effect and, with ``.py``, of its file.
+    subsystem : str
+        Where it acts.
+    explained : float
+        Share of the squared gap on the certify data that it removes.
+    ranges : dict of str -> (float, float)
+        By symbol, the range of each input in the data.
+    text : str
+        The effect file.
+    model_yaml : str
+        The model with the term in it.
+    where : str
+        The ranges in words.
+    trial : dict
+        The entry of a model file by which it was tried, a stand-in of the file.
+
+    """
+
+    equation: str
+    name: str
+    subsystem: str
+    explained: float
+    ranges: dict[str, tuple[float, float]]
+    text: str
+    model_yaml: str
+    where: str
+    trial: dict[str, Any]
+
+    @property
+    def file(self) -> str:
+        """Return the name of its file."""
+        return f'{self.name}.py'
+
+    @property
+    def sentence(self) -> str:
+        """Return it in one sentence."""
+        where = f'; it holds for {self.where}' if self.where else ''
+        return (f'Proposed: {self.equation} ({self.subsystem}). Unnamed, its form found from '
+                f'data{where}. It removes {100 * self.explained:.0f} % of the squared gap of the '
+                'proof.')
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the entry of gap.json."""
+        return {'equation': self.equation, 'file': self.file, 'subsystem': self.subsystem,
+                'explained': self.explained,
+                'range': {name: list(ends) for name, ends in self.ranges.items()}}
+
+
+def propose(result: GapResult, estimator: Estimator, final: Fit, held_out: Recording, whole: bool,
+            seed: int = 0, out_of_time: Callable[[], bool] = lambda: False) -> None:
+    """
+    Set the proposal of a result, if one is wanted and the certify data confirm it.
+
+    Wanted is one where the verdict is ``unknown``, or what is named leaves more than a tenth.
+
+    Parameters
+    ----------
+    result : GapResult
+        With its verdict.
+    estimator : Estimator
+        That the final model was fitted with.
+    final : Fit
+        The final model.
+    held_out : Recording
+        Of the proof.
+    whole : bool
+        All of it is the certify part; otherwise its certify blocks.
+    seed : int
+        Of the draws of the floor.
+    out_of_time : callable
+        Whether to come to an end.
+
+    """
+    criteria = estimator.criteria
+    if result.verdict in ('no_gap', 'refused') or (
+            result.verdict != 'unknown'
+            and result.unexplained_fraction <= 1.0 - criteria.named_share):
+        return
+    learning, both = estimator.using(FIT), estimator.using(FIT, SELECT)
+    start = _refitted(learning, final)
+    for problem in sorted(estimator.problems, key=lambda p: -gap(p, start.errors[p.subsystem])):
+        if gap(problem, start.errors[problem.subsystem]) < criteria.near_floor or out_of_time():
+            break
+        found = _found(learning, problem, start, out_of_time)
+        if found is None:
+            continue
+        proved = both.polish(both.fit(found.fit.hypothesis, found.fit.theta, found.fit))
+        validation = Validation(held_out, whole, both, final, proved, seed)
+        fell, _ = validation.fall(validation.refit, validation.after)
+        explained = 1.0 - validation.unexplained()
+        if (explained > criteria.greater_part and fell > criteria.greater_part
+                and not validation.worse()):
+            result.proposal = _written(both, found, proved, explained)
+            result.remarks.append(result.proposal.sentence)
+            return
+    result.remarks.append(NONE)
+
+
+def _refitted(learning: Estimator, final: Fit) -> Fit:
+    """Return the final model fitted to the fit part alone."""
+    if not final.hypothesis.names:
+        return learning.fit_base()
+    learning.take_slopes(final.settings(), final.known_z)
+    return learning.fit(final.hypothesis, final.theta, final)
+
+
+def _found(learning: Estimator, problem: SubsystemProblem, start: Fit,
+           out_of_time: Callable[[], bool]) -> Sum | None:
+    """Return the terms for a subsystem, None where the select part wants none."""
+    ranges = ranges_of(problem.recordings, learning, start)
+    return find_terms(
+        learning, problem, start, [s for s in STAND_INS if _fits(s, learning, problem)],
+        ranges, lambda fit: waves_in(problem, fit), out_of_time)
+
+
+def _fits(stand_in: StandIn, learning: Estimator, problem: SubsystemProblem) -> bool:
+    """Return whether a stand-in can act in a subsystem of a rig."""
+    rig = learning.rig
+    return (rig.valve in stand_in.valves
+            and (stand_in.subsystem == 'valve') == (problem.subsystem == 'valve')
+            and (stand_in.subsystem != 'load' or rig.load == 'hanging_mass')
+            and (not stand_in.signal or stand_in.signal in problem.signals))
+
+
+def _written(estimator: Estimator, found: Sum, proved: Fit, explained: float) -> Proposal:
+    """Return the proposal of proved terms, with its file and its model."""
+    values = proved.values()[found.place]
+    ranges = {one.symbol: (found.ends[f'low_of_{i}'], found.ends[f'high_of_{i}'])
+              for i, one in enumerate(found.stand_in.inputs) if f'low_of_{i}' in found.ends}
+    effect = EffectText(found.stand_in, found.terms, values, ranges, explained)
+    h = proved.hypothesis
+    kept = [p for p in range(len(h.effects)) if p != found.place]
+    bare = Fit(
+        Hypothesis(tuple(h.effects[p] for p in kept), h.numbers),
+        np.concatenate([np.zeros(0), *(proved.theta_of(p) for p in kept)]), proved.known_z,
+        proved.errors, proved.temper)
+    data = yaml.safe_load(model_of(estimator, bare).to_yaml())
+    data['effects'] = [*data.get('effects', ()), {
+        'name': effect.name, 'parameters': effect.values()}]
+    return Proposal(effect.equation, effect.name, found.stand_in.subsystem, float(explained),
+                    effect.ranges, effect.text(), dump_yaml(data),
+                    range_text(effect.ranges, effect.inputs), proved.settings()[found.place])

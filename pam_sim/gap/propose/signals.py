@@ -1,0 +1,241 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Errors of force at measured inputs: what a term of the muscle or of the load must explain.
+
+The tension of the model at measured pressure and contraction is compared with the load cell, the
+load cell with weight and inertia of the measured motion; without a cell, the first with the last.
+Nothing oscillates there, and a term stands in it as it is. So many forms are compared by linear
+least squares, without a simulation. What numbers of the model can explain within their priors is
+taken out first.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from pam_sim.annotations import BoolArray, FloatArray
+from pam_sim.effects.unnamed import terms
+from pam_sim.gap.data.recording import GRID_S, Recording
+from pam_sim.gap.data.split import FIT, part_of
+from pam_sim.gap.fit.estimator import Estimator
+from pam_sim.gap.fit.hypothesis import Fit
+from pam_sim.gap.propose.library import Factor, StandIn, Term
+from pam_sim.gap.report.location import AT_STOP_M, MOVING_M_PER_S, smooth_motion
+from pam_sim.gap.subsystems.simulation import pressure_driven, simulate_driven
+from pam_sim.gap.verify.model import model_of
+from pam_sim.rig import Rig
+from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
+
+EVERY = 10                   # grid steps between the samples
+NUMBER_STEP = 0.5            # prior deviations, of the slopes
+LATE_S = 1e-3                # of two topics against each other
+LEAST_SAMPLES = 200
+SMOOTH = 31                  # grid steps of the mean
+
+
+@dataclass(frozen=True)
+class ForceError:
+    """
+    The error of a side of the force balance on the samples that are fitted.
+
+    Parameters
+    ----------
+    error : numpy.ndarray, shape (N,)
+        What the term must be [N].
+    inputs : dict of str -> numpy.ndarray
+        By symbol the inputs at the samples.
+    direction : numpy.ndarray
+        Of motion, -1 or 1.
+    chosen : numpy.ndarray of bool
+        Samples of the fit part, in motion and off the stop.
+    basis : numpy.ndarray
+        Orthonormal; what the numbers of the model can do, with their priors as further rows.
+    numbers : int
+        How many there are.
+    time_s : numpy.ndarray
+        Instants of the samples, counted from the start of their recording.
+
+    """
+
+    error: FloatArray
+    inputs: dict[str, FloatArray]
+    direction: FloatArray
+    chosen: BoolArray
+    basis: FloatArray
+    numbers: int
+    time_s: FloatArray
+
+    def free(self, column: FloatArray) -> FloatArray:
+        """Return a column at the chosen samples less what numbers can do."""
+        y = np.concatenate([column[self.chosen], np.zeros(self.numbers)])
+        return y - self.basis @ (self.basis.T @ y)
+
+    def promise(self, stand_in: StandIn, term: Term) -> tuple[tuple[float, ...], float]:
+        """Return (amplitudes in trials, squared error [N^2] that it explains) of a term."""
+        symbols = [one.symbol for one in stand_in.inputs]
+        matrix = np.column_stack([self.free(c) for c in columns_of(
+            term, self, symbols, -1.0 if stand_in.subsystem == 'muscle' else 1.0)])
+        left = self.free(self.error)
+        amounts, *_ = np.linalg.lstsq(matrix, left, rcond=None)
+        if term.channel.least == 0.0 and amounts[0] <= 0.0:
+            return (0.0,), 0.0
+        rest = left - matrix @ amounts
+        return (tuple(float(a) / term.channel.trial for a in amounts),
+                float(left @ left) - float(rest @ rest))
+
+
+def force_error(estimator: Estimator, recordings: Sequence[Recording], now: Fit, side: str,
+                noise_n: float = 0.0) -> ForceError | None:
+    """
+    Return the ForceError of a fit, None where there is hardly any motion.
+
+    Parameters
+    ----------
+    estimator : Estimator
+        With the problem of muscle and load.
+    recordings : list of Recording
+        That are searched.
+    now : Fit
+        The model so far.
+    side : str
+        ``muscle`` or ``load``.
+    noise_n : float
+        Scale of the errors against the priors; the noise of the cell by default.
+
+    """
+    problem = next(p for p in estimator.problems if p.subsystem == 'muscle')
+    rig = model_of(estimator, now)
+    base = [_error(rig, r, side) for r in recordings]
+    noise_n = noise_n or max(float(np.std(np.concatenate(base))), 1e-3)
+    slopes = []
+    for known in problem.known:
+        if known.of_rig:
+            moved = rig.with_(parameters={
+                known.name: rig.parameters[known.name] + NUMBER_STEP * known.sd})
+            slopes.append(np.concatenate([
+                (_error(moved, r, side) - b) / NUMBER_STEP for r, b in zip(recordings, base)]))
+    slopes.append(np.concatenate([LATE_S * np.gradient(b, EVERY * GRID_S) for b in base]))
+    slopes.append(np.concatenate([LATE_S * np.gradient(_cell(rig, r), EVERY * GRID_S)
+                                  for r in recordings]))
+    parts = [_inputs(rig, r) for r in recordings]
+    inputs = {k: np.concatenate([p[k] for p in parts]) for k in parts[0]}
+    time_s = inputs['t']
+    part = np.concatenate([part_of(p['t'], r.grid_s[-1], False)
+                           for p, r in zip(parts, recordings)])
+    chosen = (part == FIT) & (np.abs(inputs['v']) > MOVING_M_PER_S) & (inputs['x'] > AT_STOP_M)
+    if int(chosen.sum()) < LEAST_SAMPLES:
+        return None
+    matrix = np.column_stack(slopes)
+    basis, _ = np.linalg.qr(np.vstack([matrix[chosen] / noise_n, np.eye(matrix.shape[1])]))
+    return ForceError(np.concatenate(base), inputs, np.sign(inputs['v']), chosen, basis,
+                      matrix.shape[1], time_s)
+
+
+def _inputs(rig: Rig, r: Recording) -> dict[str, FloatArray]:
+    """Return by symbol the measured inputs of terms at the samples of a recording."""
+    x, v, _ = smooth_motion(r)
+    p = np.interp(r.grid_s, r.time_s['pressure'], r.measured['pressure']) - P_ATM_PA
+    return {'p': _thinned(p), 'x': _thinned(np.maximum(x, 0.0)), 'v': _thinned(v),
+            't': r.grid_s[::EVERY], 'F': _cell(rig, r)}
+
+
+def _cell(rig: Rig, r: Recording) -> FloatArray:
+    """Return the force at the load cell, or that of weight and inertia [N]."""
+    if 'force' in r.signals:
+        return _thinned(np.interp(r.grid_s, r.time_s['force'], r.measured['force']))
+    return _weight(rig, r)
+
+
+def _weight(rig: Rig, r: Recording) -> FloatArray:
+    _, _, a = smooth_motion(r)
+    force = rig.parameters['mass_kg'] * (a + GRAVITY_M_PER_S2)
+    if r.external_force_n is not None:
+        force = force + np.append(r.external_force_n, 0.0)
+    return _thinned(force)
+
+
+def _error(rig: Rig, r: Recording, side: str) -> FloatArray:
+    """Return what a term must add to the model's side of the balance [N]."""
+    if side == 'load':
+        return _cell(rig, r) - _weight(rig, r)
+    x, _, _ = smooth_motion(r)
+    return _cell(rig, r) - _thinned(simulate_driven(pressure_driven(rig), r, x).force_n)
+
+
+def _thinned(values: FloatArray) -> FloatArray:
+    """Return the mean around every sample."""
+    kernel = np.ones(SMOOTH) / SMOOTH
+    padded = np.concatenate([np.full(SMOOTH // 2, values[0]), values,
+                             np.full(SMOOTH // 2, values[-1])])
+    return np.convolve(padded, kernel, mode='valid')[::EVERY]
+
+
+def columns_of(term: Term, seen: ForceError, symbols: Sequence[str], friction: float
+               ) -> list[FloatArray]:
+    """Return a term of 1 N at all samples, a wave as two; ``friction``: sign of a dry level."""
+    second = _values(term.two, seen, symbols)
+    sign = friction * seen.direction if term.channel.least == 0.0 else 1.0
+    if term.one.kind == terms.SINE:
+        angle = 2.0 * np.pi * seen.inputs[symbols[term.one.of]] / term.one.shape
+        return [np.sin(angle) * second, np.cos(angle) * second]
+    return [_values(term.one, seen, symbols) * second * sign]
+
+
+def _values(f: Factor, seen: ForceError, symbols: Sequence[str]) -> FloatArray:
+    if f.kind == terms.ONE:
+        return np.ones(seen.error.size)
+    value = seen.inputs[symbols[f.of]]
+    scale = SCALES[symbols[f.of]]
+    if f.kind in terms.REMEMBER:
+        return _remembered(f, value, scale, seen.time_s)
+    q = value / scale
+    found: FloatArray = q
+    if f.kind == terms.SQUARE:
+        found = q ** 2
+    elif f.kind == terms.CUBE:
+        found = q ** 3
+    elif f.kind == terms.SIZE:
+        found = np.abs(q)
+    elif f.kind == terms.SIGNED_SQUARE:
+        found = q * np.abs(q)
+    elif f.kind == terms.SIGN:
+        found = np.tanh(value / f.shape)
+    elif f.kind == terms.ABOVE:
+        found = np.maximum(value - f.shape, 0.0) / scale
+    elif f.kind == terms.BELOW:
+        found = np.maximum(f.shape - value, 0.0) / scale
+    elif f.kind == terms.FADE:
+        found = np.exp(-np.abs(value) / f.shape)
+    return found
+
+
+def _remembered(f: Factor, value: FloatArray, scale: float, time_s: FloatArray) -> FloatArray:
+    """Return a factor with a memory, which starts anew in every recording."""
+    found = np.empty(value.size)
+    step_s, memory = EVERY * GRID_S, 0.0
+    for k in range(value.size):
+        if k == 0 or time_s[k] < time_s[k - 1]:
+            memory = value[k]
+        if f.kind == terms.STOP:
+            memory = min(max(memory, value[k] - f.shape), value[k] + f.shape)
+            found[k] = (value[k] - memory) / f.shape
+        else:
+            memory += step_s / (f.shape + 0.5 * step_s) * (value[k] - memory)
+            found[k] = (value[k] - memory) / scale
+    return found
+
+
+SCALES = {one.symbol: one.scale for one in (
+    terms.PRESSURE, terms.CONTRACTION, terms.SPEED, terms.TIME, terms.TENSION)}
