@@ -26,10 +26,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from pam_sim.annotations import BoolArray, FloatArray
-from pam_sim.gap.data.noise import noise_sd
+from pam_sim.gap.data.noise import noise_of, STAMP_SD_S
 from pam_sim.gap.data.recording import GRID_S, Recording
 from pam_sim.gap.result import Share
-from pam_sim.gap.subsystems.simulation import pressure_driven, run_from_pressure, simulate_driven
+from pam_sim.gap.subsystems.simulation import (
+    FAST_GAIN_PA_PER_V, FAST_T_S, pressure_driven, run_from_pressure, simulate_driven)
 from pam_sim.rig import Rig
 from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
 
@@ -39,6 +40,7 @@ AT_STOP_M = 3e-4             # nearer to the lower stop the force balance is not
 BANDS = 3
 ROUND_PA = 10e3
 FORCE_SMOOTH_S = 0.02        # width (standard deviation) of the smoothing of a balance of forces
+STOP_CLEAR_S = 0.1           # before and after the lower stop that do not count
 MOST_SCALE, MOST_SKEW_S = 0.07, 3e-3         # of it, that calibration may take up
 SMALL_PART = 0.1             # of two errors: what they leave of each other is none
 
@@ -148,26 +150,55 @@ def force_errors(rig: Rig, recording: Recording) -> ForceErrors | None:
     """
     if 'force' not in recording.signals or rig.load != 'hanging_mass':
         return None
-    from scipy.ndimage import gaussian_filter1d       # slow to import
-    grid, steps = recording.grid_s, FORCE_SMOOTH_S / GRID_S
-    cell, x = (np.interp(grid, recording.time_s[s], recording.measured[s])
-               for s in ('force', 'contraction'))
-    lifted = x > AT_STOP_M
+    measured = {s: (recording.time_s[s], recording.measured[s])
+                for s in ('pressure', 'contraction', 'force')}
+    at_stop = np.interp(recording.grid_s, *measured['contraction']) <= AT_STOP_M
+    # Smoothing carries the force of the stop a little further.
+    lifted = np.convolve(at_stop, np.ones(2 * int(STOP_CLEAR_S / GRID_S) + 1), 'same') < 0.5
     if lifted.mean() < 0.05:
         return None
-    tension = simulate_driven(pressure_driven(rig), recording, smooth_motion(recording)[0]).force_n
+    random = np.random.default_rng(0)
+    found = _balances(rig, recording, measured, lifted)
+    moved = _balances(rig, recording, {
+        s: (t, y + _disturbance(t, y, random)) for s, (t, y) in measured.items()}, lifted)
+    return ForceErrors(*(max(float(np.mean(one ** 2) - np.mean((one - other) ** 2)), 0.0)
+                         for one, other in zip(found, moved)))
+
+
+def _disturbance(time_s: FloatArray, values: FloatArray, random: np.random.Generator
+                 ) -> FloatArray:
+    """Return errors as the noise of a sensor and its stamps make them."""
+    late_s = STAMP_SD_S * random.standard_normal(time_s.size)
+    return noise_of(time_s, values).draw(time_s, random) + late_s * np.gradient(
+        _smooth(time_s, values), time_s)
+
+
+def _smooth(time_s: FloatArray, values: FloatArray) -> FloatArray:
+    """Return a signal smoothed over some of its samples, so that its slope is no noise."""
+    from scipy.ndimage import gaussian_filter1d       # slow to import
+    return gaussian_filter1d(values, FORCE_SMOOTH_S / float(np.median(np.diff(time_s))))
+
+
+def _balances(rig: Rig, recording: Recording,
+              measured: Mapping[str, tuple[FloatArray, FloatArray]], lifted: BoolArray
+              ) -> list[FloatArray]:
+    """Return the errors of the balances [N] that ``ForceErrors`` squares, where it is lifted."""
+    from scipy.ndimage import gaussian_filter1d       # slow to import
+    grid, steps = recording.grid_s, FORCE_SMOOTH_S / GRID_S
+    pressure, x, cell = (np.interp(grid, *measured[s])
+                         for s in ('pressure', 'contraction', 'force'))
+    driven = pressure_driven(rig)
+    at = np.interp(grid[:-1] + 0.5 * GRID_S + FAST_T_S, grid, pressure)
+    tension = simulate_driven(driven, recording, x, np.clip(
+        (at - P_ATM_PA) / FAST_GAIN_PA_PER_V, 0.0, 6.0)).force_n
     acceleration = gaussian_filter1d(x, steps, order=2) / GRID_S ** 2
     external = recording.external_force_n
     weight = rig.parameters['mass_kg'] * (acceleration + GRAVITY_M_PER_S2)
     if external is not None:
         weight = weight + gaussian_filter1d(np.append(external, external[-1]), steps)
     tension, cell = (gaussian_filter1d(y, steps) for y in (tension, cell))
-    period_s = float(np.median(np.diff(recording.time_s['force'])))
-    left = noise_sd(recording.measured['force']) * np.sqrt(
-        period_s / (2.0 * np.sqrt(np.pi) * FORCE_SMOOTH_S))
-    return ForceErrors(*(_squared(_unscaled(one[lifted], other[lifted], np.gradient(
-        other, GRID_S)[lifted]), left) for one, other in (
-            (tension, cell), (weight, cell), (tension, weight))))
+    return [_unscaled(one[lifted], other[lifted], np.gradient(other, GRID_S)[lifted])
+            for one, other in ((tension, cell), (weight, cell), (tension, weight))]
 
 
 def _unscaled(one: FloatArray, other: FloatArray, rate: FloatArray) -> FloatArray:
