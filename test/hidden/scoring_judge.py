@@ -32,6 +32,7 @@ class Answer:
     reported: tuple           # everything that the result says it may be
     unexplained: float
     subsystem: str
+    place: str                # the subsystem of the first row of `where`
     raw: dict
 
     @property
@@ -63,12 +64,12 @@ def read_answer(raw):
     reported = dict.fromkeys(raw.get('ambiguity_set') or ())
     if claims:
         reported |= dict.fromkeys(parameters if verdict == 'parameter' else effects + parameters)
-    places = sorted(raw.get('where') or (), key=lambda w: -(w.get('share_of_gap') or 0.0))
-    subsystem = places[0]['subsystem'] if places else ''
+    places = raw.get('where') or ()
+    subsystem = place = places[0]['subsystem'] if places else ''
     if effects and claims:
         subsystem = raw['effects'][0].get('subsystem', subsystem)
     return Answer(verdict, effects, parameters, tuple(reported) if claims else (),
-                  raw.get('unexplained_fraction') or 0.0, subsystem, raw)
+                  raw.get('unexplained_fraction') or 0.0, subsystem, place, raw)
 
 
 def same(name, truth):

@@ -127,6 +127,11 @@ def table(cases, families):
     def place(c):
         return right(c) or c.answer.subsystem == c.key['subsystem'][c.key['effects'][0]]
 
+    def first_place(c):
+        return c.answer.place == c.key['subsystem'][c.key['effects'][0]]
+
+    seen = [c for c in kind('single', 'two', 'far', 'near')
+            if max(c.key.get('gap_sigma', {'': 0.0}).values()) >= 1.5]
     clear_twos = [c for c in twos if c.gap >= 1.0]
     listed = [c for c in singles if c.gap >= 0.3]
     return [
@@ -152,6 +157,9 @@ def table(cases, families):
         share_row('– right single name after running it', ambiguous,
                   lambda c: c.after is not None and is_right(c.after, c.key), 0.95),
         share_row('right subsystem', clear, place, 0.99),
+        share_row('first row of `where` names the right subsystem', clear, first_place, 0.98),
+        share_row('gap of 1.5 σ or more answered `no_gap`', seen,
+                  lambda c: c.answer.verdict == 'no_gap', most=0.0),
         share_row('two effects, both right', clear_twos, right, 0.85),
         share_row('– no third name', clear_twos, lambda c: len(c.answer.claimed) <= 2, 0.97),
         *_numbers([c for c in clear + wrong + clear_twos if right(c)]),

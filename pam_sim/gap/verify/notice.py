@@ -27,7 +27,7 @@ A recorded supply pressure is a witness of its own: where it moves, a model with
 has a gap.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 import math
 
@@ -104,22 +104,26 @@ def notices(runs: OwnRuns, estimator: Estimator, found: Fit, seed: int = 0) -> l
     doubt = _doubt(estimator, found)
     tested = []
     for (problem, rig, known), searched in zip(runs.at(found), estimator.problems):
-        random = np.random.default_rng(seed)
-        signals = _Certified(runs, problem, rig, known, doubt, random)
+        here = _Certified(runs, problem, rig, known, doubt, np.random.default_rng(seed))
         for signal in problem.signals:
             followed = 0.0
             if _integrates(problem, problem.recordings[0]):
-                z = [_followed(problem, rig, known, 0, runs.chosen(problem, signal))]
-                mine = np.isin(searched.part, (FIT, SELECT))
-                z += [_followed(searched, rig, found.known_z[searched.subsystem], index,
-                                mine & (searched.run == index))
-                      for index in range(len(searched.recordings))]
-                told = np.array([one for one in z if one.size])
-                if told.size:
-                    followed = float(max(np.abs(told).max(), np.abs(
-                        told.sum(axis=0)).max() / math.sqrt(len(told))))
-            tested.append(signals.notice(signal, followed))
+                z = here.flow.follows(0, runs.chosen(problem, signal))
+                flow, mine = _Flow(searched, rig, found.known_z[searched.subsystem]), np.isin(
+                    searched.part, (FIT, SELECT))
+                followed = _most([z, *(flow.follows(index, mine & (searched.run == index))
+                                       for index in range(len(searched.recordings)))])
+            tested.append(here.notice(signal, followed))
     return tested
+
+
+def _most(z: Sequence[FloatArray]) -> float:
+    """Return the largest of some deviations, of recordings one by one and together."""
+    told = np.array([one for one in z if one.size])
+    if not told.size:
+        return 0.0
+    together = np.abs(told.sum(axis=0)) / math.sqrt(len(told))
+    return float(max(np.abs(told).max(), together.max()))
 
 
 def supply_notice(recording: Recording, rig: Rig, noise_pa: float, least: float
@@ -161,14 +165,57 @@ def _doubt(estimator: Estimator, found: Fit) -> dict[str, float]:
     return {name: float(min(sd, 1.0)) for name, sd in zip(names, spread)}
 
 
+class _Flow:
+    """The errors of a problem, and their slopes for its known numbers."""
+
+    def __init__(self, problem: SubsystemProblem, rig: Rig, known: FloatArray) -> None:
+        self.problem, self.base = problem, problem.values(rig, known)
+        self.errors = self.base - problem.measured
+        self.slopes = [(problem.values(rig, known + k.step * (np.arange(known.size) == j))
+                        - self.base) / k.step for j, k in enumerate(problem.known)]
+
+    def follows(self, index: int, chosen: BoolArray) -> FloatArray:
+        """
+        Return by how many deviations the errors follow what they should not, one by one.
+
+        Each once alone: a constant, the pressure, the time, and every number of the rig that
+        changes with time or pressure. Empty where there are too few means.
+        """
+        problem, recording = self.problem, self.problem.recordings[index]
+        mine = problem.run == index
+        time_s, inside = problem.time_s[mine], chosen[mine]
+        pressure = np.interp(
+            time_s, recording.time_s['pressure'], recording.measured['pressure'])
+
+        def means(values: FloatArray) -> FloatArray:
+            return _means(values, time_s, FLOW_MEAN_S, inside)
+
+        errors, *slopes = (means(recent(values[mine], time_s, FLOW_MEMORY_S))
+                           for values in (self.errors, *self.slopes))
+        time, level = (_unit(means(values)) for values in (time_s, pressure))
+        rows = [np.ones(errors.size), level, time]
+        rows += [s * by for s, k in zip(slopes, problem.known) if k.of_rig
+                 for by in (time, level)]
+        if errors.size < len(rows) + len(slopes) + SPARE:
+            return np.zeros(0)
+        usual = _basis(np.column_stack(slopes))
+        columns = np.column_stack([_normal(r - usual @ (usual.T @ r)) for r in rows])
+        errors = errors - usual @ (usual.T @ errors)
+        every = _basis(columns)
+        noise = errors - every @ (every.T @ errors)
+        count = errors.size - usual.shape[1] - every.shape[1]
+        sd = math.sqrt(float(noise @ noise) / count * autocorrelation_time(noise))
+        return columns.T @ errors / max(sd, 1e-12)
+
+
 class _Certified:
     """Means of the errors of a problem on the certify data, and what is expected of them."""
 
     def __init__(self, runs: OwnRuns, problem: SubsystemProblem, rig: Rig, known: FloatArray,
                  doubt: Mapping[str, float], random: np.random.Generator) -> None:
         self._runs, self._problem, self._random = runs, problem, random
-        base = problem.values(rig, known)
-        self._errors, self._slopes = base - problem.measured, _slopes(problem, rig, known, base)
+        self.flow = _Flow(problem, rig, known)
+        base, self._errors, self._slopes = self.flow.base, self.flow.errors, self.flow.slopes
         self._limits = np.array([doubt.get(k.name, 1.0) if k.of_rig else 1.0
                                  for k in problem.known])
         self._draws = []
@@ -201,48 +248,6 @@ class _Certified:
             [means(s[mine]) for s in self._slopes]), self._limits, expected)
         return Notice(self._problem.subsystem, signal, float(np.sqrt(np.mean(left ** 2))),
                       math.sqrt(expected), followed)
-
-
-def _slopes(problem: SubsystemProblem, rig: Rig, known: FloatArray, base: FloatArray
-            ) -> list[FloatArray]:
-    """Return the slopes of the values of a problem for its known numbers."""
-    return [(problem.values(rig, known + k.step * (np.arange(known.size) == j)) - base) / k.step
-            for j, k in enumerate(problem.known)]
-
-
-def _followed(problem: SubsystemProblem, rig: Rig, known: FloatArray, index: int,
-              chosen: BoolArray) -> FloatArray:
-    """
-    Return by how many deviations the errors of a flow follow what they should not, one by one.
-
-    Each once alone: a constant, the pressure, the time, and every number of the rig that changes
-    with pressure or time. Empty where there are too few means.
-    """
-    recording = problem.recordings[index]
-    base = problem.values(rig, known)
-    mine = problem.run == index
-    time_s, inside = problem.time_s[mine], chosen[mine]
-    pressure = np.interp(time_s, recording.time_s['pressure'], recording.measured['pressure'])
-
-    def means(values: FloatArray) -> FloatArray:
-        return _means(values, time_s, FLOW_MEAN_S, inside)
-
-    errors = means(recent((base - problem.measured)[mine], time_s, FLOW_MEMORY_S))
-    slopes = [means(recent(s[mine], time_s, FLOW_MEMORY_S))
-              for s in _slopes(problem, rig, known, base)]
-    time, level = (_unit(means(values)) for values in (time_s, pressure))
-    rows = [np.ones(errors.size), level, time]
-    rows += [s * by for s, k in zip(slopes, problem.known) if k.of_rig for by in (time, level)]
-    if errors.size < len(rows) + len(slopes) + SPARE:
-        return np.zeros(0)
-    usual = _basis(np.column_stack(slopes))
-    columns = np.column_stack([_normal(r - usual @ (usual.T @ r)) for r in rows])
-    errors = errors - usual @ (usual.T @ errors)
-    every = _basis(columns)
-    noise = errors - every @ (every.T @ errors)
-    count = errors.size - usual.shape[1] - every.shape[1]
-    sd = math.sqrt(float(noise @ noise) / count * autocorrelation_time(noise))
-    return columns.T @ errors / max(sd, 1e-12)
 
 
 def _normal(row: FloatArray) -> FloatArray:
