@@ -154,8 +154,8 @@ def show(args: argparse.Namespace) -> None:
         print(f'| {row} | {" | ".join(cells)} | {"" if bar is None else f"{bar:g}"} |')
 
 
-def main() -> None:
-    """Run and compare."""
+def command_line() -> argparse.ArgumentParser:
+    """Return the parser of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[1])
     parser.add_argument('old', type=Path, help='checkout with .venv')
     parser.add_argument('new', type=Path, help='the other one')
@@ -164,7 +164,12 @@ def main() -> None:
                         help='real-time priority for the measured commands, as root')
     parser.add_argument('--demo', action='store_true', help='pam demo, and nothing else')
     results_page.add_write(parser, 'first_motion')
-    args = parser.parse_args()
+    return parser
+
+
+def main() -> None:
+    """Run and compare."""
+    args = command_line().parse_args()
     with results_page.printed(args, __file__, 'demo' * args.demo):
         show(args)
 
