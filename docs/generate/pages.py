@@ -14,7 +14,7 @@
 
 """Puts together what Sphinx reads: the pages of docs/, those from outside, the generated ones."""
 
-from generate import api, command_line, gap_schema, outside, yaml_files
+from generate import api, command_line, json_files, outside, yaml_files
 
 # What is no page, in docs/.
 _LEFT_OUT = ('generate', 'conf.py', '__pycache__')
@@ -37,7 +37,7 @@ def write_all(root, source, target):
             made[name] = text.encode()
     generated = {
         **outside.copies(root, target), **api.pages(root), **command_line.pages(),
-        **yaml_files.pages(), **gap_schema.pages()}
+        **yaml_files.pages(), **json_files.pages()}
     made.update((name, text.encode()) for name, text in generated.items())
     for name, data in made.items():
         path = target / name

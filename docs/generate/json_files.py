@@ -12,13 +12,14 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The pages on ``gap.json`` and ``investigation.json``, made from their JSON Schemas."""
+"""The pages on files that verbs write for programs, made from their JSON Schemas."""
 
 import json
 
 from generate.command_line import plain
 from pam_actuation.investigate.schema import investigation_schema
 from pam_sim.gap.report.schema import report_schema
+from pam_sim.identify.schema import identify_schema
 
 
 def pages():
@@ -26,6 +27,8 @@ def pages():
     return {
         **_page('gap', report_schema(), 'pam_sim.gap.report.schema.report_schema()',
                 'Tests hold reports of every verdict against it.'),
+        **_page('identify', identify_schema(), 'pam_sim.identify.schema.identify_schema()',
+                'Tests hold results against it.'),
         **_page('investigation', investigation_schema(),
                 'pam_actuation.investigate.schema.investigation_schema()',
                 'What it shares with gap.json has the same form.')}
