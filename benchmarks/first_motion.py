@@ -154,7 +154,7 @@ def show(args: argparse.Namespace) -> None:
         print(f'| {row} | {" | ".join(cells)} | {"" if bar is None else f"{bar:g}"} |')
 
 
-def command_line() -> argparse.ArgumentParser:
+def command_line():
     """Return the parser of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[1])
     parser.add_argument('old', type=Path, help='checkout with .venv')
