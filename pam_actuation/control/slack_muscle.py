@@ -60,9 +60,11 @@ class SlackMuscle:
         self._judged_ns: int | None = None
         self._empty_ns = 0          # how long it was wanted under air and was not
         self._obeyed_ns: int | None = None       # when its driver did not vent against a command
+        self._awaited_ns: int | None = None      # since when its driver's first word is due
         self._noticed_ns = 0
 
-    def judge(self, now_ns: int, command_pa: float, pressure_pa: float) -> bool:
+    def judge(self, now_ns: int, command_pa: float, pressure_pa: float,
+              others_told: bool = False) -> bool:
         """
         Take the newest reading; return whether the muscle is slack.
 
@@ -76,6 +78,9 @@ class SlackMuscle:
             Measured absolute pressure, NaN where none is fresh. Of a muscle whose pressure was
             never measured the word of its driver counts alone; one whose reading is lost
             counts as slack.
+        others_told : bool
+            Whether the driver of another muscle ever told what it follows. This one is then
+            expected to tell as well.
 
         """
         if math.isfinite(pressure_pa):
@@ -85,7 +90,7 @@ class SlackMuscle:
         if self._obeyed_ns is None or not vents:
             self._obeyed_ns = now_ns
         lost = self._measured_ns is not None and now_ns - self._measured_ns >= LOST_NS
-        silent = self._following.silent_ns(now_ns) >= LOST_NS
+        silent = self._silent_ns(now_ns, others_told) >= LOST_NS
         if self.slack:
             if lost or silent:
                 self._noticed_ns = now_ns
@@ -95,6 +100,15 @@ class SlackMuscle:
             self.slack = True
             self._noticed_ns = now_ns
         return self.slack
+
+    def _silent_ns(self, now_ns: int, others_told: bool) -> int:
+        """Return for how long [ns] its driver has told nothing, although it does or should."""
+        if self._following.told or not others_told:
+            self._awaited_ns = None
+            return self._following.silent_ns(now_ns)
+        if self._awaited_ns is None or now_ns < self._awaited_ns:
+            self._awaited_ns = now_ns
+        return now_ns - self._awaited_ns
 
     def _count(self, now_ns: int, command_pa: float, pressure_pa: float) -> None:
         """Add up how long the muscle was empty; commands that come and go count in part."""

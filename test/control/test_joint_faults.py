@@ -223,9 +223,9 @@ def test_a_joint_of_which_one_driver_does_not_follow_does_not_begin(valve, key, 
     begin, end = FROM_THE_START[key]
     rig = FaultyJoint(valve, lambda time_s: ANGLE_RAD)
     begin(rig, side)
-    rig.run(1.2)        # of a driver that never spoke, the pressure tells
+    rig.run(1.2)
     both_stay_vented(rig, side)
-    assert key == 'driver_killed' or max(map(max, rig.gauge_pa)) < 120e3
+    assert max(map(max, rig.gauge_pa)) < (150e3 if key == 'driver_killed' else 120e3)
     end(rig, side)
     comes_back(rig)
 
