@@ -47,11 +47,12 @@ from pam_actuation.rigging.processes import end_with_parent, name_process
 LATER = ('pam_actuation.bags.recorder', 'pam_actuation.control.config',
          'pam_actuation.control.loop', 'pam_actuation.drivers.for_rig',
          'pam_actuation.experiments', 'pam_sim.joint.model_file', 'pam_sim.plant',
-         'pam_sim.rollout.packing', 'scipy.linalg')
+         'pam_sim.rollout.packing', 'rosidl_generator_py', 'scipy.linalg')
 # Packages of the messages and services of every node.
 MESSAGES = ('builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs', 'lifecycle_msgs',
             'rcl_interfaces', 'sensor_msgs', 'service_msgs', 'std_msgs', 'std_srvs',
             'trajectory_msgs', 'type_description_interfaces')
+TYPE_SUPPORT = '_s__rosidl_typesupport_c'        # compiled, of a package of messages
 READ_BYTES = 1 << 16
 
 
@@ -184,15 +185,11 @@ def prepare(names: Sequence[str]) -> None:
     Nothing of it is garbage: a collection would only take time, and in a node copy what is shared.
     """
     gc.disable()
-    for module in (*LATER, *(f'{package}.msg' for package in MESSAGES),
-                   *(f'pam_actuation.nodes.{name}' for name in names)):
+    for module in (*LATER, *(f'pam_actuation.nodes.{name}' for name in names),
+                   *(f'{package}.msg' for package in MESSAGES),
+                   *(f'{package}.{package}{TYPE_SUPPORT}' for package in MESSAGES)):
         with contextlib.suppress(ImportError):      # the node says so itself
             importlib.import_module(module)
-    with contextlib.suppress(ImportError):
-        from rosidl_generator_py import import_type_support, UnsupportedTypeSupport
-        for package in MESSAGES:
-            with contextlib.suppress(UnsupportedTypeSupport):
-                import_type_support(package)
     from numba import njit
     njit(lambda number: number + 1.0)(1.0)
     # The first line that a node logs would look up the files of all modules.
