@@ -68,6 +68,11 @@ VIEW_REQUIRES = [
     'tornado>=6.4',
 ]
 
+# `pam view --foxglove`. Loaded by this option only.
+FOXGLOVE_REQUIRES = [
+    'foxglove-sdk>=0.16',
+]
+
 # Tables of `pam import` and `pam export` that pandas reads with another library.
 TABLE_REQUIRES = [
     'pyarrow>=14.0',     # Parquet
@@ -78,6 +83,7 @@ TEST_REQUIRES = [
     *DOCS_REQUIRES,
     *TABLE_REQUIRES,
     *VIEW_REQUIRES,
+    *FOXGLOVE_REQUIRES,
     'pytest>=7.4',
     'pytest-timeout>=2.1',
     'pytest-xdist>=3.7',
@@ -156,6 +162,7 @@ setup(
     extras_require={
         'ros': ROS_REQUIRES, 'test': TEST_REQUIRES, 'docs': DOCS_REQUIRES,
         'tables': TABLE_REQUIRES, 'view': VIEW_REQUIRES,
+        'foxglove': FOXGLOVE_REQUIRES,
         'cluster': CLUSTER_REQUIRES, 'ray': RAY_REQUIRES, 'bench': BENCH_REQUIRES},
     zip_safe=False,
     maintainer='pam_actuation developers',

@@ -42,6 +42,7 @@ EXECUTABLES = (
 
 # Import name -> name in setup.py, where they differ.
 DISTRIBUTIONS = {'yaml': 'pyyaml', 'mcap_ros2': 'mcap-ros2-support',
+                 'foxglove': 'foxglove-sdk',
                  'skfuzzy': 'scikit-fuzzy', 'sklearn': 'scikit-learn'}
 # Import name -> rosdep key in package.xml; plotly has none (docs/guides/installation.md).
 ROSDEP_KEYS = {
@@ -56,8 +57,8 @@ ROSDEP_KEYS = {
 # Come with rclpy or are only tried, with a way out where they are missing.
 WITH_ROS = {'rclpy', 'ament_index_python'}
 # Only where a cluster is named (pam_actuation/workers says what to install), for kinds of
-# tables, for the live page.
-OPTIONAL = {'dask', 'ray', 'h5py', 'pyarrow', 'tornado'}
+# tables, for the live page, for Foxglove.
+OPTIONAL = {'dask', 'ray', 'foxglove', 'h5py', 'pyarrow', 'tornado'}
 
 
 @pytest.fixture(scope='module')

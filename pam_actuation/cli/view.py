@@ -50,12 +50,17 @@ def add_arguments(parser: Parser) -> None:
                              'token that is printed (default: this machine only)')
     parser.add_argument('--port', type=count(0, 65535), default=None, metavar='N',
                         help='port, 0 for any (default: the first free one from 8750 on)')
+    parser.add_argument('--foxglove', action='store_true',
+                        help='serve the topics of the running rig to Foxglove instead of a page, '
+                             'to this machine only (default port: 8765)')
     parser.add_argument('--open', action='store_true', help='open the page in a browser here')
     add_recover_option(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Serve the page until Ctrl-C, which is the ordinary end."""
+    if args.foxglove:
+        return _serve_foxglove(args)
     need_tornado()
     from pam_actuation.namespaces import namespace_of
     from pam_actuation.view.access import Access
@@ -80,6 +85,37 @@ def run(args: argparse.Namespace) -> int:
         return _serve(args, ViewServer(listener, access, args.port), listener)
     finally:
         listener.close()
+
+
+def _serve_foxglove(args: argparse.Namespace) -> int:
+    """Serve the topics to Foxglove until Ctrl-C."""
+    from pam_actuation.namespaces import namespace_of
+    if args.bag is not None:
+        raise InputError('is for a running rig; Foxglove opens the .mcap file of a bag itself',
+                         '--foxglove')
+    for name in ('host', 'open'):
+        if getattr(args, name):
+            raise InputError('does not go with --foxglove, whose server has no password and '
+                             'listens to this machine only', f'--{name}')
+    try:
+        from pam_actuation.nodes.foxglove_server import FoxgloveServer, PORT
+    except ImportError as error:
+        from pam_actuation.ros_missing import ros_missing
+        raise InputError(ros_missing(error.name or 'rclpy')) from None
+    os.nice(max(NICENESS - os.nice(0), 0))
+    server = FoxgloveServer(
+        _domain(args), '' if args.namespace is None else namespace_of(
+            args.namespace, '--namespace'), PORT if args.port is None else args.port)
+    try:
+        print(json.dumps({'url': server.url, 'live': True}) if args.json else
+              f'Foxglove: Open connection, {server.url}\n'
+              'Ctrl-C ends it; the rig goes on without it', flush=True)
+        while True:
+            server.run_once()
+    except KeyboardInterrupt:
+        return EXIT_DONE
+    finally:
+        server.close()
 
 
 def _domain(args: argparse.Namespace) -> int | None:

@@ -12,75 +12,48 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""
-What the live page hears of a rig, and how it asks the drivers to vent.
-
-A node without parameters and services of its own. It subscribes as an onlooker: publishers send
-each message once and keep nothing for it, so it may be slow, stop or be killed at any time.
-"""
+"""What the live page hears of a rig, and how it asks the drivers to vent."""
 
 from collections.abc import Iterator
-import os
 import queue
 import time
 from typing import Any, Final
 
 from pam_actuation.bags.series import table
-from pam_actuation.nodes import qos
 from pam_actuation.nodes.endpoints import PolledSubscription
+from pam_actuation.nodes.onlooker import DIAGNOSTICS, Onlooker
 from pam_actuation.nodes.operator import is_below, serving
-from pam_actuation.nodes.ros_messages import message_class
 from pam_actuation.nodes.view_player import experiments, PLAYER, Playing, RECORDER
-from pam_actuation.rigging.client import context_by_environment
 from pam_actuation.topics.codec import Reader
-from pam_actuation.topics.quality import ONLOOKER
-from pam_actuation.topics.table import BY_NAME, short_name
+from pam_actuation.topics.table import short_name
 from pam_actuation.view.plots import KEPT
 from pam_actuation.view.requests import ACTIONS, EMERGENCY_STOP, PLAY, Request
 from pam_actuation.view.source import Answer
 from pam_actuation.view.store import Store
-import rclpy
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
 from std_srvs.srv import Trigger
 
-PAGE: Final = 'pam_view'            # beginning of the name of the node, and its enclave
-DIAGNOSTICS: Final = '/diagnostics'
 POLL_S, LOOK_S = 0.02, 1.0          # for messages; for new topics and drivers
 ANSWER_S: Final = 2.0               # a driver answers within a tick; later it is told as silent
 
 
-class ViewListener:
+class ViewListener(Onlooker):
     """
     A source of the page: the rigs of a ROS domain.
 
     Parameters
     ----------
-    domain_id : int, optional
-        ROS domain; default: that of the environment.
-    namespace : str
-        Only this namespace and those below it; '' for all.
+    domain_id, namespace
+        As of ``Onlooker``.
 
     """
 
     live = True
 
     def __init__(self, domain_id: int | None = None, namespace: str = '') -> None:
+        super().__init__(domain_id, namespace)
         self.title = namespace
         self.store = Store()
-        self._namespace = namespace
-        if domain_id is None:
-            domain_id = int(os.environ.get('ROS_DOMAIN_ID') or 0)
-        context = context_by_environment(
-            domain_id, ['--ros-args', '--enclave', f'/{PAGE}'])
-        # Several pages may look at one rig.
-        self._node = Node(f'{PAGE}_{os.getpid()}', context=context, use_global_arguments=False,
-                          enable_rosout=False, start_parameter_services=False)
-        self._executor = SingleThreadedExecutor(context=context)
-        self._executor.add_node(self._node)
-        self._topics: dict[str, PolledSubscription] = {}
         self._read = Reader(short_name(DIAGNOSTICS))
-        self._add(DIAGNOSTICS)
         self._clients: dict[str, dict[str, Any]] = {}       # driver: action: client
         self._players: list[str] = []
         self._asked: queue.SimpleQueue[tuple[Request, Answer]] = queue.SimpleQueue()
@@ -114,9 +87,7 @@ class ViewListener:
         while not self._asked.empty():
             self._begin(*self._asked.get())
         self._waiting = [one for one in self._waiting if not one.is_over()]
-        deadline_s = now_s + POLL_S
-        while (left_s := deadline_s - time.monotonic()) > 0.0:
-            self._executor.spin_once(timeout_sec=left_s)
+        self.spin_until(now_s + POLL_S)
 
     def _begin(self, request: Request, answer: Answer) -> None:
         """Ask those whom a request is for."""
@@ -133,9 +104,7 @@ class ViewListener:
 
     def _look(self) -> None:
         """Find topics and drivers that came, forget drivers that went."""
-        for name, types in self._node.get_topic_names_and_types():
-            if name not in self._topics and self._is_drawn(name, types):
-                self._add(name)
+        self.find_topics(KEPT)
         self._players = sorted(self._found_players())
         found = set(serving(self._node, self._namespace, EMERGENCY_STOP))
         for driver in self._clients.keys() - found:
@@ -146,11 +115,6 @@ class ViewListener:
                 action: self._node.create_client(Trigger, f'{driver}/{action}')
                 for action in ACTIONS}
 
-    def _is_drawn(self, name: str, types: list[str]) -> bool:
-        short = short_name(name)
-        return (short in KEPT and BY_NAME[short].type_name in types
-                and is_below(name, self._namespace))
-
     def _found_players(self) -> Iterator[str]:
         """Yield reference generators that are not recorded: a bag tells of one experiment."""
         nodes = self._node.get_node_names_and_namespaces()
@@ -160,11 +124,6 @@ class ViewListener:
             if name == PLAYER and is_below(full_name, self._namespace) and (
                     namespace not in recorded):
                 yield full_name
-
-    def _add(self, full_name: str) -> None:
-        self._topics[full_name] = PolledSubscription(
-            self._node, message_class(BY_NAME[short_name(full_name)].type_name), full_name,
-            qos.profile(ONLOOKER), raw=True)
 
     def _take(self, full_name: str, subscription: PolledSubscription) -> None:
         raws = [raw for raw, _ in subscription.take()]
@@ -183,12 +142,6 @@ class ViewListener:
             stamps_ns = stamps_ns[~bad]
             values = {name: column[~bad] for name, column in values.items()}
         self.store.add(namespace, short, stamps_ns, values, subscription.lost)
-
-    def close(self) -> None:
-        """Leave the graph."""
-        self._executor.shutdown(timeout_sec=1.0)
-        self._node.destroy_node()
-        rclpy.try_shutdown(context=self._node.context)
 
 
 class _Question:
