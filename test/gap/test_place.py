@@ -24,12 +24,14 @@ from pam_sim.gap.criteria import CRITERIA
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
 from pam_sim.gap.report.by_subsystem import add_place
+from pam_sim.gap.report.encoder import followed, sensor_part
 from pam_sim.gap.report.location import force_errors, ForceErrors
 from pam_sim.gap.report.place import Evidence, first_place
 from pam_sim.gap.result import GapResult, Share, SignalGap, SubsystemVerdict
 from pam_sim.gap.select.candidates import candidates
 from pam_sim.gap.select.rival import NamedEffect, Rival
 from pam_sim.gap.select.screening import Screened
+from pam_sim.gap.subsystems.simulation import pressure_driven, simulate_driven
 import pytest
 
 QUIET = SignalGap('Pa', 300.0, 310.0, 290.0, 290.0)
@@ -51,7 +53,7 @@ def pool():
 
 
 def place(run, verdict, valve=QUIET, muscle=MUSCLE, named=(), screened=(), forces=None,
-          errors=None):
+          errors=None, encoder=None):
     """Return the first row of a result with these gaps."""
     gaps = {'valve': {'pressure': valve}, 'muscle': muscle}
     recording = Recording(run, 'ppr')
@@ -63,7 +65,7 @@ def place(run, verdict, valve=QUIET, muscle=MUSCLE, named=(), screened=(), force
     return first_place(result, named, Evidence(
         recording, SimpleNamespace(gaps=gaps, residual=lambda problem, signal: (
             time_s, 7e3 * np.ones(time_s.size) if errors is None else errors(time_s))),
-        screened, forces, lambda w: {}, CRITERIA))
+        screened, forces, encoder, lambda w: {}, CRITERIA))
 
 
 def found_as(name, pool, others=()):
@@ -95,6 +97,8 @@ def test_a_sensor_is_a_place_of_its_own(run, pool):
     found = place(run, 'unknown', screened=(creep, lag))
     assert (found.subsystem, found.signal) == ('sensor', 'contraction')
     assert place(run, 'unknown', screened=(creep,)).subsystem == 'muscle'
+    found = place(run, 'unknown', forces=ForceErrors(0.5, 0.02, 0.5), encoder=0.9)
+    assert (found.subsystem, found.signal, found.certainty) == ('sensor', 'contraction', 0.9)
     found = place(run, 'unknown', forces=CELL)
     assert (found.subsystem, found.signal) == ('sensor', 'force')
 
@@ -132,6 +136,22 @@ def test_the_balance_of_forces_tells_muscle_from_load(run):
     rubbing = force_errors(rig.with_(effects=[
         {'name': 'coulomb_friction', 'parameters': {'force_n': 2.0}}]), recording)
     assert rubbing.muscle_part > 0.9 and rubbing.muscle > 1.0 > 100.0 * noise.muscle
+
+
+def test_an_encoder_that_creeps_is_told_from_a_muscle_that_does():
+    rig = nominal()
+    recording = Recording(recorded(rig, voltages(20.0)), 'ppr')
+    time_s, x = recording.time_s['contraction'], recording.measured['contraction']
+    grid = np.interp(recording.grid_s, time_s, x)
+    late = np.interp(time_s, recording.grid_s, grid - followed(grid, 3.0))
+    k = pressure_driven(rig)
+    stiffness = (simulate_driven(k, recording, grid).force_n - simulate_driven(
+        k, recording, grid + 1e-4).force_n) / 1e-4
+    noise = 1e-5 * np.random.default_rng(1).standard_normal(x.size)
+    sensor, muscle = 0.02 * late, 60.0 * late / np.interp(time_s, recording.grid_s, stiffness)
+    told = [sensor_part(rig, recording, time_s, e + noise, CRITERIA)
+            for e in (sensor, muscle, 0.0 * late)]
+    assert told[0] > 0.9 and told[1:] == [None, None]
 
 
 def test_an_unknown_load_is_told_of_by_subsystem():

@@ -18,7 +18,8 @@ The one place in which the disagreement lives after calibration: the first row o
 Each subsystem runs on its own measured inputs, so what it misses is its own. What a confirmed
 name explains of a subsystem is of that name's subsystem. The rest of muscle and load divides by
 the balance of forces. It is of a sensor where the readings of one sensor alone contradict the
-others, or where an error of a sensor would explain more than any other effect.
+others, where its error follows the contraction as that of a sensor does, or where an error of a
+sensor would explain more than any other effect.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -32,6 +33,7 @@ from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit
 from pam_sim.gap.report.by_subsystem import subsystem_of
+from pam_sim.gap.report.encoder import sensor_part
 from pam_sim.gap.report.location import force_errors, ForceErrors, locate, signal_conditions
 from pam_sim.gap.result import GapResult, Share
 from pam_sim.gap.select.rival import NamedEffect
@@ -63,6 +65,8 @@ class Evidence:
         What every effect promises at the calibrated model.
     forces : ForceErrors or None
         The balance of forces of the final model; None without a load cell.
+    encoder : float or None
+        The share of the error of the contraction that follows it as that of a sensor does.
     moved : callable
         ``moved(named)``: how far a name moves each signal of a free run, in sensor deviations.
     criteria : Criteria
@@ -74,6 +78,7 @@ class Evidence:
     runs: OwnRuns
     screened: Sequence[Screened]
     forces: ForceErrors | None
+    encoder: float | None
     moved: Moved
     criteria: Criteria
 
@@ -111,8 +116,12 @@ def places(result: GapResult, outcome: Outcome, estimator: Estimator, validation
         return validation.moved(held_without(final, others), whole)
 
     model, recording = model_of(estimator, final), validation.recording
+    encoder = None
+    if result.verdict == 'unknown' and 'contraction' in runs.gaps.get('muscle', {}):
+        encoder = sensor_part(
+            model, recording, *runs.residual('muscle', 'contraction'), estimator.criteria)
     first = first_place(result, outcome.named, Evidence(
-        recording, runs, outcome.screened, force_errors(model, recording), moved,
+        recording, runs, outcome.screened, force_errors(model, recording), encoder, moved,
         estimator.criteria))
     if first is None:
         return []
@@ -235,7 +244,9 @@ def _divided(problem: str, named: Sequence[NamedEffect], evidence: Evidence
 
 
 def _sensor(problem: str, evidence: Evidence) -> tuple[str, float] | None:
-    """Return (signal, certainty) where an error of its sensor would explain more than the rest."""
+    """Return (signal, certainty) where an error of its sensor explains more than the rest does."""
+    if problem == 'muscle' and evidence.encoder is not None:
+        return 'contraction', evidence.encoder
     criteria, best = evidence.criteria, {True: (0.0, ''), False: (0.0, '')}
     for one in evidence.screened:
         signal = get_effect(one.candidate.effect).fitting.sensor_signal
