@@ -59,7 +59,8 @@ def run(args: argparse.Namespace) -> int:
         result = run_experiment(
             experiment, rig, controller, rig.valve, out, learning=not args.freeze,
             seed=args.seed, domain_id=domain_id, namespace=args.namespace,
-            overwrite=args.overwrite, progress=lambda done, total: bar.update(done - bar.n))
+            overwrite=args.overwrite, progress=lambda done, total: bar.update(done - bar.n),
+            tell=lambda text: bar.write(f'pam run: {text}', file=sys.stderr))
     published, recorded = sum(result.published.values()), sum(result.recorded.values())
     # A node that was killed could not report its last count.
     counted = '' if result.failure else f', {published} published'

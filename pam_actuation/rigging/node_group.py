@@ -118,7 +118,8 @@ class NodeGroup:
         """Tell whether a node was asked to become active."""
         return name in self._asked
 
-    def start(self, compiled: Sequence[str] = ()) -> None:
+    def start(self, compiled: Sequence[str] = (),
+              tell: Callable[[str], object] = lambda text: None) -> None:
         """
         Start all processes and bring them up in order.
 
@@ -126,6 +127,8 @@ class NodeGroup:
         ----------
         compiled : sequence of str
             Arguments of ``compile_ahead.compile_ahead``: what is compiled first, once for all.
+        tell : callable
+            Gets a sentence if that takes long.
 
         Raises
         ------
@@ -142,7 +145,7 @@ class NodeGroup:
                 template.compile_ahead(compiled)
             # Meanwhile: from here on this process has threads, and leaves forking to the template.
             self.client = self._new_client(self.domain_id)
-            template.wait_until_compiled()      # what is wrong, the nodes say
+            template.wait_until_compiled(tell)      # what is wrong, the nodes say
             template.wait_until_ready()
         elif compiled:
             compile_ahead(*compiled)

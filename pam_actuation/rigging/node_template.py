@@ -21,10 +21,11 @@ systems than Linux there is none, and each node is started by itself.
 """
 
 import atexit
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 import contextlib
 from functools import partial
 import json
+import math
 import os
 import select
 import signal
@@ -43,6 +44,8 @@ OF_A_RUN = ('experiment_recorder', 'plant_simulator', 'valve_watchdog', 'valve_d
             'sofc_controller', 'reference_generator')
 PREPARE_TIMEOUT_S = 60.0        # for its imports, on a busy machine
 END_TIMEOUT_S = 5.0
+TELL_AFTER_S = 3.0
+COMPILES = 'compiling for the first run on this machine, up to two minutes'
 ROOM_FOR_WORDS = 4000           # for the command lines of its nodes, see ``name_process``
 READ_BYTES = 1 << 16
 
@@ -104,11 +107,31 @@ class NodeTemplate:
             self._channel.sendall(json.dumps({'compile': list(files)}).encode() + b'\n')
             self._compiling = True
 
-    def wait_until_compiled(self) -> str:
-        """Wait for what was asked for; return why not, '' if done. Ctrl-C ends the waiting."""
+    def wait_until_compiled(self, tell: Callable[[str], object] = lambda text: None,
+                            after_s: float = TELL_AFTER_S) -> str:
+        """
+        Wait for what was asked for; Ctrl-C ends the waiting.
+
+        Parameters
+        ----------
+        tell : callable
+            Gets a sentence, once, if it takes long.
+        after_s : float
+            How long [s].
+
+        Returns
+        -------
+        str
+            Why it cannot be compiled, '' if it is done.
+
+        """
+        tell_at_s = time.monotonic() + after_s
         while self._compiling and self.usable:
             with self._lock:
                 self._read(0.1)
+            if self._compiling and time.monotonic() > tell_at_s:
+                tell_at_s = math.inf
+                tell(COMPILES)
         return self._not_compiled
 
     def start(self, words: list[str], environment: Mapping[str, str],

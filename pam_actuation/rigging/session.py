@@ -50,10 +50,15 @@ if TYPE_CHECKING:
     from pam_sim.rig import Rig
 
 Progress = Callable[[float, float], object]     # takes seconds done, seconds in all
+Tell = Callable[[str], object]                  # takes a sentence
 
 OVERDUE_S = 5.0               # the reference may finish this much late
 STOPPED = 'stopped by the user'
 LEVEL_ERROR = 2
+
+
+def silent(text: str) -> None:
+    """Tell nobody."""
 
 
 @dataclass
@@ -151,9 +156,14 @@ class RigSession:
         """Return the processes, each by its place below the namespace."""
         return self.group.processes
 
-    def start(self) -> None:
+    def start(self, tell: Tell = silent) -> None:
         """
         Start all processes and bring them up, the reference last.
+
+        Parameters
+        ----------
+        tell : callable
+            As of ``run_experiment``.
 
         Raises
         ------
@@ -164,7 +174,7 @@ class RigSession:
         compiled = [str(self.plan.rig_file)]
         if self.plan.controller is not None:
             compiled.append(str(self.plan.controller_file))
-        self.group.start(compiled)
+        self.group.start(compiled, tell)
         self._active_since = time.monotonic()
         self._cpu = {name: process.cpu_s() for name, process in self.processes.items()}
 
@@ -297,7 +307,8 @@ def run_experiment(experiment: 'StrPath | Experiment',
                    domain_id: int | None = None, progress: Progress | None = None,
                    with_recorder: bool = True, namespace: str | None = None,
                    overwrite: bool = False, realtime: bool = True,
-                   programs: Mapping[str, Sequence[str]] | None = None) -> Result:
+                   programs: Mapping[str, Sequence[str]] | None = None,
+                   tell: Tell = silent) -> Result:
     """
     Run one experiment on live nodes and record it.
 
@@ -330,6 +341,8 @@ def run_experiment(experiment: 'StrPath | Experiment',
     programs : mapping, optional
         Place of a node below the namespace, such as ``plant_simulator``, to the command line of a
         node of your own that takes its place, with the same name, topics and life cycle.
+    tell : callable
+        Gets a sentence on what is going on where the start takes long.
 
     Returns
     -------
@@ -362,18 +375,19 @@ def run_experiment(experiment: 'StrPath | Experiment',
     try:
         with termination_as_interrupt(), RigSession(
                 plan, namespace, domain_id, programs) as session:
-            run_guarded(session, result, progress)
+            run_guarded(session, result, progress, tell)
     finally:
         plan.remove()
     return result
 
 
-def run_guarded(session: RigSession, result: Result, progress: Progress | None) -> None:
+def run_guarded(session: RigSession, result: Result, progress: Progress | None,
+                tell: Tell = silent) -> None:
     """Start, run and stop; a failure or Ctrl-C goes into the result."""
     begin: float | None = None
     ended: tuple[str, ...] = ()
     try:
-        session.start()
+        session.start(tell)
         begin = time.monotonic()
         session.run(progress)
     except SessionFailed as error:

@@ -19,6 +19,7 @@ from pathlib import Path
 import signal
 import subprocess
 import sys
+import threading
 import time
 
 import pytest
@@ -27,7 +28,7 @@ pytest.importorskip('rclpy', reason='rclpy is not installed')
 
 from pam_actuation.rigging.domain import DomainLock                            # noqa: E402, I100
 from pam_actuation.rigging.node_template import (                              # noqa: E402
-    NodeTemplate, OF_A_RUN, template_for)
+    COMPILES, NodeTemplate, OF_A_RUN, template_for)
 from pam_actuation.rigging.processes import (                                  # noqa: E402
     end_all, node_environment, NodeProcess)
 
@@ -116,6 +117,22 @@ def test_a_run_is_compiled_before_its_nodes_are_forked(template):
     template.compile_ahead(['no_such_rig'])
     assert 'no_such_rig' in template.wait_until_compiled()
     assert template.usable
+
+
+def test_a_long_compilation_is_told_once(template, environment, tmp_path):
+    node = NodeProcess('valve_watchdog', '/held', {}, environment, tmp_path, template=template)
+    held, said = parent_of(node.pid), []
+    os.kill(held, signal.SIGSTOP)
+    try:
+        template.compile_ahead(['dmsp_5_300_realistic'])
+        goes_on = threading.Timer(0.5, os.kill, (held, signal.SIGCONT))
+        goes_on.start()
+        assert template.wait_until_compiled(said.append, 0.1) == ''
+        goes_on.join()
+    finally:
+        os.kill(held, signal.SIGCONT)
+        end_all([node], END_S)
+    assert said == [COMPILES]
 
 
 def test_a_folder_and_variables_may_change_between_nodes(
