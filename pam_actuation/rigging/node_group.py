@@ -212,7 +212,7 @@ class NodeGroup:
                 # Of a driver that is dead or hangs the watchdog vents the muscle.
                 self.client.spin(VENT_S)
         self.client.spin(0.1)
-        if not problems:
+        if not problems and self._asked.issuperset(self.of_kind(DRIVER)):
             end_all(self.processes.values())        # the drivers have vented
         self.end()
         return problems
