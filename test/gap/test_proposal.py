@@ -13,34 +13,62 @@
 # limitations under the License.
 """A term without a name: found, proved, written as an effect file that simulates the same."""
 
+import json
 import os
 import subprocess
 import sys
 
 from gap_runs import assert_form, nominal, recorded, voltages
-import numpy as np
-from pam_sim import load_rig
 from pam_sim.effects.unnamed import terms
 from pam_sim.gap.criteria import CRITERIA
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.fit.estimator import Estimator
+from pam_sim.gap.propose.library import Factor, NOTHING, STAND_INS, Term
 from pam_sim.gap.propose.proposal import NONE, propose
+from pam_sim.gap.propose.search import candidate_of, ends_of
+from pam_sim.gap.propose.writing import EffectText
 from pam_sim.gap.result import GapResult
 from pam_sim.gap.subsystems.problems import subsystem_problems
-from pam_sim.located_yaml import dump_yaml
 import pytest
 import yaml
 
 DRAG_N = -3.0                # at 50 mm/s
 DRAG = {'name': 'muscle_term', 'parameters': {
     'first_of_1': DRAG_N, 'kind_1_of_1': terms.SIGNED_SQUARE, 'input_1_of_1': 2.0}}
+# Simulates each pair of effects, one of a file and its stand-in; prints how far they are apart.
 SCRIPT = """
-import sys
+import json, sys
 import numpy as np
 from pam_sim import load_rig
-rig = load_rig(sys.argv[1])
-np.save(sys.argv[2], rig.simulate(np.linspace(4.0, 5.0, 60), initial_pressure_pa=501325.0).outputs)
+for name, valve, effects in json.load(open(sys.argv[1])):
+    rig = load_rig('dmsp_5_300_hanging_mass', valve=valve)
+    signal = np.linspace(4.0, 5.0, 40)
+    if valve == 'hsv':
+        signal = np.column_stack([np.abs(np.sin(signal * 9.0)), np.abs(np.sin(signal * 7.0))])
+    one, other, none = (
+        rig.with_(effects=chosen).simulate(signal, initial_pressure_pa=501325.0).outputs
+        for chosen in (effects[:1], effects[1:], []))
+    same, acts = np.allclose(one, other, 1e-6, 1e-9), not np.allclose(one, none, 1e-9)
+    print(name, same, acts)
 """
+RANGES = {'p': (1e4, 5e5), 'x': (1e-4, 0.02), 'v': (-0.2, 0.2), 't': (0.005, 60.0),
+          'F': (1.0, 90.0), 's': (1e5, 6e5), 'e': (-1e5, 1e5), 'a': (0.0, 1.0), 'b': (0.0, 1.0)}
+# By stand-in: channel, factors (kind, input, shape), and amplitude in the unit of the channel.
+FORMS = [
+    ('muscle_term', 0, (terms.STOP, 1, 2e-4), (terms.SIGN, 2, 3e-3), 2.0),
+    ('muscle_term', 0, (terms.PASSING, 0, 0.02), (terms.LINEAR, 3, 1.0), 500.0),
+    ('muscle_term', 1, (terms.SIZE, 2, 1.0), None, 3.0),
+    ('load_term', 0, (terms.SINE, 0, 4e-3), None, 2.0),
+    ('load_term', 0, (terms.ABOVE, 0, 2e-3), (terms.SQUARE, 1, 1.0), 900.0),
+    ('set_point_term', 0, (terms.CUBE, 0, 1.0), (terms.LINEAR, 4, 1.0), 1e7),
+    ('set_point_term', 0, (terms.PASSING, 0, 0.2), None, 1e5),
+    ('set_point_term', 1, (terms.LINEAR, 1, 1.0), None, 0.3),
+    ('set_point_term', 2, (terms.SWING, 1, 0.2), None, 0.5),
+    ('flow_term', 0, (terms.LINEAR, 0, 1.0), None, 3.0),
+    ('flow_term', 1, (terms.LINEAR, 2, 1.0), None, -0.3),
+    ('flow_term', 2, (terms.SIGNED_SQUARE, 3, 1.0), None, -0.3),
+    ('contraction_reading_term', 0, (terms.SINE, 1, 3e-3), None, 1e-4),
+    ('force_reading_term', 0, (terms.STOP, 2, 0.5), None, 1.0)]
 
 
 def asked(rig):
@@ -66,20 +94,33 @@ def test_the_missing_term_is_found_and_says_what_it_is(drag):
     assert_form(drag)
 
 
-def test_its_file_loads_and_simulates_as_the_term_does(drag, tmp_path):
-    (tmp_path / 'proposed_effect.py').write_text(drag.proposal.text)
-    (tmp_path / 'model.yaml').write_text(drag.proposal.model_yaml)
-    flat = tmp_path / 'out.npy'
+def written(number, effect, channel, one, two, size):
+    """Return (text of an effect file, its entry in a model, that of its stand-in, valve)."""
+    stand_in = next(s for s in STAND_INS if s.effect == effect)
+    term = Term(stand_in.channels[channel], Factor(*one), Factor(*two) if two else NOTHING)
+    values = {'first_of_1': size, 'second_of_1': 0.5 * size, 'shape_1_of_1': one[2]}
+    values = {f.name: values[f.name] for f in term.free(1)}
+    text = EffectText(stand_in, [term], values, RANGES, 1.0, f'term_{number}')
+    trial = candidate_of(stand_in, [term], ends_of(stand_in, RANGES)).setting(values)
+    return text.text(), {'name': text.name, 'parameters': text.values()}, trial, stand_in.valves
+
+
+def test_files_load_and_simulate_as_the_terms_that_were_tried(drag, tmp_path):
+    found = drag.proposal
+    (tmp_path / found.file).write_text(found.text)
+    pairs = [('drag', 'ppr', [yaml.safe_load(found.model_yaml)['effects'][0], found.trial])]
+    for number, form in enumerate(FORMS):
+        text, entry, trial, valves = written(number, *form)
+        (tmp_path / f'term_{number}.py').write_text(text)
+        pairs.append((form[0] + str(number), valves[0], [entry, trial]))
+    (tmp_path / 'pairs.json').write_text(json.dumps(pairs, default=float))
     answer = subprocess.run(
-        [sys.executable, '-c', SCRIPT, str(tmp_path / 'model.yaml'), str(flat)],
-        capture_output=True, text=True, timeout=200,
+        [sys.executable, '-c', SCRIPT, str(tmp_path / 'pairs.json')],
+        capture_output=True, text=True, timeout=300,
         env={**os.environ, 'PAM_EFFECTS_PATH': str(tmp_path), 'NUMBA_DISABLE_JIT': '1',
              'PYTHONPATH': os.pathsep.join(sys.path), 'PAM_CACHE_DIR': str(tmp_path / 'cache')})
     assert answer.returncode == 0, answer.stderr
-    tried = {**yaml.safe_load(drag.proposal.model_yaml), 'effects': [drag.proposal.trial]}
-    same = load_rig(dump_yaml(tried)).simulate(
-        np.linspace(4.0, 5.0, 60), initial_pressure_pa=501325.0).outputs
-    assert np.allclose(np.load(flat), same, rtol=1e-6, atol=1e-9)
+    assert answer.stdout.split('\n')[:-1] == [f'{name} True True' for name, *_ in pairs]
 
 
 def test_noise_alone_has_no_term():

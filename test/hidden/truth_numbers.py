@@ -43,6 +43,9 @@ NUMBERS = {
     'wander': 0.0, 'wander_hz': 1.3,
     # What somebody does to the load: a force against contraction.
     'pull': 0.0,
+    # More that no library has.
+    'fill_curve': 0.0, 'drag_p': 0.0, 'bump': 0.0, 'bump_at': 0.01, 'full_slow': 0.0,
+    'ageing': 0.0,
 }
 
 

@@ -36,7 +36,8 @@ EVERY = 2                     # one row of output per so many steps
  CREEP_T2, CREEP_T3, CREEP_T4, SOFTEN, SOFTEN_T1, SOFTEN_T2, THRESHOLD, TAPER, TAPER_GROWTH,
  TUBE, TUBE_HARDENING, GUIDE, SPRING, SPRING_CUBIC, RIPPLE, RIPPLE_PERIOD, CONTACT, PULSATION,
  PULSATION_HZ, GAIN_DRIFT, DRAG_X2, DRAG_V2, DRY_GROWING, DRY_PULL, STOP_STIFFNESS, STOP_AT,
- RESONANCE_HZ, RESONANCE_DAMPING, WANDER, WANDER_HZ, PULL) = range(len(NUMBERS))
+ RESONANCE_HZ, RESONANCE_DAMPING, WANDER, WANDER_HZ, PULL, FILL_CURVE, DRAG_P, BUMP, BUMP_AT,
+ FULL_SLOW, AGEING) = range(len(NUMBERS))
 
 # Physical constants and the muscle.
 ATM, AMBIENT, GAS, GRAVITY, RHO = 101325.0, 293.15, 287.05, 9.80665, 1.185
@@ -202,6 +203,8 @@ def regulator_rate(y, target, t, n, d):
         d[Y_RATE] = w * w * distance - 2.0 * n[RESONANCE_DAMPING] * w * y[Y_RATE]
         return y[Y_RATE]
     rate = distance / n[T_M]
+    if n[FULL_SLOW] != 0.0:              # the more air there is to move
+        rate /= 1.0 + n[FULL_SLOW] * x / 0.020
     if n[VENT_RATIO] != 1.0:
         falling = 0.5 - 0.5 * math.tanh(distance / 800.0)
         rate /= 1.0 + (n[VENT_RATIO] - 1.0) * falling
@@ -228,6 +231,11 @@ def air_rates(y, p, fill, vent, n, d):
     vent = second_stage(y, vent, Y_B1, Y_B2, n[LAG_1], n[LAG_2], d)
     inward = fill * iso_flow(supply, p, n[C], CRITICAL)
     outward = vent * iso_flow(p, ATM, n[C], CRITICAL) / n[VENT_RATIO] + air_lost(p, n)
+    if n[FILL_CURVE] != 0.0:
+        inward *= 1.0 - n[FILL_CURVE] * fill
+    if n[FULL_SLOW] != 0.0:
+        inward /= 1.0 + n[FULL_SLOW] * y[Y_X] / 0.020
+        outward /= 1.0 + n[FULL_SLOW] * y[Y_X] / 0.020
     aside = 0.0
     if n[SECOND_VOLUME] > 0.0:
         beside = y[Y_SECOND] * RT / n[SECOND_VOLUME]
@@ -247,7 +255,7 @@ def air_rates(y, p, fill, vent, n, d):
 
 
 @jit
-def muscle_pull(y, p, anchors, n, d):
+def muscle_pull(y, p, t, anchors, n, d):
     """Return the tension [N] of map, rubber, memory and bristle, and fill their rates."""
     x, v = y[Y_X], y[Y_V]
     gauge = p - ATM
@@ -257,6 +265,8 @@ def muscle_pull(y, p, anchors, n, d):
     if n[TAPER] != 0.0:
         strain *= 1.0 + n[TAPER] * (1.0 + n[TAPER_GROWTH] * strain)
     force = map_force(gauge, strain, n[GAIN_MAP])
+    if n[AGEING] != 0.0:
+        force *= 1.0 - n[AGEING] * (1.0 - math.exp(-t / 15.0))
     if n[SOFTEN] != 0.0:
         force /= 1.0 + n[SOFTEN] * y[Y_WARM_2]
         d[Y_WARM_1] = (abs(v) / 0.020 - y[Y_WARM_1]) / n[SOFTEN_T1]
@@ -285,7 +295,9 @@ def muscle_pull(y, p, anchors, n, d):
     force -= n[DRAG_X2] * x * x * v + n[DRAG_V2] * abs(v) * v
     if n[RIPPLE] != 0.0:
         force -= n[RIPPLE] * math.sin(2.0 * math.pi * x / n[RIPPLE_PERIOD])
-    return force - n[DAMPING] * v
+    if n[BUMP] != 0.0:
+        force -= n[BUMP] * math.exp(-((x - n[BUMP_AT]) / 2e-3) ** 2)
+    return force - (n[DAMPING] + n[DRAG_P] * gauge / 4e5) * v
 
 
 @jit
@@ -311,7 +323,7 @@ def rates(y, in_a, in_b, t, anchors, valve, n, d):
         d[Y_AIR] = regulator_rate(y, in_a, t, n, d)
     else:
         air_rates(y, p, in_a, in_b, n, d)
-    pull = muscle_pull(y, p, anchors, n, d)
+    pull = muscle_pull(y, p, t, anchors, n, d)
     push = load_push(y, t, n, d)
     acceleration = (pull - push) / n[MASS] - GRAVITY
     if y[Y_X] <= 0.0 and y[Y_V] <= 0.0 and acceleration < 0.0:

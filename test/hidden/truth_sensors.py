@@ -79,6 +79,13 @@ def readings(rows, chain):
         offset = rig.ATM if topic == 'pressure' else 0.0
         gain = 1.0 + chain.effects.get(f'{topic}_gain', 0.0)
         found[topic] = offset + gain * (values - offset) + chain.effects.get(f'{topic}_bias', 0.0)
+        if f'{topic}_wave' in chain.effects:
+            period = chain.effects[f'{topic}_wave_period']
+            found[topic] = found[topic] + chain.effects[f'{topic}_wave'] * np.sin(
+                2.0 * np.pi * values / period)
+    if 'force_of_pressure' in chain.effects:       # of 400 kPa, through the mounting
+        found['force'] = found['force'] + chain.effects['force_of_pressure'] * (
+            rows[:, rig.O_P] - rig.ATM) / 4e5
     return found
 
 

@@ -23,7 +23,7 @@ from pam_sim.effects.unnamed import terms
 from pam_sim.units import P_ATM_PA
 
 INPUTS = (terms.SET_POINT, terms.DISTANCE, terms.PRESSURE, terms.CONTRACTION, terms.TIME)
-AIM, QUICKNESS = range(2)
+AIM, QUICKNESS, SWING = range(3)
 SLOWEST = 0.1                # of the regulator: however large the term
 
 
@@ -56,4 +56,10 @@ def set_point(set_point_pa: float, time_constant_s: float, pressure_pa: float,
         AIM, gauge, distance, now, contraction_m, plant.time_s, 0.0, state, par)
     quicker = terms.term_sum(
         QUICKNESS, gauge, distance, now, contraction_m, plant.time_s, 0.0, state, par)
+    for k in range(int(par.used)):
+        slot = par.slots[k]
+        if slot.channel == SWING and slot.first != 0.0:
+            state.memory[k] = terms.swung(
+                state.memory[k], distance, par.step_s, slot.shape_1, slot.first)
+            return pressure_pa + time_constant_s * state.memory[k], time_constant_s
     return set_point_pa + change, time_constant_s / max(1.0 + quicker, SLOWEST)

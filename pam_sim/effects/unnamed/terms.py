@@ -37,9 +37,9 @@ from pam_sim.records import record
 SLOTS = 4
 INPUTS = 5
 (ONE, LINEAR, SQUARE, CUBE, SIZE, SIGNED_SQUARE, SIGN, ABOVE, SINE, FADE, STOP, PASSING,
- BELOW) = range(13)
+ BELOW, SWING) = range(14)
 PAIRED = (SINE,)            # sine and cosine, each with an amplitude of its own
-REMEMBER = (STOP, PASSING)
+REMEMBER = (STOP, PASSING, SWING)
 
 _FIELDS = ('channel', 'first', 'second', 'input_1', 'kind_1', 'shape_1', 'input_2', 'kind_2',
            'shape_2')
@@ -143,6 +143,13 @@ def followed(value: float, anchor: float, width: float) -> float:
 def relaxed(memory: float, value: float, elapsed_s: float, time_constant_s: float) -> float:
     """Return a memory that follows a value with a time constant."""
     return memory + elapsed_s / (time_constant_s + 0.5 * elapsed_s) * (value - memory)
+
+
+@compiled
+def swung(rate: float, distance: float, step_s: float, period_s: float, damping: float) -> float:
+    """Return a rate after a step towards something ``distance`` away, as a spring pulls it."""
+    w = 2.0 * math.pi / period_s
+    return rate + step_s * (w * w * distance - 2.0 * damping * w * rate)
 
 
 @compiled

@@ -40,6 +40,8 @@ STOPS = (0.01, 0.03, 0.1, 0.3)               # of the range
 MEMORIES_S = (0.05, 0.2, 1.0, 5.0, 20.0)
 LONG_S = 2.0                 # of a reading: what lasts longer is a trend
 FADES_S = (2.0, 8.0, 25.0)
+SWINGS_S = (0.12, 0.2, 0.3, 0.45)
+DISTANCE_PLACE = 1           # of the inputs of a set point
 SOFT = {'v': 3e-3, 'e': 1.5e3}               # width of a change of direction
 
 
@@ -76,7 +78,8 @@ STAND_INS = (
         Channel(load_term.DRY, 'F_guide', 'N', 0.5, 0.0))),
     StandIn('set_point_term', 'valve', set_point_term.INPUTS, (
         Channel(set_point_term.AIM, 's', 'Pa', 1e3),
-        Channel(set_point_term.QUICKNESS, '1/T', '-', 0.05)), ('ppr',)),
+        Channel(set_point_term.QUICKNESS, '1/T', '-', 0.05),
+        Channel(set_point_term.SWING, 'zeta', '-', 0.5, 0.0005)), ('ppr',)),
     StandIn('flow_term', 'valve', flow_term.INPUTS, (
         Channel(flow_term.NET, 'mdot', 'kg/s', 0.05, -1.0, flow_term.FLOW_SCALE),
         Channel(flow_term.FILL, 'mdot_fill', '-', 0.03),
@@ -100,7 +103,7 @@ class Factor:
     def is_shaped(self) -> bool:
         """Return whether its shape is fitted."""
         return self.kind in (terms.ABOVE, terms.BELOW, terms.SINE, terms.FADE, terms.STOP,
-                             terms.PASSING)
+                             terms.PASSING, terms.SWING)
 
 
 NOTHING = Factor(terms.ONE)
@@ -158,6 +161,9 @@ def library(stand_in: StandIn, ranges: Mapping[str, tuple[float, float]],
     """
     found = []
     for channel in stand_in.channels:
+        if channel.symbol == 'zeta':        # its amplitude is a damping, it stands alone
+            found += [Term(channel, Factor(terms.SWING, DISTANCE_PLACE, s)) for s in SWINGS_S]
+            continue
         alone = [f for i, one in enumerate(stand_in.inputs) if one.symbol in ranges
                  for f in _factors(i, one, ranges[one.symbol], waves_s)]
         if stand_in.signal:             # gain and bias of a sensor have names

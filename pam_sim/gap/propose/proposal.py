@@ -64,6 +64,8 @@ class Proposal:
         The ranges in words.
     trial : dict
         The entry of a model file by which it was tried, a stand-in of the file.
+    proof : dict of str -> (float, float)
+        By signal, the error (rms) on the certify data without the term and with it.
 
     """
 
@@ -76,6 +78,7 @@ class Proposal:
     model_yaml: str
     where: str
     trial: dict[str, Any]
+    proof: dict[str, tuple[float, float]]
 
     @property
     def file(self) -> str:
@@ -135,13 +138,13 @@ def propose(result: GapResult, estimator: Estimator, final: Fit, held_out: Recor
         found = _found(learning, problem, start, out_of_time)
         if found is None:
             continue
-        proved = both.polish(both.fit(found.fit.hypothesis, found.fit.theta, found.fit))
+        proved = both.polish(found.fit)
         validation = Validation(held_out, whole, both, final, proved, seed)
         fell, _ = validation.fall(validation.refit, validation.after)
         explained = 1.0 - validation.unexplained()
         if (explained > criteria.greater_part and fell > criteria.greater_part
                 and not validation.worse()):
-            result.proposal = _written(both, found, proved, explained)
+            result.proposal = _written(both, found, proved, validation)
             result.remarks.append(result.proposal.sentence)
             return
     result.remarks.append(NONE)
@@ -173,9 +176,10 @@ def _fits(stand_in: StandIn, learning: Estimator, problem: SubsystemProblem) -> 
             and (not stand_in.signal or stand_in.signal in problem.signals))
 
 
-def _written(estimator: Estimator, found: Sum, proved: Fit, explained: float) -> Proposal:
+def _written(estimator: Estimator, found: Sum, proved: Fit, validation: Validation
+             ) -> Proposal:
     """Return the proposal of proved terms, with its file and its model."""
-    values = proved.values()[found.place]
+    values, explained = proved.values()[found.place], 1.0 - validation.unexplained()
     ranges = {one.symbol: (found.ends[f'low_of_{i}'], found.ends[f'high_of_{i}'])
               for i, one in enumerate(found.stand_in.inputs) if f'low_of_{i}' in found.ends}
     effect = EffectText(found.stand_in, found.terms, values, ranges, explained)
@@ -190,4 +194,5 @@ def _written(estimator: Estimator, found: Sum, proved: Fit, explained: float) ->
         'name': effect.name, 'parameters': effect.values()}]
     return Proposal(effect.equation, effect.name, found.stand_in.subsystem, float(explained),
                     effect.ranges, effect.text(), dump_yaml(data),
-                    range_text(effect.ranges, effect.inputs), proved.settings()[found.place])
+                    range_text(effect.ranges, effect.inputs), proved.settings()[found.place],
+                    {s: (g.rmse_refit, g.rmse_after) for s, g in validation.signals().items()})

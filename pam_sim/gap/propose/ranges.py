@@ -77,24 +77,31 @@ def waves_in(problem: SubsystemProblem, found: Fit) -> tuple[float, ...]:
     """
     chosen = (problem.part == FIT) & (problem.run == 0)
     errors = found.errors[problem.subsystem]
-    duration = float(problem.time_s[chosen].max(initial=0.0))
-    if duration <= 0.0:
-        return ()
     periods: list[float] = []
     for s in range(len(problem.signals)):
         mine = chosen & (problem.signal == s)
-        place = (problem.time_s[mine] * WAVE_RATE_HZ).astype(int)
-        count = int(duration * WAVE_RATE_HZ) + 1
-        number = np.bincount(place, minlength=count)
-        total = np.bincount(place, errors[mine] - np.mean(errors[mine]), count)
-        size = FINER * count
-        power = np.abs(np.fft.rfft(total / np.maximum(number, 1), size)) ** 2
-        frequencies = np.fft.rfftfreq(size, 1.0 / WAVE_RATE_HZ)
-        power[(frequencies < SLOWEST_WAVES / duration) | (frequencies > FASTEST_HZ)] = 0.0
-        for _ in range(WAVES):
-            k = int(np.argmax(power))
-            if power[k] <= 0.0:
-                break
-            periods.append(1.0 / float(frequencies[k]))
-            power[max(k - FINER, 0):k + FINER + 1] = 0.0
+        periods += waves_of(problem.time_s[mine], errors[mine])
     return tuple(dict.fromkeys(periods))
+
+
+def waves_of(time_s: FloatArray, values: FloatArray) -> list[float]:
+    """Return the periods [s] of the strongest waves in values at some instants."""
+    duration = float(time_s.max(initial=0.0))
+    if duration <= 0.0:
+        return []
+    periods: list[float] = []
+    place = (time_s * WAVE_RATE_HZ).astype(int)
+    count = int(duration * WAVE_RATE_HZ) + 1
+    number = np.bincount(place, minlength=count)
+    total = np.bincount(place, values - np.mean(values), count)
+    size = FINER * count
+    power = np.abs(np.fft.rfft(total / np.maximum(number, 1), size)) ** 2
+    frequencies = np.fft.rfftfreq(size, 1.0 / WAVE_RATE_HZ)
+    power[(frequencies < SLOWEST_WAVES / duration) | (frequencies > FASTEST_HZ)] = 0.0
+    for _ in range(WAVES):
+        k = int(np.argmax(power))
+        if power[k] <= 0.0:
+            break
+        periods.append(1.0 / float(frequencies[k]))
+        power[max(k - FINER, 0):k + FINER + 1] = 0.0
+    return periods

@@ -22,11 +22,11 @@ term is looked for, as long as the select part shows that it is there.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from pam_sim.annotations import FloatArray
-from pam_sim.effects.unnamed.terms import PAIRED, SLOTS
+from pam_sim.effects.unnamed.terms import PAIRED, SLOTS, SWING
 from pam_sim.errors import InputError
 from pam_sim.gap.fit.candidate import Candidate
 from pam_sim.gap.fit.estimator import Estimator
@@ -40,9 +40,11 @@ from pam_sim.gap.subsystems.effects import shows
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 
 FITTED = 3                   # most promising terms of a stand-in that are fitted
+FITTED_LATER = 2             # the same of a further term
 FITTED_READINGS = 1          # of a sensor
 ALIKE = 1                    # of the same factors, such as periods near each other
 NEAR_BEST = 0.5              # of the best promise of a stand-in: less is not fitted
+ROUNDS = 2                   # of the weights: the best fit is polished
 SIZE_COST = 0.06             # of the logarithm of the rest: what a further number must gain
 
 
@@ -109,16 +111,19 @@ def find_terms(estimator: Estimator, problem: SubsystemProblem, start: Fit,
         promises = _promises(estimator, problem, now, tried, ranges, waves_s(now), found)
         options = [one for one in parallel_map(
             lambda promise: _fitted(estimator, now, promise, ranges, found),
-            _most_promising(promises)) if one is not None]
+            _most_promising(promises, FITTED_LATER if found else FITTED)) if one is not None]
         if not options:
             break
         best = min(options, key=lambda one: _cost(problem, one))
         t = preference(problem, now.errors[s], best.fit.errors[s], now.errors[s], quiet=True)
         gained = 1.0 - gap(problem, best.fit.errors[s]) / left
-        if gained < criteria.first_gain or not t > criteria.certain_sd:
+        certain = criteria.likely_sd if found else criteria.certain_sd
+        if gained < 2.0 * criteria.close_share or not t > certain:
             break
         estimator.take_slopes(best.fit.settings(), best.fit.known_z, [problem])
-        found = replace(best, fit=estimator.polish(best.fit))
+        found = best
+        if found.terms[-1].one.kind == SWING:
+            break
     return found
 
 
@@ -128,7 +133,7 @@ def _cost(problem: SubsystemProblem, one: Sum) -> float:
     return float(np.log(rest)) + SIZE_COST * sum(term.size for term in one.terms)
 
 
-def _most_promising(promises: Sequence[Promise]) -> list[Promise]:
+def _most_promising(promises: Sequence[Promise], fitted: int = FITTED) -> list[Promise]:
     """Return the promises worth a fit: some of each stand-in, few of the same factors."""
     kept: list[Promise] = []
     count: dict[object, int] = {}
@@ -136,7 +141,7 @@ def _most_promising(promises: Sequence[Promise]) -> list[Promise]:
         f, g, owner = one.term.one, one.term.two, one.stand_in.effect
         key = (owner, one.term.channel.number, f.kind, f.of, g.kind, g.of)
         best = max(p.share for p in promises if p.stand_in.effect == owner)
-        most = FITTED_READINGS if one.stand_in.signal else FITTED
+        most = FITTED_READINGS if one.stand_in.signal else fitted
         if (count.get(key, 0) < ALIKE and count.get(owner, 0) < most
                 and one.share > max(NEAR_BEST * best, 0.0)):
             kept.append(one)
@@ -152,15 +157,17 @@ def _promises(estimator: Estimator, problem: SubsystemProblem, now: Fit,
     """Return every term of the library with what it promises on the fitted part."""
     promises = []
     for stand_in in stand_ins:
-        terms = library(stand_in, ranges, waves_s)
         seen = None
         if stand_in.subsystem in ('muscle', 'load'):
             seen = force_error(estimator, problem.recordings, now, stand_in.subsystem)
+        if seen is not None and found and stand_in.subsystem == 'load':
+            seen = seen.less(stand_in, found.terms, now.values()[found.place])
         if seen is not None:
             promises += [Promise(stand_in, term, *seen.promise(stand_in, term))
-                         for term in terms]
+                         for term in library(stand_in, ranges, seen.waves_s)]
         else:
-            promises += _simulated(estimator, problem, now, stand_in, terms, ranges, found)
+            promises += _simulated(estimator, problem, now, stand_in, library(
+                stand_in, ranges, waves_s), ranges, found)
     return promises
 
 
@@ -233,7 +240,7 @@ def _fitted(estimator: Estimator, now: Fit, promise: Promise,
         theta.append(fresh)
     hypothesis = Hypothesis(tuple(effects), now.hypothesis.numbers)
     try:
-        fit = estimator.fit(hypothesis, np.concatenate(theta), now)
+        fit = estimator.fit(hypothesis, np.concatenate(theta), now, rounds=ROUNDS)
     except (InputError, np.linalg.LinAlgError, ValueError):
         return None
     return Sum(stand_in, terms, ends, fit)
@@ -241,6 +248,8 @@ def _fitted(estimator: Estimator, now: Fit, promise: Promise,
 
 def _started(amount: float, term: Term) -> float:
     """Return the normalised amplitude a fit starts from."""
+    if term.one.kind == SWING:
+        return 1.0
     return float(np.clip(amount, -20.0, 20.0)) or 0.1
 
 

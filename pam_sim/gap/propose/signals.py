@@ -21,8 +21,9 @@ least squares, without a simulation. What numbers of the model can explain withi
 taken out first.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from pam_sim.annotations import BoolArray, FloatArray
@@ -31,7 +32,8 @@ from pam_sim.gap.data.recording import GRID_S, Recording
 from pam_sim.gap.data.split import FIT, part_of
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit
-from pam_sim.gap.propose.library import Factor, StandIn, Term
+from pam_sim.gap.propose.library import Factor, moved_to, StandIn, Term
+from pam_sim.gap.propose.ranges import waves_of
 from pam_sim.gap.report.location import AT_STOP_M, MOVING_M_PER_S, smooth_motion
 from pam_sim.gap.subsystems.simulation import pressure_driven, simulate_driven
 from pam_sim.gap.verify.model import model_of
@@ -81,6 +83,22 @@ class ForceError:
         """Return a column at the chosen samples less what numbers can do."""
         y = np.concatenate([column[self.chosen], np.zeros(self.numbers)])
         return y - self.basis @ (self.basis.T @ y)
+
+    @property
+    def waves_s(self) -> tuple[float, ...]:
+        """Return the periods [s] of its strongest waves over time."""
+        return tuple(waves_of(self.time_s[self.chosen], self.error[self.chosen]))
+
+    def less(self, stand_in: StandIn, found: Sequence[Term], values: Mapping[str, float]
+             ) -> Self:
+        """Return the same less terms of the load, which its weight does not hold."""
+        error = self.error
+        for place, term in enumerate(found, 1):
+            fitted = moved_to(term, values.get(f'shape_1_of_{place}', term.one.shape))
+            columns = columns_of(fitted, self, [one.symbol for one in stand_in.inputs], 1.0)
+            for name, column in zip(('first', 'second'), columns):
+                error = error - values[f'{name}_of_{place}'] * column
+        return replace(self, error=error)
 
     def promise(self, stand_in: StandIn, term: Term) -> tuple[tuple[float, ...], float]:
         """Return (amplitudes in trials, squared error [N^2] that it explains) of a term."""

@@ -38,6 +38,9 @@ def equation_of(stand_in: StandIn, found: Sequence[Term], values: Mapping[str, f
         Amplitudes and shapes, by the names of the stand-in.
 
     """
+    if found[0].one.kind == terms.SWING:
+        return (f"p\'\' = w^2 (s - p) - 2 zeta w p\', w = 2 pi / {values['shape_1_of_1']:.3g} s, "
+                f"zeta = {values['first_of_1']:.3g}")
     parts = []
     for channel in dict.fromkeys(term.channel for term in found):
         rest = [_term(stand_in, term, place, values) for place, term in enumerate(found, 1)

@@ -84,13 +84,16 @@ class EffectText:
         Of every input, by symbol.
     explained : float
         Share of the squared gap of the proof that it removes.
+    name : str, optional
+        Of the effect; by default one that is free.
 
     """
 
     def __init__(self, stand_in: StandIn, found: Sequence[Term], values: Mapping[str, float],
-                 ranges: Mapping[str, tuple[float, float]], explained: float) -> None:
+                 ranges: Mapping[str, tuple[float, float]], explained: float,
+                 name: str = '') -> None:
         self._stand_in, self._terms, self._values = stand_in, tuple(found), values
-        self.name = free_name()
+        self.name = name or free_name()
         used = {i for term in found for i, f in ((term.one.of, term.one),
                                                  (term.two.of, term.two))
                 if f.kind != terms.ONE}
@@ -104,7 +107,7 @@ class EffectText:
     def text(self) -> str:
         """Return the Python source."""
         body = ''.join(f'\n\n{one}' for one in self._functions())
-        used = {name for name in ('followed', 'held', 'relaxed', 'stop')
+        used = {name for name in ('followed', 'held', 'relaxed', 'stop', 'swung')
                 if re.search(rf'\b{name}\(', body)}
         imports = ['from pam_sim.compiled import compiled',
                    'from pam_sim.effects.effect import Effect'
@@ -131,7 +134,7 @@ class EffectText:
     def _steps(self) -> bool:
         """Return whether a memory needs the physics step, which its hook is not told."""
         return self._stand_in.effect == 'set_point_term' and any(
-            self._terms[k - 1].one.kind == terms.PASSING for k in self._remember)
+            self._terms[k - 1].one.kind in (terms.PASSING, terms.SWING) for k in self._remember)
 
     def _docstring(self) -> str:
         where = range_text(self.ranges, self.inputs) or 'every state'
@@ -155,7 +158,7 @@ class EffectText:
                     found[f'{label}_{k}{end}'] = (
                         term.channel.unit, size * term.channel.factor, f'{own}_of_{k}')
             if term.one.is_shaped:
-                unit = 's' if term.one.kind == terms.PASSING else (
+                unit = 's' if term.one.kind in (terms.PASSING, terms.SWING) else (
                     self._stand_in.inputs[term.one.of].unit)
                 found[f'shape_{k}{_UNIT_ENDS[unit]}'] = (
                     unit, self._values[f'shape_1_of_{k}'], f'shape_1_of_{k}')
@@ -215,7 +218,17 @@ class EffectText:
                     'dict[str, Any]:', "    return {**values, 'step_s': numbers.substep_s}", *rows]
         return '\n'.join([*rows, '    return {', *entries, '    }'])
 
+    def _swing(self) -> list[str]:
+        """Return the hook of a regulator that swings."""
+        size, shape = self.parameters
+        rows = [f'state.memory_1 = swung(state.memory_1, set_point_pa - pressure_pa, par.step_s,'
+                f'\n                           par.{shape}, par.{size})',
+                'return pressure_pa + time_constant_s * state.memory_1, time_constant_s']
+        return [_written('set_point', rows, _RETURNS['set_point'], 'Return it with the term.')]
+
     def _functions(self) -> list[str]:
+        if self._terms[0].one.kind == terms.SWING:
+            return self._swing()
         effect, found = self._stand_in.effect, []
         by_hook: dict[str, list[int]] = {}
         for channel in dict.fromkeys(t.channel.number for t in self._terms):
