@@ -27,7 +27,7 @@ from pam_sim.gap.data.supply import supply_stands
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.select.context import context_of
 from pam_sim.gap.subsystems.problems import subsystem_problems
-from pam_sim.gap.verify.notice import LEAST_STAMP_SD_S, Notice, stamp_sd_s
+from pam_sim.gap.verify.notice import FAST_S, LEAST_STAMP_SD_S, Notice, stamp_sd_s
 from pam_sim.run import Run, Series
 import pytest
 
@@ -110,6 +110,8 @@ def test_only_what_noise_cannot_make_is_a_gap():
     assert one.is_gap(CRITERIA)
     assert not replace(one, expected=0.5).is_gap(CRITERIA)
     assert not Notice('muscle', 'force', 0.4, 0.1).is_gap(CRITERIA)       # too little to matter
+    quick = Notice('valve', 'pressure', 0.9, 0.4, 0.0, FAST_S)
+    assert not quick.is_gap(CRITERIA) and replace(quick, rms=1.2).is_gap(CRITERIA)
     assert Notice('valve', 'pressure', 0.2, 0.2, 5.1).is_gap(CRITERIA)
     assert not Notice('valve', 'pressure', 0.2, 0.2, 4.9).is_gap(CRITERIA)
 
@@ -121,6 +123,6 @@ def test_what_is_too_small_for_a_name_hides_no_gap_beside_it(monkeypatch):
         {'name': 'coulomb_friction', 'parameters': {'force_n': 1.5}}])
     result = find_gap(recorded(rig, voltages(16.0)), nominal(), effects=['valve_hysteresis'])
     assert result.verdict == 'unknown' and result.effects == []
-    assert result.remarks[-1] == 'What valve_hysteresis would explain is too small to matter.'
+    assert 'What valve_hysteresis would explain is too small to matter.' in result.remarks
     assert result.where[0].subsystem == 'muscle'
     assert load_rig(result.model_yaml).effects == nominal().effects

@@ -125,7 +125,7 @@ def test_unknown_tells_of_fits_only_where_the_gap_is():
         'The calibrated model leaves a gap that its free run hides and no known effect')
     assert text.endswith('follow time or pressure by 9 deviations.')
     text = said('unknown', {'pressure': still}, noticed=[Notice('muscle', 'force', 0.9, 0.3)])
-    assert text.endswith('The force errs 3.0 times as much over half a second as noise does.')
+    assert text.endswith('Over 0.5 s the force errs 3.0 times as much as noise does.')
 
 
 def test_a_wrong_number_is_a_sentence_of_its_own():

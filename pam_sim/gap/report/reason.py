@@ -137,8 +137,8 @@ def _noticed(result: GapResult) -> str:
             parts.append(' Over short spans the pressure errs as noise and stamps do not: its '
                          f'errors follow time or pressure by {one.deviations:.0f} deviations.')
         else:
-            parts.append(f' The {one.signal} errs {one.rms / one.expected:.1f} times as much '
-                         'over half a second as noise does.')
+            parts.append(f' Over {one.span_s:g} s the {one.signal} errs '
+                         f'{one.rms / one.expected:.1f} times as much as noise does.')
     return ''.join(parts)
 
 

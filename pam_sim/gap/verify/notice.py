@@ -15,8 +15,9 @@
 """
 Whether a subsystem leaves a gap that its noise cannot make, however its free run drifts.
 
-Means of the errors over half a second are compared with those that noise, stamps and the drift of
-sensors make in the same run. What the numbers of the model may do is taken out before.
+Means of the errors, over half a second and over 20 ms, are compared with those that noise, stamps
+and the drift of sensors make in the same run. What the numbers of the model may do is taken out
+before.
 
 A muscle behind on/off valves integrates the errors of its flow. Errors of stamps alone take its
 free run far away, and a gap of the flow hides in that. Its errors count against their own mean
@@ -45,7 +46,7 @@ from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.gap.verify.own_runs import OwnRuns
 from pam_sim.rig import Rig
 
-MEAN_S = 0.5                 # of the means that are compared with those of noise
+SLOW_S, FAST_S = 0.5, 0.02   # of the means that are compared with those of noise
 MEMORY_S = 1.0               # of the mean before that errors behind on/off valves count against
 # Of the test that follows them. The errors of stamps add up, and those of the sensor do not;
 # they are as large after some tenths of a second.
@@ -69,6 +70,8 @@ class Notice:
         Of the means, and of those that noise alone makes, in deviations of the sensor.
     deviations : float
         By how many standard deviations the errors of a flow follow something; 0 of the others.
+    span_s : float
+        Of the means.
 
     """
 
@@ -77,12 +80,15 @@ class Notice:
     rms: float
     expected: float
     deviations: float = 0.0
+    span_s: float = SLOW_S
 
     def is_gap(self, criteria: Criteria) -> bool:
         """Return whether noise cannot have made this."""
         beyond = math.sqrt(max(self.rms ** 2 - self.expected ** 2, 0.0))
+        # What lasts shows with less; a quick gap must be as large as the noise.
+        least = criteria.greater_part if self.span_s >= SLOW_S else criteria.hint_sd
         return self.deviations > criteria.certain_size or (
-            self.rms > criteria.likely_sd * self.expected and beyond > criteria.greater_part)
+            self.rms > criteria.likely_sd * self.expected and beyond > least)
 
 
 def notices(runs: OwnRuns, estimator: Estimator, found: Fit, seed: int = 0) -> list[Notice]:
@@ -113,7 +119,7 @@ def notices(runs: OwnRuns, estimator: Estimator, found: Fit, seed: int = 0) -> l
                     searched.part, (FIT, SELECT))
                 followed = _most([z, *(flow.follows(index, mine & (searched.run == index))
                                        for index in range(len(searched.recordings)))])
-            tested.append(here.notice(signal, followed))
+            tested += [here.notice(signal, SLOW_S, followed), here.notice(signal, FAST_S)]
     return tested
 
 
@@ -226,8 +232,8 @@ class _Certified:
         self._drift = problem.values(rig, known) - base
         problem.disturb(None)
 
-    def notice(self, signal: str, followed: float) -> Notice:
-        """Return the Notice of a signal."""
+    def notice(self, signal: str, span_s: float, followed: float = 0.0) -> Notice:
+        """Return the Notice of a signal, by its means over a span."""
         recording = self._problem.recordings[0]
         mine = (self._problem.run == 0) & (
             self._problem.signal == self._problem.signals.index(signal))
@@ -238,16 +244,18 @@ class _Certified:
 
         def means(values: FloatArray) -> FloatArray:
             values = recent(values, time_s, MEMORY_S) if integrates else values
-            return _means(values, time_s, MEAN_S, inside) / max(noise.sd, 1e-12)
+            return _means(values, time_s, span_s, inside) / max(noise.sd, 1e-12)
 
+        late = STAMP_SD_S * np.gradient(self.flow.base[mine], time_s)
         expected = float(np.mean([np.mean(means(
-            d[mine] + noise.draw(time_s, self._random)) ** 2) for d in self._draws]))
+            d[mine] + noise.draw(time_s, self._random)
+            + late * self._random.standard_normal(late.size)) ** 2) for d in self._draws]))
         expected += 0.0 if integrates else float(
             np.mean(means(self._drift[mine]) ** 2)) + DRIFT_SD ** 2
         left = _free_of(means(self._errors[mine]), np.column_stack(
             [means(s[mine]) for s in self._slopes]), self._limits, expected)
         return Notice(self._problem.subsystem, signal, float(np.sqrt(np.mean(left ** 2))),
-                      math.sqrt(expected), followed)
+                      math.sqrt(expected), followed, span_s)
 
 
 def _normal(row: FloatArray) -> FloatArray:
