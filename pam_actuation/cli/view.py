@@ -20,8 +20,8 @@ import os
 import threading
 from typing import TYPE_CHECKING
 
-from pam_actuation.cli.common import add_recover_option, EXIT_DONE
-from pam_actuation.cli.options import count, Parser, source
+from pam_actuation.cli.common import add_overwrite_option, add_recover_option, EXIT_DONE
+from pam_actuation.cli.options import count, out_path, Parser, source
 from pam_actuation.cli.viewed import need_tornado
 from pam_sim.errors import InputError
 
@@ -53,7 +53,11 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument('--foxglove', action='store_true',
                         help='serve the topics of the running rig to Foxglove instead of a page, '
                              'to this machine only (default port: 8765)')
+    parser.add_argument('--layout', type=out_path, default=None, metavar='FILE',
+                        help='with --foxglove: write a layout for Foxglove, of --namespace '
+                             '(default there: /muscle)')
     parser.add_argument('--open', action='store_true', help='open the page in a browser here')
+    add_overwrite_option(parser, 'the layout that is there')
     add_recover_option(parser)
 
 
@@ -61,6 +65,8 @@ def run(args: argparse.Namespace) -> int:
     """Serve the page until Ctrl-C, which is the ordinary end."""
     if args.foxglove:
         return _serve_foxglove(args)
+    if args.layout is not None:
+        raise InputError('goes with --foxglove', '--layout')
     need_tornado()
     from pam_actuation.namespaces import namespace_of
     from pam_actuation.view.access import Access
@@ -89,7 +95,9 @@ def run(args: argparse.Namespace) -> int:
 
 def _serve_foxglove(args: argparse.Namespace) -> int:
     """Serve the topics to Foxglove until Ctrl-C."""
-    from pam_actuation.namespaces import namespace_of
+    from pam_actuation.namespaces import MUSCLE, namespace_of
+    from pam_actuation.view.layouts import foxglove_layout
+    from pam_sim.files import check_file, write_text
     if args.bag is not None:
         raise InputError('is for a running rig; Foxglove opens the .mcap file of a bag itself',
                          '--foxglove')
@@ -102,11 +110,14 @@ def _serve_foxglove(args: argparse.Namespace) -> int:
     except ImportError as error:
         from pam_actuation.ros_missing import ros_missing
         raise InputError(ros_missing(error.name or 'rclpy')) from None
+    namespace = '' if args.namespace is None else namespace_of(args.namespace, '--namespace')
+    if args.layout is not None:
+        check_file(args.layout, args.overwrite)
     os.nice(max(NICENESS - os.nice(0), 0))
-    server = FoxgloveServer(
-        _domain(args), '' if args.namespace is None else namespace_of(
-            args.namespace, '--namespace'), PORT if args.port is None else args.port)
+    server = FoxgloveServer(_domain(args), namespace, PORT if args.port is None else args.port)
     try:
+        if args.layout is not None:
+            write_text(args.layout, foxglove_layout(namespace or MUSCLE))
         print(json.dumps({'url': server.url, 'live': True}) if args.json else
               f'Foxglove: Open connection, {server.url}\n'
               'Ctrl-C ends it; the rig goes on without it', flush=True)

@@ -16,7 +16,10 @@
 
 import asyncio
 import json
+import signal
 import struct
+import subprocess
+import sys
 import threading
 import time
 
@@ -34,6 +37,7 @@ from pam_actuation.rigging.client import local_context                      # no
 from pam_actuation.rigging.domain import DomainLock                         # noqa: E402
 from pam_actuation.topics.codec import decode, encode                       # noqa: E402
 from pam_actuation.topics.definitions import schema_text                    # noqa: E402
+from pam_actuation.view.layouts import foxglove_layout                      # noqa: E402
 from pam_sim.errors import InputError                                       # noqa: E402
 import rclpy                                                                # noqa: E402
 from rclpy.node import Node                                                 # noqa: E402
@@ -44,6 +48,21 @@ PROTOCOL = 'foxglove.sdk.v1'
 LONGEST_S = 20.0
 MESSAGE_DATA = 1
 HEAD = struct.Struct('<BIQ')        # kind, subscription, receive time
+
+
+def test_a_layout_is_written_for_a_namespace(tmp_path):
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'pam_actuation.cli.main', 'view', '--foxglove', '--port', '0',
+         '--namespace', 'left_knee/flexor', '--layout', 'own.json', '--json'],
+        cwd=tmp_path, stdout=subprocess.PIPE, text=True)
+    assert json.loads(process.stdout.readline())['url'].startswith('ws://127.0.0.1:')
+    process.send_signal(signal.SIGINT)
+    assert process.wait(LONGEST_S) == 0
+    process.stdout.close()
+    own = (tmp_path / 'own.json').read_text()
+    assert 'left_knee/flexor/pressure.fluid_pressure' in own and '"/muscle' not in own
+    assert json.loads(own.replace('"/left_knee/flexor', '"/muscle')) == json.loads(
+        foxglove_layout())
 
 
 @pytest.mark.parametrize('words, place', [
