@@ -19,6 +19,7 @@ from types import SimpleNamespace
 from gap_runs import nominal, recorded, voltages
 import numpy as np
 from pam_actuation.report.sections.gap import gap_section
+from pam_actuation.report.sections.gap_witness import witness_part
 from pam_sim.gap import find_gap
 from pam_sim.gap.criteria import CRITERIA
 from pam_sim.gap.data.recording import Recording
@@ -173,3 +174,16 @@ def test_page_and_terminal_open_with_the_place():
     assert result.text().startswith(f'{sentence}\neffects: ')
     assert gap_section(result).body.startswith(f'<p>{sentence}</p>')
     assert {w.subsystem for w in result.where} == {'sensor'}
+
+
+def test_a_page_lists_no_dependence_of_what_has_no_gap():
+    shares = {'pressure': 0.1, 'contraction': 0.2, 'direction': 0.3, 'rate': 0.0,
+              'time since reversal': 0.0, 'constant': 0.0, 'pressure x contraction': 0.4}
+    row = {'signal': 'force', 'rms': 0.5, 'rms_left': 0.5, 'explained': shares,
+           'explained_left': shares}
+    quiet, unknown = (SubsystemVerdict(v, (), 'force', QUIET, 1.0) for v in ('no_gap', 'unknown'))
+    result = GapResult('unknown', '', subsystems={'valve': unknown, 'muscle': quiet}, fingerprint={
+        'valve': {**row, 'signal': 'pressure'}, 'muscle': row, 'load': row})
+    assert witness_part(result).count('<tr>') == 2
+    result.subsystems['muscle'] = unknown
+    assert witness_part(result).count('<tr>') == 4

@@ -86,7 +86,8 @@ def _subsystems(result: 'GapResult') -> str:
          for name, one in result.subsystems.items()]) + paragraph(
         'RMS difference with the measured inputs of each subsystem: the valve gets the measured '
         'contraction, muscle and load the measured pressure. The signal is the one with the '
-        'largest gap. Load and sensors stand here where something of them is named.',
+        'largest gap. Load and sensors stand here where something of them is named, or where '
+        'the gap lives.',
         'note') + '<h3>The whole chain</h3>'
 
 

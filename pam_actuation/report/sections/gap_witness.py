@@ -34,8 +34,10 @@ MOST_POINTS = 700            # of each colour
 
 def witness_part(result: 'GapResult') -> str:
     """Return the table of what binned maps of the errors explain, before and after."""
-    rows = []
+    rows, closed = [], _closed(result)
     for subsystem, found in result.fingerprint.items():
+        if subsystem in closed:
+            continue
         factor, _, unit, _ = SHOWN[found['signal']]
         shares, left = found['explained'], found['explained_left']
         pair = max((n for n in shares if n not in (*CONDITIONS, 'constant')), key=shares.get)
@@ -56,6 +58,14 @@ def witness_part(result: 'GapResult') -> str:
         'noise that such a map explains on data it was not made from. Friction shows in '
         'direction, damping in rate, a wrong static map in pressure and contraction, what relaxes '
         'in the time since the last reversal.', 'note')
+
+
+def _closed(result: 'GapResult') -> set[str]:
+    """Return the subsystems that the page calls without a gap, where nothing is named."""
+    if result.verdict != 'unknown':
+        return set()
+    found = {name for name, one in result.subsystems.items() if one.verdict == 'no_gap'}
+    return found | ({'load'} if 'muscle' in found and 'load' not in result.subsystems else set())
 
 
 def coloured_part(result: 'GapResult') -> str:
