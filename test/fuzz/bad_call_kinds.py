@@ -140,6 +140,10 @@ VERBS = {
     'identify': [
         (BAG, Slot('--rig', 'rig', RIG), INSIDE, Slot('--seed', 'count'),
          Slot('--out', 'folder', 'new'))],
+    'investigate': [
+        (Slot('--rig', 'rig', RIG), Slot('--model', 'rig', RIG), Slot('--valve', 'valve'),
+         Slot('--experiment', 'experiment', 'good.yaml'), Slot('--rounds', 'count'),
+         Slot('--seed', 'count'), Slot('--out', 'folder', 'new'))],
     'report': [(BAG, BAG, INSIDE, Slot('--out', 'page', 'new.html'))],
     'info': [(BAG,)],
     'import': [
