@@ -41,7 +41,6 @@ from pam_sim.rig import Rig
 from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
 
 EVERY = 10                   # grid steps between the samples
-NUMBER_STEP = 0.5            # prior deviations, of the slopes
 LATE_S = 1e-3                # of two topics against each other
 LEAST_SAMPLES = 200
 SMOOTH = 31                  # grid steps of the mean
@@ -140,10 +139,12 @@ def force_error(estimator: Estimator, recordings: Sequence[Recording], now: Fit,
     slopes = []
     for known in problem.known:
         if known.of_rig:
-            moved = rig.with_(parameters={
-                known.name: rig.parameters[known.name] + NUMBER_STEP * known.sd})
+            value, step = rig.parameters[known.name], known.step
+            if value + step * known.sd > known.upper:
+                step = -step
+            moved = rig.with_(parameters={known.name: value + step * known.sd})
             slopes.append(np.concatenate([
-                (_error(moved, r, side) - b) / NUMBER_STEP for r, b in zip(recordings, base)]))
+                (_error(moved, r, side) - b) / step for r, b in zip(recordings, base)]))
     slopes.append(np.concatenate([LATE_S * np.gradient(b, EVERY * GRID_S) for b in base]))
     slopes.append(np.concatenate([LATE_S * np.gradient(_cell(rig, r), EVERY * GRID_S)
                                   for r in recordings]))
