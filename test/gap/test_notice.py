@@ -114,6 +114,8 @@ def test_only_what_noise_cannot_make_is_a_gap():
     assert not quick.is_gap(CRITERIA) and replace(quick, rms=1.2).is_gap(CRITERIA)
     assert Notice('valve', 'pressure', 0.2, 0.2, 5.1).is_gap(CRITERIA)
     assert not Notice('valve', 'pressure', 0.2, 0.2, 4.9).is_gap(CRITERIA)
+    assert Notice('valve', 'pressure', 0.9, 0.3, 3.1).is_gap(CRITERIA)
+    assert not Notice('valve', 'pressure', 0.9, 0.3, 2.9).is_gap(CRITERIA)
 
 
 def test_what_is_too_small_for_a_name_hides_no_gap_beside_it(monkeypatch):

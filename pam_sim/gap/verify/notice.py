@@ -87,8 +87,11 @@ class Notice:
         beyond = math.sqrt(max(self.rms ** 2 - self.expected ** 2, 0.0))
         # What lasts shows with less; a quick gap must be as large as the noise.
         least = criteria.greater_part if self.span_s >= SLOW_S else criteria.hint_sd
-        return self.deviations > criteria.certain_size or (
-            self.rms > criteria.likely_sd * self.expected and beyond > least)
+        large = self.rms > criteria.likely_sd * self.expected and beyond > least
+        if self.deviations > 0.0:        # of a flow: large alone is not enough, for it adds up
+            return self.deviations > criteria.certain_size or (
+                large and self.deviations > criteria.certain_sd)
+        return large
 
 
 def notices(runs: OwnRuns, estimator: Estimator, found: Fit, seed: int = 0) -> list[Notice]:
@@ -119,7 +122,10 @@ def notices(runs: OwnRuns, estimator: Estimator, found: Fit, seed: int = 0) -> l
                     searched.part, (FIT, SELECT))
                 followed = _most([z, *(flow.follows(index, mine & (searched.run == index))
                                        for index in range(len(searched.recordings)))])
-            tested += [here.notice(signal, SLOW_S, followed), here.notice(signal, FAST_S)]
+            tested.append(here.notice(signal, SLOW_S, followed))
+            # When a valve opens is known no better than its pulses are long.
+            if not _integrates(problem, problem.recordings[0]):
+                tested.append(here.notice(signal, FAST_S))
     return tested
 
 
@@ -226,7 +232,7 @@ class _Certified:
                                  for k in problem.known])
         self._draws = []
         for _ in range(DRAWS):
-            problem.disturb(random, stamp_sd_s(problem.recordings[0]))
+            problem.disturb(random)
             self._draws.append(problem.values(rig, known) - base)
         problem.shift_inputs(DRIFT_SD)
         self._drift = problem.values(rig, known) - base
