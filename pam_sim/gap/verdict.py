@@ -63,7 +63,8 @@ def fill(result: GapResult, estimator: Estimator, outcome: Outcome, final: Fit,
 
 
 def judge(result: GapResult, outcome: Outcome, estimator: Estimator, validation: Validation,
-          base: Fit, final: Fit, materiality: float, whole: bool, runs: OwnRuns) -> None:
+          base: Fit, final: Fit, materiality: float, whole: bool,
+          runs: OwnRuns | None = None) -> None:
     """
     Set verdict, ambiguity set and the unexplained fraction of a result.
 

@@ -153,6 +153,7 @@ def test_a_gap_without_a_name_must_be_clear(monkeypatch, off, materiality, verdi
     validation = SimpleNamespace(noise={'pressure': 1.0}, highest_floor={'pressure': 0.8},
                                  unexplained=lambda: 1.0)
     monkeypatch.setattr(verdict_module, 'is_material', lambda *given: False)
+    monkeypatch.setattr(verdict_module, '_noticed', lambda *given: [])
     monkeypatch.setattr(verdict_module, 'spread_of_numbers', lambda *given: {})
     validation.moved = validation.fall = lambda *given: (0.0, 0.0)
     validation.refit = validation.after = None
@@ -241,6 +242,7 @@ def test_an_effect_is_too_small_for_a_name_only_where_that_is_certain(
         noise={}, unexplained=lambda: 0.0, fall=lambda *given: (1.0, 0.8),
         moved=lambda *given: {'contraction': 0.8}, refit=None, after=None)
     monkeypatch.setattr(verdict_module, 'held_without', lambda found: found)
+    monkeypatch.setattr(verdict_module, '_noticed', lambda *given: [])
     creep = SimpleNamespace(name='creep')
     final = SimpleNamespace(hypothesis=SimpleNamespace(effects=(creep,)))
     outcome = SimpleNamespace(share={'muscle': 1.0}, named=[
