@@ -26,15 +26,15 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from pam_sim.annotations import FloatArray
 from pam_sim.effects.registry import effects, get_effect
 from pam_sim.gap.criteria import Criteria
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit
 from pam_sim.gap.report.by_subsystem import subsystem_of
+from pam_sim.gap.report.condition import condition_of
 from pam_sim.gap.report.encoder import sensor_part
-from pam_sim.gap.report.location import force_errors, ForceErrors, locate, signal_conditions
+from pam_sim.gap.report.location import force_errors, ForceErrors, locate
 from pam_sim.gap.result import GapResult, Share
 from pam_sim.gap.select.rival import NamedEffect
 from pam_sim.gap.select.screening import Screened
@@ -168,7 +168,8 @@ def first_place(result: GapResult, named: Sequence[NamedEffect], evidence: Evide
     problem = max((p for s, p in parts if s == first), key=lambda p: parts[first, p])
     signal = _signal(first, problem, named, evidence)
     whole = sum(v for (_, p), v in parts.items() if p == problem)
-    condition, of_it = _condition(problem, signal, evidence)
+    condition, of_it = condition_of(
+        evidence.recording, evidence.runs, problem, signal, evidence.criteria)
     by_name = [_certainty(w, first) for w in named if _subsystem(w, first)]
     certainty = max(by_name) if by_name else sure.get(first, UNTOLD) * (
         weight[first] / max(sum(weight.values()), 1e-12))
@@ -291,35 +292,6 @@ def _reads(name: str) -> str:
     if name in effects():
         return get_effect(name).fitting.sensor_signal or 'pressure'
     return name.split('_')[0]
-
-
-def _condition(problem: str, signal: str, evidence: Evidence) -> tuple[str, float]:
-    """
-    Return the condition that holds the greater part of a gap in a small part of the time.
-
-    ``all`` where none does. And the share of the squared gap in it.
-    """
-    found, best = 'all', 0.0
-    if signal not in evidence.runs.gaps[problem]:
-        problem = next((p for p, gaps in evidence.runs.gaps.items() if signal in gaps), problem)
-    if signal not in evidence.runs.gaps[problem]:
-        return found, 1.0
-    time_s, errors = evidence.runs.residual(problem, signal)
-    floor, least = evidence.runs.gaps[problem][signal].noise_floor, evidence.criteria.greater_part
-    if float(np.sqrt(np.mean(errors ** 2))) < evidence.criteria.floor_error * floor:
-        return found, 1.0                 # too little to say when
-    for conditions in signal_conditions(evidence.recording, time_s):
-        squares = {name: _squares(errors[mask], floor) for name, mask in conditions.items()}
-        total = sum(squares.values())
-        for name, mask in conditions.items():
-            share = squares[name] / total if total > 0.0 else 0.0
-            if share > max(least, best) and float(np.mean(mask)) < least * share:
-                found, best = name, share
-    return found, best or 1.0
-
-
-def _squares(errors: FloatArray, floor: float) -> float:
-    return max(float(np.sum(errors ** 2)) - floor ** 2 * errors.size, 0.0)
 
 
 def _certainty(named: NamedEffect, subsystem: str) -> float:

@@ -43,6 +43,7 @@ from pam_sim.gap.data.supply import supply_scatter
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit
 from pam_sim.gap.subsystems.problem import SubsystemProblem
+from pam_sim.gap.verify.means import free_of, means_of, recent
 from pam_sim.gap.verify.own_runs import OwnRuns
 from pam_sim.rig import Rig
 
@@ -200,7 +201,7 @@ class _Flow:
             time_s, recording.time_s['pressure'], recording.measured['pressure'])
 
         def means(values: FloatArray) -> FloatArray:
-            return _means(values, time_s, FLOW_MEAN_S, inside)
+            return means_of(values, time_s, FLOW_MEAN_S, inside)
 
         errors, *slopes = (means(recent(values[mine], time_s, FLOW_MEMORY_S))
                            for values in (self.errors, *self.slopes))
@@ -250,7 +251,7 @@ class _Certified:
 
         def means(values: FloatArray) -> FloatArray:
             values = recent(values, time_s, MEMORY_S) if integrates else values
-            return _means(values, time_s, span_s, inside) / max(noise.sd, 1e-12)
+            return means_of(values, time_s, span_s, inside) / max(noise.sd, 1e-12)
 
         late = STAMP_SD_S * np.gradient(self.flow.base[mine], time_s)
         expected = float(np.mean([np.mean(means(
@@ -258,7 +259,7 @@ class _Certified:
             + late * self._random.standard_normal(late.size)) ** 2) for d in self._draws]))
         expected += 0.0 if integrates else float(
             np.mean(means(self._drift[mine]) ** 2)) + DRIFT_SD ** 2
-        left = _free_of(means(self._errors[mine]), np.column_stack(
+        left = free_of(means(self._errors[mine]), np.column_stack(
             [means(s[mine]) for s in self._slopes]), self._limits, expected)
         return Notice(self._problem.subsystem, signal, float(np.sqrt(np.mean(left ** 2))),
                       math.sqrt(expected), followed, span_s)
@@ -293,28 +294,3 @@ def stamp_sd_s(recording: Recording) -> float:
     # Of a difference of two; the median is blind to messages that are missing.
     scatter = MAD_TO_SD * float(np.median(np.abs(steps - usual))) / math.sqrt(2.0)
     return min(max(scatter, LEAST_STAMP_SD_S), STAMP_SD_S)
-
-
-def recent(values: FloatArray, time_s: FloatArray, memory_s: float) -> FloatArray:
-    """Return values less their own mean before, which forgets within ``memory_s``."""
-    from scipy.signal import lfilter       # slow to import
-    keep = math.exp(-float(np.median(np.diff(time_s))) / memory_s)
-    return values - lfilter([0.0, 1.0 - keep], [1.0, -keep], values)
-
-
-def _means(values: FloatArray, time_s: FloatArray, mean_s: float,
-           inside: BoolArray | None = None) -> FloatArray:
-    """Return means over ``mean_s``, of the spans with nearly all samples inside."""
-    place = (time_s // mean_s).astype(int)
-    count = np.bincount(place)
-    within = count if inside is None else np.bincount(place, inside)
-    full = (count > 0.5 * count.max()) & (within >= 0.9 * count)
-    return np.bincount(place, values)[full] / count[full]
-
-
-def _free_of(means: FloatArray, slopes: FloatArray, limits: FloatArray, variance: float
-             ) -> FloatArray:
-    """Return means less what numbers within their doubt do, by ridge regression."""
-    scaled = slopes * limits
-    normal = scaled.T @ scaled / variance + np.eye(limits.size)
-    return means - scaled @ np.linalg.solve(normal, scaled.T @ means / variance)
