@@ -85,7 +85,18 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def _run_verb(argv: list[str] | None, begin: Callable[[], object] = lambda: None) -> int:
-    """Parse, call ``begin``, run the verb; return the exit code."""
+    """Parse, call ``begin``, run the verb; return the exit code, 0 where nobody reads on."""
+    try:
+        code = _parsed_and_run(argv, begin)
+        sys.stdout.flush()
+        return code
+    except BrokenPipeError:   # e.g. "pam info BAG | head"
+        # The interpreter flushes once more as it ends.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+
+
+def _parsed_and_run(argv: list[str] | None, begin: Callable[[], object]) -> int:
     # Here and not above: an early Ctrl-C finds main() at work, see interrupts.
     from pam_actuation.cli import completion
     from pam_actuation.cli.options import (
@@ -116,9 +127,8 @@ def _run_verb(argv: list[str] | None, begin: Callable[[], object] = lambda: None
             ' '.join(str(mistake).split()), EXIT_BAD_INPUT, f'pam {args.verb}', args.json)
     except KeyboardInterrupt as stop:
         return complain(str(stop) or 'stopped', EXIT_INTERRUPTED, f'pam {args.verb}', args.json)
-    except BrokenPipeError:   # e.g. "pam info BAG | head"
-        sys.stderr.close()
-        return 0
+    except BrokenPipeError:
+        raise
     except OSError as error:  # the file system refuses where nobody looked before
         place = f'{shown(str(error.filename))}: ' if error.filename else ''
         return complain(f'{place}{reason(error)}', EXIT_BAD_INPUT, f'pam {args.verb}', args.json)

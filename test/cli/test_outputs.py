@@ -169,3 +169,12 @@ def test_a_gap_is_made_again_for_the_same_bags_and_model_only(bags, tmp_path, ca
     assert listed(folder) == before
     call(capsys, 'gap', bags / 'second', *model, '--out', folder, '--overwrite', code=1)
     assert listed(folder) != before
+
+
+@pytest.mark.parametrize('words', [(), ('--help',), ('models',)])
+def test_a_reader_that_leaves_early_is_no_error(words):
+    """As `pam models | head`, whatever is printed."""
+    with subprocess.Popen([sys.executable, '-m', 'pam_actuation.cli.main', *words], cwd=ROOT,
+                          stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        process.stdout.close()
+        assert (process.stderr.read(), process.wait()) == (b'', 0)
