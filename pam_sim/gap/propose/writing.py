@@ -18,54 +18,14 @@ import re
 
 from pam_sim.effects.registry import effects
 from pam_sim.effects.unnamed import terms
+from pam_sim.gap.propose.hooks import (
+    BOTH, COMMIT, function_text, hook_text, HOOKS, READS, RETURNS)
 from pam_sim.gap.propose.library import Factor, StandIn, Term
 from pam_sim.gap.propose.words import equation_of, range_text
 
 NAME = 'proposed_effect'
 LINE = 99
 _LICENCE = '"""\nA term without a name, proposed by `pam gap`; its form was found from data.\n'
-# Where each stand-in reads its inputs, in the order of its inputs; F of the muscle is force_n.
-_READS = {
-    'muscle_term': ('pressure_pa - P_ATM_PA', 'contraction_m', 'velocity_m_per_s',
-                    'plant.time_s', 'force_n'),
-    'load_term': ('contraction_m', 'velocity_m_per_s', 'plant.time_s'),
-    'set_point_term': ('set_point_pa - P_ATM_PA', 'set_point_pa - pressure_pa',
-                       'pressure_pa - P_ATM_PA', 'contraction_m', 'plant.time_s'),
-    'flow_term': ('pressure_pa - P_ATM_PA', 'plant.contraction_m', 'state.filling',
-                  'state.venting', 'plant.time_s'),
-    'contraction_reading_term': ('pressure_pa - P_ATM_PA', 'contraction_m', 'force_n',
-                                 'plant.time_s'),
-    'force_reading_term': ('pressure_pa - P_ATM_PA', 'contraction_m', 'force_n', 'plant.time_s'),
-}
-# Of every channel: hook, what it returns, and the returned expressions with {sum}.
-_HOOKS = {
-    ('muscle_term', 0): ('muscle_force', 'force_n + {0}'),
-    ('muscle_term', 1): ('muscle_friction', 'max(level_n + {0}, 0.0)'),
-    ('load_term', 0): ('load_force', 'force_n + {0}'),
-    ('load_term', 1): ('load_friction', 'max(level_n + {0}, 0.0)'),
-    ('set_point_term', 0): ('set_point', 'set_point_pa + {0}, time_constant_s'),
-    ('set_point_term', 1): (
-        'set_point', 'set_point_pa, time_constant_s / max(1.0 + {0}, 0.1)'),
-    ('flow_term', 0): ('mass_flow', 'flow_kg_per_s + {0}'),
-    ('flow_term', 1): ('valve_flow', 'fill_kg_per_s * max(1.0 + {0}, 0.0), vent_kg_per_s'),
-    ('flow_term', 2): ('valve_flow', 'fill_kg_per_s, vent_kg_per_s * max(1.0 + {0}, 0.0)'),
-    ('contraction_reading_term', 0): ('sensor', 'pressure_pa, contraction_m + {0}, force_n'),
-    ('force_reading_term', 0): ('sensor', 'pressure_pa, contraction_m, force_n + {0}'),
-}
-_BOTH = {
-    'set_point': 'set_point_pa + {0}, time_constant_s / max(1.0 + {1}, 0.1)',
-    'valve_flow': ('fill_kg_per_s * max(1.0 + {0}, 0.0), '
-                   'vent_kg_per_s * max(1.0 + {1}, 0.0)')}
-_RETURNS = {'set_point': 'tuple[float, float]', 'valve_flow': 'tuple[float, float]',
-            'sensor': 'tuple[float, float, float]'}
-_COMMIT = {'contraction_reading_term': 'sensor_commit', 'force_reading_term': 'sensor_commit',
-           'set_point_term': 'set_point'}
-_ARGUMENTS = (
-    'set_point_pa', 'time_constant_s', 'fill_kg_per_s', 'vent_kg_per_s', 'flow_kg_per_s',
-    'force_n', 'level_n', 'pressure_pa', 'contraction_m', 'velocity_m_per_s', 'elapsed_s',
-    'dt_s', 'state', 'par', 'plant')
-_FIRST = {'muscle_force': 'force_n', 'load_force': 'force_n', 'muscle_friction': 'level_n',
-          'load_friction': 'level_n', 'mass_flow': 'flow_kg_per_s'}
 _UNIT_ENDS = {'N': '_n', 'Pa': '_pa', 'm': '_m', 'm/s': '_m_per_s', 's': '_s', '-': '',
               'kg/s': '_kg_per_s'}
 
@@ -224,7 +184,7 @@ class EffectText:
         rows = [f'state.memory_1 = swung(state.memory_1, set_point_pa - pressure_pa, par.step_s,'
                 f'\n                           par.{shape}, par.{size})',
                 'return pressure_pa + time_constant_s * state.memory_1, time_constant_s']
-        return [_written('set_point', rows, _RETURNS['set_point'], 'Return it with the term.')]
+        return [hook_text('set_point', rows, RETURNS['set_point'], 'Return it with the term.')]
 
     def _functions(self) -> list[str]:
         if self._terms[0].one.kind == terms.SWING:
@@ -232,22 +192,22 @@ class EffectText:
         effect, found = self._stand_in.effect, []
         by_hook: dict[str, list[int]] = {}
         for channel in dict.fromkeys(t.channel.number for t in self._terms):
-            by_hook.setdefault(_HOOKS[effect, channel][0], []).append(channel)
-        commits = _COMMIT.get(effect, 'commit') if self._remember else ''
+            by_hook.setdefault(HOOKS[effect, channel][0], []).append(channel)
+        commits = COMMIT.get(effect, 'commit') if self._remember else ''
         if effect == 'flow_term':
-            found.append(_function('flow_opening', [
+            found.append(function_text('flow_opening', [
                 'state.filling = fill', 'state.venting = vent', 'return fill, vent'],
                 ['fill', 'vent', 'state'], 'tuple[float, float]', 'Keep the openings.'))
         for hook, channels in by_hook.items():
             sums = [self._sum(channel, hook) for channel in sorted(channels)]
-            pattern = _BOTH[hook] if len(channels) > 1 else _HOOKS[effect, channels[0]][1]
+            pattern = BOTH[hook] if len(channels) > 1 else HOOKS[effect, channels[0]][1]
             rows = self._lines(hook, [f'return {pattern.format(*sums)}'], commits == hook)
-            found.append(_written(hook, rows, _RETURNS.get(hook, 'float'),
-                                  'Return it with the term.'))
+            found.append(hook_text(
+                hook, rows, RETURNS.get(hook, 'float'), 'Return it with the term.'))
         if commits == 'set_point' and 'set_point' not in by_hook or commits in (
                 'commit', 'sensor_commit'):
             rows = self._lines(commits, [], True)
-            found.append(_written(commits, rows, 'None', 'Advance what the term remembers.'))
+            found.append(hook_text(commits, rows, 'None', 'Advance what the term remembers.'))
         return found
 
     def _lines(self, hook: str, last: list[str], remembers: bool) -> list[str]:
@@ -266,7 +226,7 @@ class EffectText:
                     f'{memory} = relaxed({memory}, {symbol.lower()}_, {step}, {shape})')
             rows = ahead + rows
         reads = []
-        for one, source in zip(self._stand_in.inputs, _READS[self._stand_in.effect]):
+        for one, source in zip(self._stand_in.inputs, READS[self._stand_in.effect]):
             if re.search(rf'\b{one.symbol.lower()}_(?![a-z0-9])', ' '.join(rows)):
                 low, high = self.ranges[one.symbol]
                 if hook == 'commit' and source == 'force_n':
@@ -315,22 +275,6 @@ class EffectText:
             terms.STOP: f'stop({value}, state.memory_{k}, {shape})',
             terms.PASSING: f'({value} - relaxed(state.memory_{k}, {value}, {within}, '
             f'{shape})) / {scale}'}[f.kind]
-
-
-def _written(hook: str, rows: list[str], returns: str, sentence: str) -> str:
-    """Return a function with the arguments that its lines name."""
-    body = ' '.join(rows)
-    arguments = [a for a in _ARGUMENTS if re.search(rf'\b{a}\b', body)]
-    return _function(hook, rows, arguments, returns, sentence)
-
-
-def _function(hook: str, rows: list[str], arguments: list[str], returns: str,
-              sentence: str) -> str:
-    typed = [f'{a}: np.record' if a in ('state', 'par', 'plant') else f'{a}: float'
-             for a in arguments]
-    given = (',\n' + ' ' * (len(hook) + 5)).join(typed)
-    return '\n'.join(['@compiled', f'def {hook}({given}) -> {returns}:', f'    """{sentence}"""',
-                      *(f'    {row}' for row in rows), ''])
 
 
 def free_name() -> str:
