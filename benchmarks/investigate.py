@@ -18,9 +18,9 @@ Measure whether `pam investigate` finds what is hidden, and ends the ambiguity.
     python benchmarks/investigate.py realistic --write      # all hidden effects of a rig
     python benchmarks/investigate.py rivals --write         # names that one recording leaves
 
-`realistic` asks the nominal model about `dmsp_5_300_realistic`, and about rigs of the independent
-simulator under test/hidden with the same effects, other equations, and valve and friction that
-are off by up to 30 %. A held-out `multisine` is then played on the same rig.
+`realistic` asks the nominal model about `dmsp_5_300_realistic`. It also asks about rigs of the
+independent simulator under test/hidden. They have the same effects in other equations, and valve
+and friction are off by up to 30 %. A held-out `multisine` is then played on the same rig.
 
 `rivals` begins with one recording of a hidden rig that leaves two names, as the examination of
 `pam gap` does. The investigation plays what it suggests on the hidden rig until it ends.

@@ -14,9 +14,9 @@
 """
 Which term explains what is left: sparse selection from the library.
 
-Each term is simulated once at a trial size. What numbers of the model and terms already chosen
-can do of its change of the errors is taken out; the projection of the errors on the rest gives
-amplitudes and promise in closed form. The most promising are fitted in free runs of their
+Each term is simulated once at a trial size. Of the change it makes, what numbers of the model or
+chosen terms could also make is removed. A linear fit of the errors to the remainder gives
+amplitudes and promise. The most promising are fitted in free runs of their
 subsystem on the fit part. The select part chooses among them, simple ones first. Then the next
 term is looked for, as long as the select part shows that it is there.
 """

@@ -14,11 +14,11 @@
 """
 Errors of force at measured inputs: what a term of the muscle or of the load must explain.
 
-The tension of the model at measured pressure and contraction is compared with the load cell, the
-load cell with weight and inertia of the measured motion; without a cell, the first with the last.
-Nothing oscillates there, and a term stands in it as it is. So many forms are compared by linear
-least squares, without a simulation. What numbers of the model can explain within their priors is
-taken out first.
+For a term of the muscle, the tension of the model at measured pressure and contraction is
+compared with the load cell. For one of the load, the load cell is compared with weight and inertia
+of the measured motion. Without a load cell, tension and motion are compared. A term adds to such
+an error as it is, so linear least squares compares many forms without a simulation. What numbers
+of the model explain within their priors is subtracted first.
 """
 
 from collections.abc import Mapping, Sequence
