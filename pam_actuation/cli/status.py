@@ -46,13 +46,12 @@ def run(args: argparse.Namespace) -> int:
     """Listen to all nodes for a moment; exit code 1 if one is not well, 2 if there is none."""
     from pam_sim.errors import InputError
     with operators(args) as opened:
-        rows = _rows(opened, args.wait)
-        if not rows:
-            raise InputError(nobody(opened, 'node of a rig'))
-    if args.name is not None:
-        rows = [row for row in rows if _is_called(row['node'], args.name)]
-        if not rows:
-            raise InputError('no node of this name is running', args.name)
+        rows = _rows(opened, args.wait, args.name)
+        running = sorted(name for one in opened for name in one.nodes())
+    if not rows and args.name is not None and running:
+        raise InputError(f'no such node; running are {", ".join(running)}', args.name)
+    if not rows:
+        raise InputError(nobody(opened, 'node of a rig'))
     several = len({row['domain_id'] for row in rows}) > 1
     text = []
     wide = max(len(row['node']) for row in rows)
@@ -67,15 +66,16 @@ def run(args: argparse.Namespace) -> int:
     return EXIT_DONE if well else EXIT_FINDING
 
 
-def _rows(opened: 'list[Operator]', wait_s: float) -> list[dict[str, Any]]:
-    """Return the status of each node, and who sent none."""
+def _rows(opened: 'list[Operator]', wait_s: float, asked: str | None) -> list[dict[str, Any]]:
+    """Return the status of each node, or of those that are asked for, and who sent none."""
     from pam_actuation.cli.completion import nodes as executables
     from pam_actuation.nodes.operator import watch
     known = set(executables())
 
     def there(operator: 'Operator') -> set[str]:
         found = {name for name in operator.statuses if operator.concerns(name)}
-        return found | {name for name in operator.nodes() if name.rpartition('/')[2] in known}
+        found |= {name for name in operator.nodes() if name.rpartition('/')[2] in known}
+        return {name for name in found if asked is None or _is_called(name, asked)}
 
     watch(opened, lambda: frozenset(
         (one.domain_id, name, name in one.statuses) for one in opened for name in there(one)),

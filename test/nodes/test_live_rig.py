@@ -129,9 +129,9 @@ def test_parameters_are_described_and_guarded(rig):
     assert not answer.results[0].successful and answer.results[0].reason
 
 
-def _pam(rig, capsys, code, verb, *words):
+def _pam(rig, capsys, code, verb, *words, wait_s='20'):
     """Run a verb in the domain of the rig; return its result."""
-    words = (*words, '--domain-id', str(rig.domain_id), '--wait', '20', '--json')
+    words = (*words, '--domain-id', str(rig.domain_id), '--wait', wait_s, '--json')
     assert main([verb, *words]) == code
     return json.loads(capsys.readouterr().out)
 
@@ -142,7 +142,9 @@ def test_the_rig_is_operated_without_the_command_of_ros(rig, capsys, monkeypatch
     assert [line.split()[:2] for line in told] == [
         [f'/muscle/{name}', 'ok'] for name in sorted(NODES)]
 
-    monkeypatch.setattr(operator, 'QUIET_S', 0.5)       # one driver, which is found or not
+    monkeypatch.setattr(operator, 'QUIET_S', 1.5)       # a status comes every half second
+    error = _pam(rig, capsys, 2, 'status', 'valve_drive', wait_s='5')['error']
+    assert 'no such node; running are ' in error and '/muscle/valve_driver' in error
     described = _pam(rig, capsys, 0, 'param', 'get', 'valve_driver', 'max_pressure_gauge_pa')
     limit = described['parameters']['max_pressure_gauge_pa']
     assert (limit['value'], limit['read_only']) == (6e5, True)
