@@ -29,9 +29,10 @@ from campaign_kills import content, listed, LONGEST_S, started
 from campaign_stand_in import WAIT_S, work_on_list
 from pam_actuation.campaign import Case, Settings
 from pam_actuation.campaign.campaign import Task, work_and_keep
-from pam_actuation.campaign.store import CASES, UNFINISHED
+from pam_actuation.campaign.store import CASES
 from pam_actuation.workers import Workers
 from pam_actuation.workers.calls import call, packed
+from pam_sim.files import UNFINISHED
 
 ROOT = Path(__file__).resolve().parent.parent
 SIZES = (1, 2, 4, 8)

@@ -25,7 +25,9 @@ import sys
 import time
 
 from campaign_stand_in import WAIT_S
-from pam_actuation.campaign.store import CASES, LOCK, TIMES, UNFINISHED
+from pam_actuation.campaign.store import CASES, TIMES
+from pam_actuation.kept_folders import LOCK
+from pam_sim.files import UNFINISHED
 
 ROOT = Path(__file__).resolve().parent.parent
 LONGEST_S = 600.0

@@ -33,6 +33,7 @@ from pam_sim.errors import InputError
 
 StrPath = str | os.PathLike[str]
 
+UNFINISHED = '.unfinished-'   # temporary files and folders begin with it
 LONGEST_NAME = 100            # of an experiment or muscle: the file system takes 255 bytes in all
 LONGEST_PART_BYTES = 255      # that file systems take between two slashes
 _TRIED_BYTES = _LOOKED_AT = 4096
@@ -188,7 +189,7 @@ def whole_file(path: StrPath, suffix: str = '', parents: bool = True) -> Iterato
     try:
         # Not made from the name: a long one would not leave room for more.
         handle, temporary = tempfile.mkstemp(
-            prefix='.unfinished-', suffix=suffix, dir=path.parent)
+            prefix=UNFINISHED, suffix=suffix, dir=path.parent)
         os.close(handle)
         yield temporary
         with open(temporary, 'rb') as stream:
@@ -220,7 +221,7 @@ def whole_files(folder: StrPath) -> Iterator[Path]:
     make_folder(folder)
     written, temporary = False, None
     try:
-        temporary = Path(tempfile.mkdtemp(prefix='.unfinished-', dir=folder))
+        temporary = Path(tempfile.mkdtemp(prefix=UNFINISHED, dir=folder))
         yield temporary
         names = sorted(path.name for path in temporary.iterdir())
         for name in names:
@@ -264,7 +265,7 @@ def try_to_write(path: StrPath) -> None:
         folder = folder.parent
     name = None
     try:
-        handle, name = tempfile.mkstemp(prefix='.unfinished-', dir=folder)
+        handle, name = tempfile.mkstemp(prefix=UNFINISHED, dir=folder)
         if os.write(handle, bytes(_TRIED_BYTES)) < _TRIED_BYTES:
             raise OSError(0, 'no space left on the device')
     except OSError as error:

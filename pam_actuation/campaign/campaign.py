@@ -24,8 +24,9 @@ import time
 from typing import Any
 
 from pam_actuation.campaign.cases import Case
-from pam_actuation.campaign.store import CASES, kept_folder, key_of, RESULT, Store
+from pam_actuation.campaign.store import CASES, key_of, RESULT, Store
 from pam_actuation.campaign.work import NEED_A_MODEL, Settings, work_on
+from pam_actuation.kept_folders import kept_folder
 from pam_actuation.workers import ClusterLost, WorkerLost, Workers
 from pam_sim.errors import InputError
 from pam_sim.files import StrPath, write_text

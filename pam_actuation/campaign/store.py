@@ -19,26 +19,21 @@ A case is known by a key of all that its result depends on: the bytes of the rec
 the settings, the version. A run that was killed goes on where it stopped.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 import contextlib
-import fcntl
 import hashlib
 import json
 import os
 from pathlib import Path
-import shutil
-import tempfile
 from typing import Any
 
 from pam_actuation import __version__
 from pam_actuation.campaign.cases import Case
 from pam_actuation.campaign.work import Settings
-from pam_sim.errors import InputError
+from pam_actuation.kept_folders import add_files, only_one
 from pam_sim.files import check_folder, make_folder, StrPath
 
-CASES, RESULT, TIMES, LOCK = 'cases', 'case.json', 'times.csv', '.lock'
-UNFINISHED = '.unfinished-'
-_BLOCK = 1 << 20
+CASES, RESULT, TIMES = 'cases', 'case.json', 'times.csv'
 
 
 class Store:
@@ -91,58 +86,6 @@ class Store:
             stream.write(f'{key},{wall_s:.3f},{processor_s:.3f}\n')
 
 
-@contextlib.contextmanager
-def only_one(folder: Path, what: str, below: Iterable[Path] = ()) -> Iterator[None]:
-    """
-    Keep other processes out of a folder, and remove what a killed one left half done.
-
-    Parameters
-    ----------
-    folder : pathlib.Path
-        It is there.
-    what : str
-        What works in it, for the message.
-    below : iterable of pathlib.Path
-        Further folders that may hold something half done.
-
-    Raises
-    ------
-    InputError
-        Another process works in it.
-
-    """
-    with open(folder / LOCK, 'w', encoding='utf-8') as lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            raise InputError(f'another {what} works in this folder', str(folder)) from None
-        for one in (*below, folder):
-            for left in one.glob(f'{UNFINISHED}*'):
-                if left.is_dir():
-                    shutil.rmtree(left, ignore_errors=True)
-                else:
-                    left.unlink(missing_ok=True)
-        yield
-
-
-@contextlib.contextmanager
-def kept_folder(cases: Path, key: str) -> Iterator[Path]:
-    """Give a folder that becomes ``key`` in the folder ``cases`` when the block ends well."""
-    folder = Path(tempfile.mkdtemp(prefix=UNFINISHED, dir=cases))
-    try:
-        yield folder
-        os.chmod(folder, 0o755)
-        for path in folder.rglob('*'):
-            if path.is_file():
-                with open(path, 'rb') as stream:
-                    os.fsync(stream.fileno())
-        # Where another worker was faster, the folder is there already and holds the same.
-        with contextlib.suppress(OSError):
-            os.rename(folder, cases / key)
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-
-
 def key_of(case: Case, settings: Settings, model_text: str) -> str:
     """
     Return the key of all that the result of a case depends on.
@@ -162,14 +105,5 @@ def key_of(case: Case, settings: Settings, model_text: str) -> str:
     for part in (__version__, model_text, json.dumps(options, sort_keys=True),
                  case.namespace or ''):
         digest.update(part.encode() + b'\0')
-    path = Path(case.path)
-    files = sorted(one for one in path.rglob('*') if one.is_file()) if path.is_dir() else [path]
-    for file in files:
-        digest.update(str(file.relative_to(path)).encode() + b'\0')
-        try:
-            with open(file, 'rb') as stream:
-                while block := stream.read(_BLOCK):
-                    digest.update(block)
-        except OSError as error:
-            digest.update(str(error.errno).encode())
+    add_files(digest, case.path, lambda file, error: str(error.errno).encode())
     return digest.hexdigest()[:20]

@@ -20,15 +20,15 @@ import os
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
+from pam_actuation.kept_folders import add_files
 from pam_sim.errors import InputError
-from pam_sim.files import StrPath
+from pam_sim.files import reason, StrPath
 
 if TYPE_CHECKING:
     from pam_actuation.experiments.experiment import Experiment
     from pam_sim.rig import Rig
 
 SCHEMA = 1
-_BLOCK = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -99,14 +99,9 @@ def digest_of(path: StrPath) -> str:
         It cannot be read.
 
     """
-    digest, top = hashlib.sha256(), Path(path)
-    files = sorted(one for one in top.rglob('*') if one.is_file()) if top.is_dir() else [top]
-    for file in files:
-        digest.update(str(file.relative_to(top)).encode() + b'\0')
-        try:
-            with open(file, 'rb') as stream:
-                while block := stream.read(_BLOCK):
-                    digest.update(block)
-        except OSError as error:
-            raise InputError(f'cannot be read: {error.strerror}', str(file)) from None
+    def unreadable(file: Path, error: OSError) -> bytes:
+        raise InputError(f'cannot be read: {reason(error)}', str(file)) from None
+
+    digest = hashlib.sha256()
+    add_files(digest, path, unreadable)
     return digest.hexdigest()

@@ -27,9 +27,9 @@ from pathlib import Path
 import shutil
 from typing import Any
 
-from pam_actuation.campaign.store import kept_folder, only_one
 from pam_actuation.investigate.recorder import RecordingFailed
 from pam_actuation.investigate.rounds import Round
+from pam_actuation.kept_folders import kept_folder, only_one
 from pam_sim.errors import InputError
 from pam_sim.files import check_folder, make_folder, StrPath, write_text
 

@@ -23,13 +23,15 @@ import sys
 from pam_actuation.campaign.campaign import run_campaign
 from pam_actuation.campaign.cases import Case, find_cases
 from pam_actuation.campaign.results import NO_PARQUET, table_rows, write_table
-from pam_actuation.campaign.store import kept_folder, key_of, Store, UNFINISHED
+from pam_actuation.campaign.store import key_of, Store
 from pam_actuation.campaign.work import Settings
 from pam_actuation.cli.main import main
 from pam_actuation.experiments import load_experiment
 from pam_actuation.experiments.offline import simulate_experiment
+from pam_actuation.kept_folders import kept_folder
 from pam_sim import load_rig
 from pam_sim.errors import InputError
+from pam_sim.files import UNFINISHED
 import pytest
 
 MODEL = 'dmsp_5_300_hanging_mass'
@@ -138,7 +140,7 @@ def test_the_key_is_of_recording_model_and_settings(lab, tmp_path):
 
 def test_what_a_kill_left_half_done_is_removed(tmp_path):
     code = ('import os, signal, sys\nfrom pathlib import Path\n'
-            'from pam_actuation.campaign.store import kept_folder\n'
+            'from pam_actuation.kept_folders import kept_folder\n'
             'with kept_folder(Path(sys.argv[1]), "key") as folder:\n'
             '    (folder / "case.json").write_text("{}")\n'
             '    os.kill(os.getpid(), signal.SIGKILL)\n')

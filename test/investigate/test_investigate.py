@@ -14,6 +14,7 @@
 
 """An investigation: rounds kept whole, the same bytes after a kill, every ending."""
 
+import hashlib
 import json
 import os
 import shutil
@@ -27,10 +28,12 @@ from pam_actuation.cli.main import main
 from pam_actuation.experiments import load_experiment
 from pam_actuation.investigate import Budget, Investigation, loop, Question
 from pam_actuation.investigate.decide import decide
+from pam_actuation.investigate.question import digest_of
 from pam_actuation.investigate.recorder import Declined, Recorder, RecordingFailed
 from pam_actuation.investigate.rounds import Round
 from pam_actuation.investigate.schema import investigation_schema
 from pam_sim import load_rig
+from pam_sim.errors import InputError
 from pam_sim.gap.result import GapResult
 import pytest
 
@@ -314,3 +317,14 @@ def test_what_follows_a_round():
             ('refused', 'sine', 'refused'), ('no_gap', 'sine', 'answered'),
             ('parameter', 'sine', 'answered')):
         assert decide([told(verdict, name)], wide).ended == ended
+
+
+def test_the_digests_of_a_recording_stay(tmp_path):
+    bag = tmp_path / 'bag'
+    (bag / 'a').mkdir(parents=True)
+    (bag / 'a' / 'x').write_bytes(b'12')
+    (bag / 'b').write_bytes(b'3' * 3_000_000)       # more than is read at once
+    content = b'a/x\0' + b'12' + b'b\0' + b'3' * 3_000_000
+    assert digest_of(bag) == hashlib.sha256(content).hexdigest()
+    with pytest.raises(InputError, match='No such file'):
+        digest_of(tmp_path / 'gone')
