@@ -17,17 +17,19 @@ Files that are written whole or not at all, and only where nothing is lost.
 
 Every writer of the two packages ends here. A target is looked at before the work
 starts (``check_file``, ``check_folder``) and written through temporary files beside it
-(``whole_file``, ``whole_files``, ``write_text``). Only regular files are replaced: never a
-device, a pipe, a folder or what a symbolic link points to.
+(``whole_file``, ``whole_files``, ``write_text``, ``write_json``). Only regular files are
+replaced: never a device, a pipe, a folder or what a symbolic link points to.
 """
 
 from collections.abc import Iterable, Iterator
 import contextlib
+import json
 import os
 from pathlib import Path
 import shutil
 import stat
 import tempfile
+from typing import Any
 
 from pam_sim.errors import InputError
 
@@ -245,6 +247,21 @@ def write_text(path: StrPath, content: str, parents: bool = True) -> Path:
         with open(temporary, 'w', encoding='utf-8') as stream:
             stream.write(content)
     return Path(path)
+
+
+def write_json(path: StrPath, data: Any) -> Path:
+    """
+    Write plain data as an indented JSON file, whole or not at all; return its path.
+
+    Raises
+    ------
+    InputError
+        As ``whole_file``.
+    ValueError
+        A number is infinite or not a number; JSON has none of these.
+
+    """
+    return write_text(path, json.dumps(data, indent=2, allow_nan=False) + '\n')
 
 
 def try_to_write(path: StrPath) -> None:

@@ -17,7 +17,6 @@
 from collections.abc import Callable, Sequence
 import contextlib
 from dataclasses import asdict, dataclass, replace
-import json
 import os
 from pathlib import Path
 import time
@@ -29,7 +28,7 @@ from pam_actuation.campaign.work import NEED_A_MODEL, Settings, work_on
 from pam_actuation.kept_folders import kept_folder
 from pam_actuation.workers import ClusterLost, WorkerLost, Workers
 from pam_sim.errors import InputError
-from pam_sim.files import StrPath, write_text
+from pam_sim.files import StrPath, write_json
 
 FAILED = 'failed'
 WARM = {'gap': ('pam_actuation.report.gap',), 'identify': ('pam_actuation.report.identify',),
@@ -177,7 +176,7 @@ def work_and_keep(given: tuple[Settings, str], task: Task) -> tuple[float, float
             found = {'verdict': FAILED, 'reason': ' '.join(str(error).split()), **_LOST}
         except Exception as error:      # noqa: B902, a failed case is a row and not an end
             found = {'verdict': FAILED, 'reason': f'{type(error).__name__}: {error}', **_LOST}
-        write_text(folder / RESULT, json.dumps(found, indent=2, allow_nan=False) + '\n')
+        write_json(folder / RESULT, found)
     return time.perf_counter() - began, time.process_time() - used
 
 

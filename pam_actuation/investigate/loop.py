@@ -16,7 +16,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-import json
 import time
 from typing import Any, TYPE_CHECKING
 
@@ -30,7 +29,7 @@ from pam_actuation.investigate.store import Store
 from pam_actuation.report.gap import gap_of, save_gap
 from pam_actuation.report.signals import duration_s
 from pam_sim.errors import InputError
-from pam_sim.files import StrPath, write_text
+from pam_sim.files import StrPath, write_json
 
 if TYPE_CHECKING:
     from pam_actuation.bags.load import RecordedRun
@@ -203,7 +202,7 @@ class Investigation:
             GIVEN if given else decision.why, {})
         with self._store.new_round(number) as folder:
             save_gap(result, runs[0], folder)
-            write_text(folder / ROUND_FILE, _text(found.facts()))
+            write_json(folder / ROUND_FILE, found.facts())
         self._store.told_time(number, 'gap', time.perf_counter() - began)
         return Round.read(self._store.rounds / str(number))
 
@@ -226,7 +225,3 @@ class Investigation:
                 run.path = self._store.as_seen(path)
             self._runs[number] = runs
         return self._runs[number]
-
-
-def _text(data: dict[str, Any]) -> str:
-    return json.dumps(data, indent=2, allow_nan=False) + '\n'

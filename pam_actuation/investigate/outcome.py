@@ -15,7 +15,6 @@
 """What came out of an investigation: as plain data, as lines for a person, as files."""
 
 from dataclasses import dataclass
-import json
 import os
 import shlex
 import shutil
@@ -25,7 +24,7 @@ from pam_actuation.investigate.decide import (
     ANSWERED, DECLINED, FAILED, IMPOSSIBLE, MINUTES, REFUSED, ROUNDS)
 from pam_actuation.investigate.page import investigation_page
 from pam_actuation.report.sections.replay import SHOWN
-from pam_sim.files import StrPath, whole_files, write_text
+from pam_sim.files import StrPath, whole_files, write_json, write_text
 
 if TYPE_CHECKING:
     from pam_actuation.investigate.rounds import Round
@@ -132,8 +131,7 @@ class Outcome:
     def write(self, store: 'Store') -> None:
         """Write investigation.json, report.html and model.yaml, all of them or none."""
         with whole_files(store.folder) as folder:
-            write_text(folder / 'investigation.json',
-                       json.dumps(self.to_dict(), indent=2, allow_nan=False) + '\n')
+            write_json(folder / 'investigation.json', self.to_dict())
             model, names = '', ['model.yaml'] * self.has_model
             if self.proposal:
                 names += [os.path.basename(self.proposal['file']), PROPOSED_MODEL]

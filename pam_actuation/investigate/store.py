@@ -31,7 +31,7 @@ from pam_actuation.investigate.recorder import RecordingFailed
 from pam_actuation.investigate.rounds import Round
 from pam_actuation.kept_folders import kept_folder, only_one
 from pam_sim.errors import InputError
-from pam_sim.files import check_folder, make_folder, StrPath, write_text
+from pam_sim.files import check_folder, make_folder, StrPath, write_json
 
 QUESTION, TIMES = 'question.json', 'times.csv'
 RECORDINGS, ROUNDS, BAG = 'recordings', 'rounds', 'bag'
@@ -115,7 +115,7 @@ class Store:
                     make_folder(one)
                 for name in (*RESULTS, TIMES):
                     (self.folder / name).unlink(missing_ok=True)
-            write_text(path, json.dumps(asked, indent=2, allow_nan=False) + '\n')
+            write_json(path, asked)
             yield
 
     def read(self) -> list[Round]:

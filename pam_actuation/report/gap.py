@@ -20,7 +20,6 @@ not at all.
 """
 
 from collections.abc import Collection, Sequence
-import json
 import os
 from pathlib import Path
 import shlex
@@ -44,7 +43,7 @@ from pam_actuation.topics.codec import encode
 from pam_actuation.topics.table import topic_of
 from pam_sim import load_rig, preset_names
 from pam_sim.errors import InputError
-from pam_sim.files import check_folder, StrPath, whole_files, write_text
+from pam_sim.files import check_folder, StrPath, whole_files, write_json, write_text
 from pam_sim.gap import find_gap
 from pam_sim.gap.data.health import check_health, dead_signals, recorded_valve
 from pam_sim.gap.data.recording import Recording
@@ -168,8 +167,7 @@ def save_gap(result: 'GapResult', run: 'Run', out_dir: StrPath, of: str = '') ->
 
 
 def _save_into(out_dir: Path, result: 'GapResult', run: 'Run', of: str) -> None:
-    write_text(out_dir / 'gap.json',
-               json.dumps(result.to_dict(), indent=2, allow_nan=False) + '\n')
+    write_json(out_dir / 'gap.json', result.to_dict())
     write_text(out_dir / 'model.yaml', result.model_yaml)
     if result.next_experiment:
         write_text(out_dir / 'next_experiment.yaml',

@@ -15,14 +15,13 @@
 """Write the folder of ``pam identify``: rig, numbers, page and the next experiment."""
 
 from collections.abc import Sequence
-import json
 from typing import TYPE_CHECKING
 
 from pam_actuation.report import figures
 from pam_actuation.report.page import paragraph, plot, render, Section, table
 from pam_actuation.report.pages import FOOTER
 from pam_actuation.report.sections.provenance import provenance
-from pam_sim.files import StrPath, whole_files, write_text
+from pam_sim.files import StrPath, whole_files, write_json, write_text
 from pam_sim.identify.profile import RISE_95
 from pam_sim.identify.result import READABLE
 from pam_sim.located_yaml import dump_yaml
@@ -57,8 +56,7 @@ def save_identification(result: 'Identification', runs: 'Sequence[Run]', out_dir
 
     """
     with whole_files(out_dir) as folder:
-        write_text(folder / 'identify.json',
-                   json.dumps(result.to_dict(), indent=2, allow_nan=False) + '\n')
+        write_json(folder / 'identify.json', result.to_dict())
         write_text(folder / 'rig.yaml', result.rig.to_yaml())
         if result.next_experiment is not None:
             write_text(folder / 'next_experiment.yaml',

@@ -147,3 +147,13 @@ def test_a_pipe_is_not_waited_for(tmp_path):
         files.refuse_pipe(tmp_path / 'pipe')
     files.refuse_pipe(tmp_path / 'missing')
     files.refuse_pipe('/dev/zero')
+
+
+def test_json_is_written_whole_or_not_at_all(tmp_path):
+    path = tmp_path / 'found.json'
+    assert files.write_json(path, {'a': [1, 0.5]}) == path
+    before = path.read_text()
+    assert before == '{\n  "a": [\n    1,\n    0.5\n  ]\n}\n'
+    with pytest.raises(ValueError, match='not JSON compliant'):
+        files.write_json(path, {'a': float('nan')})
+    assert path.read_text() == before and os.listdir(tmp_path) == ['found.json']
