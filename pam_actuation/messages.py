@@ -189,13 +189,16 @@ class ControllerState:
     values: tuple[float, ...]
 
 
+LEVEL_OK, LEVEL_WARN, LEVEL_ERROR, LEVEL_STALE = 0, 1, 2, 3      # of a status
+
+
 @dataclass(frozen=True, slots=True)
 class Status:
     """
     One diagnostic status: topic /diagnostics.
 
-    ``level`` 0 ok, 1 warning, 2 error, 3 stale; ``values`` is a tuple of (key, text) pairs.
-    ``hardware_id`` is the program or device that speaks.
+    ``level`` is one of ``LEVEL_OK`` to ``LEVEL_STALE``; ``values`` is a tuple of (key, text)
+    pairs. ``hardware_id`` is the program or device that speaks.
     """
 
     stamp_ns: int

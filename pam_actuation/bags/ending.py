@@ -24,7 +24,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from pam_actuation.messages import Status
+from pam_actuation.messages import LEVEL_ERROR, Status
 from pam_sim.joint.parameters import SIDES
 from pam_sim.run import Run
 
@@ -36,7 +36,6 @@ EARLY = {INTERRUPTED: 'interrupted', ERROR: 'an error ended it', VENTED: 'the dr
 PLAYING, FINISHED = 'playing', 'finished'
 ENDED_FILE, RECORDED_FILE = 'ended.json', 'recorded.json'     # between session and recorder
 REFERENCE, DRIVER = 'reference_generator', 'valve_driver'
-_LEVEL_ERROR = 2
 
 
 @dataclass(frozen=True)
@@ -141,10 +140,10 @@ class EndWatch:
         elif self._heard_ns is not None:
             self._over = True
             self._elapsed_s = elapsed_s or self._elapsed_s
-            self._failed = status.message if status.level >= _LEVEL_ERROR else ''
+            self._failed = status.message if status.level >= LEVEL_ERROR else ''
 
     def _hear_driver(self, status: Status) -> None:
-        if status.level < _LEVEL_ERROR:
+        if status.level < LEVEL_ERROR:
             self._vented.pop(status.name, None)
         elif self._heard_ns is not None and status.name not in self._vented:
             since_s = (status.stamp_ns - self._heard_ns) * 1e-9

@@ -32,6 +32,7 @@ from pam_actuation.drivers.limits import SafetyLimits
 from pam_actuation.drivers.monitors import (
     AirMonitor, Channel, CommandOrder, FrozenMonitor, stamp_problem)
 from pam_actuation.drivers.steady_age import SteadyAge
+from pam_actuation.messages import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN
 from pam_actuation.slow_rise import SlowRise, WAITS_LONG_S
 from pam_sim.units import gauge_kpa, P_ATM_PA
 
@@ -39,8 +40,6 @@ WAITING = 'waiting'
 OK = 'ok'
 VENTED = 'vented'
 EMERGENCY_STOP = 'emergency_stop'
-
-LEVEL_OK, LEVEL_WARN, LEVEL_ERROR = 0, 1, 2
 
 _NS = 1_000_000_000
 _WARNING_HOLD_NS = _NS       # a warning stays in the message for 1 s after its last cause

@@ -25,6 +25,7 @@ from pam_actuation.hardware.files import hardware_file
 from pam_actuation.investigate.motion import Ask, limit_of, Motion
 from pam_actuation.investigate.recorder import Declined, Progress, Recorder, RecordingFailed
 from pam_actuation.investigate.simulated import controller_for
+from pam_actuation.messages import LEVEL_ERROR
 from pam_actuation.namespaces import MUSCLE
 from pam_sim.errors import InputError
 from pam_sim.files import write_text
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
     from pam_sim.rig import Rig
 
 OVERDUE_S = 5.0               # the reference may finish this much late
-_LEVEL_ERROR = 2
 
 
 class LiveRecorder(Recorder):
@@ -153,7 +153,7 @@ def _watched(supervisor: 'Supervisor', length_s: float, progress: Progress) -> s
 
     def vented() -> str:
         level, message = supervisor.status(driver)
-        return f'{driver}: {message}' if level >= _LEVEL_ERROR else ''
+        return f'{driver}: {message}' if level >= LEVEL_ERROR else ''
 
     def over() -> bool:
         progress(min((time.monotonic() - began) / length_s, 1.0))

@@ -33,6 +33,7 @@ from typing import Self, TYPE_CHECKING
 from pam_actuation.bags.ending import ENDED_FILE, ERROR, FINISHED, INTERRUPTED, RECORDED_FILE
 from pam_actuation.drivers.watchdog import VENTS
 from pam_actuation.interrupts import undisturbed
+from pam_actuation.messages import LEVEL_ERROR
 from pam_actuation.namespaces import JOINT, MUSCLE, namespace_of
 from pam_actuation.rigging.node_group import NodeGroup
 from pam_actuation.rigging.node_spec import NodeSpec
@@ -54,7 +55,6 @@ Tell = Callable[[str], object]                  # takes a sentence
 
 OVERDUE_S = 5.0               # the reference may finish this much late
 STOPPED = 'stopped by the user'
-LEVEL_ERROR = 2
 
 
 def silent(text: str) -> None:
