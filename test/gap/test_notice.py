@@ -23,7 +23,7 @@ from pam_sim.gap import find_gap
 from pam_sim.gap.criteria import CRITERIA
 from pam_sim.gap.data.noise import STAMP_SD_S
 from pam_sim.gap.data.recording import Recording
-from pam_sim.gap.data.supply import supply_stands
+from pam_sim.gap.data.supply import supply_scatter, supply_stands
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.select.context import context_of
 from pam_sim.gap.subsystems.problems import subsystem_problems
@@ -97,6 +97,16 @@ def test_a_recorded_supply_pressure_is_a_witness(quiet):
                              ['supply_droop', 'dead_volume'])
         # What stands still is no reservoir that empties.
         assert ('supply_droop' in {c.name for c in context.pool}) != stands
+
+
+@pytest.mark.parametrize(('first', 'last', 'value'), [
+    (0, 1, 8e5), (0, 40, float('nan')), (-1, None, 8e5)])
+def test_a_supply_pressure_of_a_moment_is_no_witness(quiet, first, last, value):
+    stamp = quiet.topics['pressure'].stamp_ns[first:last]
+    run = Run({**quiet.topics, 'supply_pressure': Series(
+        stamp, {'pressure_pa': np.full(stamp.size, value)})}, {}, '/muscle', 'simulated')
+    recording = Recording(run, 'hsv')
+    assert supply_scatter(recording) is None and not supply_stands([recording], CRITERIA)
 
 
 def test_stamps_scatter_by_no_more_than_they_are_uneven(quiet):

@@ -199,5 +199,5 @@ def _ordered(series: Series, field: str) -> tuple[IntArray, FloatArray]:
     stamp, value = stamp[good], value[good]
     order = np.argsort(stamp, kind='stable')
     stamp, value = stamp[order], value[order]
-    last = np.append(np.diff(stamp) > 0, True)
+    last = np.append(np.diff(stamp) > 0, True)[:stamp.size]
     return stamp[last], value[last]

@@ -41,10 +41,12 @@ def supply_scatter(recording: Recording) -> tuple[float, float, float] | None:
     if recording.supply is None or recording.valve != 'hsv':
         return None
     time_s, values = recording.supply
+    if time_s.size < LEAST_MEANS:
+        return None
     noise = noise_of(time_s, values)
     place = (time_s // MEAN_S).astype(int)
     count = np.bincount(place)
-    full = count > 0.5 * count.max(initial=0)
+    full = count > 0.5 * count.max()
     if full.sum() < LEAST_MEANS or noise.sd <= 0.0:
         return None
     means = np.bincount(place, values)[full] / count[full]
