@@ -23,7 +23,7 @@ from pam_sim.effects.unnamed import terms
 from pam_sim.gap.criteria import CRITERIA
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.fit.estimator import Estimator
-from pam_sim.gap.propose.library import Factor, NOTHING, STAND_INS, Term
+from pam_sim.gap.propose.library import Factor, library, NOTHING, STAND_INS, Term
 from pam_sim.gap.propose.proposal import NONE, propose
 from pam_sim.gap.propose.search import candidate_of, ends_of
 from pam_sim.gap.propose.writing import EffectText
@@ -103,6 +103,23 @@ def written(number, effect, channel, one, two, size):
     text = EffectText(stand_in, [term], values, RANGES, 1.0, f'term_{number}')
     trial = candidate_of(stand_in, [term], ends_of(stand_in, RANGES)).setting(values)
     return text.text(), {'name': text.name, 'parameters': text.values()}, trial, stand_in.valves
+
+
+@pytest.mark.parametrize('stand_in', STAND_INS, ids=lambda s: s.effect)
+def test_every_term_that_may_be_found_can_be_written(stand_in):
+    of_range = {one.symbol: RANGES[one.symbol] for one in stand_in.inputs}
+    first = Term(stand_in.channels[0], Factor(terms.LINEAR))
+    forms = {}
+    for beside in ((), (first,)):
+        for term in library(stand_in, of_range, (2.0,), bool(beside)):
+            form = term.channel, term.one.kind, term.one.of, term.two.kind, term.two.of
+            forms[(*beside, *form)] = (*beside, term)
+    for found in forms.values():
+        values = {f.name: f.typical for k, term in enumerate(found, 1) for f in term.free(k)}
+        effect = EffectText(stand_in, found, values, RANGES, 1.0, 'term')
+        compile(effect.text(), 'term.py', 'exec')
+        for term in found:
+            assert f'{term.channel.symbol} -> ' in effect.equation or len(found) == 1
 
 
 def test_files_load_and_simulate_as_the_terms_that_were_tried(drag, tmp_path):

@@ -145,7 +145,7 @@ class Term:
 
 
 def library(stand_in: StandIn, ranges: Mapping[str, tuple[float, float]],
-            waves_s: tuple[float, ...] = ()) -> list[Term]:
+            waves_s: tuple[float, ...] = (), further: bool = False) -> list[Term]:
     """
     Return the terms of a stand-in, the simple ones first.
 
@@ -157,12 +157,16 @@ def library(stand_in: StandIn, ranges: Mapping[str, tuple[float, float]],
         Lowest and highest value of every input in the data, by its symbol.
     waves_s : tuple of float
         Periods over time that the errors show.
+    further : bool
+        Whether the terms go beside others; those that stand alone are left out then.
 
     """
-    found = []
+    found: list[Term] = []
     for channel in stand_in.channels:
         if channel.symbol == 'zeta':        # its amplitude is a damping, it stands alone
-            found += [Term(channel, Factor(terms.SWING, DISTANCE_PLACE, s)) for s in SWINGS_S]
+            if not further:
+                found += [Term(channel, Factor(terms.SWING, DISTANCE_PLACE, s))
+                          for s in SWINGS_S]
             continue
         alone = [f for i, one in enumerate(stand_in.inputs) if one.symbol in ranges
                  for f in _factors(i, one, ranges[one.symbol], waves_s)]

@@ -164,10 +164,11 @@ def _promises(estimator: Estimator, problem: SubsystemProblem, now: Fit,
             seen = seen.less(stand_in, found.terms, now.values()[found.place])
         if seen is not None:
             promises += [Promise(stand_in, term, *seen.promise(stand_in, term))
-                         for term in library(stand_in, ranges, seen.waves_s)]
+                         for term in library(
+                             stand_in, ranges, seen.waves_s, found is not None)]
         else:
             promises += _simulated(estimator, problem, now, stand_in, library(
-                stand_in, ranges, waves_s), ranges, found)
+                stand_in, ranges, waves_s, found is not None), ranges, found)
     return promises
 
 
