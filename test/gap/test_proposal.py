@@ -91,6 +91,7 @@ def test_the_missing_term_is_found_and_says_what_it_is(drag):
     assert (found.subsystem, found.file) == ('muscle', 'proposed_effect.py')
     assert found.explained > 0.9 and set(found.ranges) == {'v'}
     assert 'Unnamed, its form found from data; it holds for v' in drag.remarks[-1]
+    assert '\n    v (speed of contraction) ' in found.text
     assert_form(drag)
 
 
@@ -117,7 +118,9 @@ def test_every_term_that_may_be_found_can_be_written(stand_in):
     for found in forms.values():
         values = {f.name: f.typical for k, term in enumerate(found, 1) for f in term.free(k)}
         effect = EffectText(stand_in, found, values, RANGES, 1.0, 'term')
-        compile(effect.text(), 'term.py', 'exec')
+        text = effect.text()
+        compile(text, 'term.py', 'exec')
+        assert all(f'\n    {one.symbol} ({one.meaning}) ' in text for one in effect.inputs)
         for term in found:
             assert f'{term.channel.symbol} -> ' in effect.equation or len(found) == 1
 

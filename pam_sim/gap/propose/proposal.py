@@ -25,7 +25,7 @@ from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
 from pam_sim.gap.propose.library import STAND_INS, StandIn
 from pam_sim.gap.propose.ranges import ranges_of, waves_in
 from pam_sim.gap.propose.search import find_terms, Sum
-from pam_sim.gap.propose.words import range_text
+from pam_sim.gap.propose.words import range_texts
 from pam_sim.gap.propose.writing import EffectText
 from pam_sim.gap.result import GapResult
 from pam_sim.gap.select.comparison import gap
@@ -194,5 +194,6 @@ def _written(estimator: Estimator, found: Sum, proved: Fit, validation: Validati
         'name': effect.name, 'parameters': effect.values()}]
     return Proposal(effect.equation, effect.name, found.stand_in.subsystem, float(explained),
                     effect.ranges, effect.text(), dump_yaml(data),
-                    range_text(effect.ranges, effect.inputs), proved.settings()[found.place],
+                    ', '.join(range_texts(effect.ranges, effect.inputs)),
+                    proved.settings()[found.place],
                     {s: (g.rmse_refit, g.rmse_after) for s, g in validation.signals().items()})

@@ -57,15 +57,16 @@ def amount(value: float, unit: str) -> str:
     return f'{value * factor:.3g} {readable}'.strip()
 
 
-def range_text(ranges: Mapping[str, tuple[float, float]], inputs: Sequence[Input]) -> str:
-    """Return the range of the inputs in words."""
+def range_texts(ranges: Mapping[str, tuple[float, float]], inputs: Sequence[Input]
+                ) -> list[str]:
+    """Return the range of every input in words."""
     parts = []
     for one in inputs:
         if one.symbol in ranges:
             low, high = ranges[one.symbol]
             parts.append(f'{one.symbol} ({one.meaning}) {amount(low, one.unit)} to '
                          f'{amount(high, one.unit)}')
-    return ', '.join(parts)
+    return parts
 
 
 def _term(stand_in: StandIn, term: Term, place: int, values: Mapping[str, float]) -> str:

@@ -21,10 +21,9 @@ from pam_sim.effects.unnamed import terms
 from pam_sim.gap.propose.hooks import (
     BOTH, COMMIT, function_text, hook_text, HOOKS, READS, RETURNS)
 from pam_sim.gap.propose.library import Factor, StandIn, Term
-from pam_sim.gap.propose.words import equation_of, range_text
+from pam_sim.gap.propose.words import equation_of, range_texts
 
 NAME = 'proposed_effect'
-LINE = 99
 _LICENCE = '"""\nA term without a name, proposed by `pam gap`; its form was found from data.\n'
 _UNIT_ENDS = {'N': '_n', 'Pa': '_pa', 'm': '_m', 'm/s': '_m_per_s', 's': '_s', '-': '',
               'kg/s': '_kg_per_s'}
@@ -97,12 +96,11 @@ class EffectText:
             self._terms[k - 1].one.kind in (terms.PASSING, terms.SWING) for k in self._remember)
 
     def _docstring(self) -> str:
-        where = range_text(self.ranges, self.inputs) or 'every state'
         rows = [
             f'    {self.equation}', '',
             f'It removed {100 * self._explained:.0f} % of the squared gap of the data of the '
             'proof. It holds for',
-            *(f'    {part}' for part in where.split(', ')),
+            *(f'    {part}' for part in range_texts(self.ranges, self.inputs) or ['every state']),
             'Outside of this range its inputs are held at the edge, so it is bounded.', '',
             'Give it a name and a source of its own, and it is an effect like the others.']
         return _LICENCE + '\n' + '\n'.join(rows) + '\n"""\n'
