@@ -24,7 +24,7 @@ from pam_sim.gap.criteria import CRITERIA
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.propose.library import Factor, library, NOTHING, STAND_INS, Term
-from pam_sim.gap.propose.proposal import NONE, propose
+from pam_sim.gap.propose.proposal import NO_TIME, NONE, propose
 from pam_sim.gap.propose.search import candidate_of, ends_of
 from pam_sim.gap.propose.writing import EffectText
 from pam_sim.gap.result import GapResult
@@ -71,12 +71,12 @@ FORMS = [
     ('force_reading_term', 0, (terms.STOP, 2, 0.5), None, 1.0)]
 
 
-def asked(rig):
+def asked(rig, **options):
     """Return the result of a look for a term in a recording of a rig, held to be `unknown`."""
     recording = Recording(recorded(rig, voltages(12.0)), 'ppr')
     estimator = Estimator(nominal(), subsystem_problems(nominal(), [recording], True, 0, CRITERIA))
     result = GapResult('unknown', '', model_yaml=nominal().to_yaml())
-    propose(result, estimator, estimator.base, recording, False)
+    propose(result, estimator, estimator.base, recording, False, **options)
     return result
 
 
@@ -146,3 +146,8 @@ def test_files_load_and_simulate_as_the_terms_that_were_tried(drag, tmp_path):
 def test_noise_alone_has_no_term():
     result = asked(nominal())
     assert result.proposal is None and result.remarks == [NONE]
+
+
+def test_a_search_that_was_cut_short_says_so():
+    result = asked(nominal().with_(effects=[DRAG]), out_of_time=lambda: True)
+    assert result.proposal is None and result.remarks == [NO_TIME]

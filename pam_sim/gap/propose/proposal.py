@@ -37,6 +37,7 @@ import yaml
 
 MODEL_FILE = 'proposed_model.yaml'
 NONE = 'No simple term explains the rest on the data of the proof, so none is proposed.'
+NO_TIME = 'The time ran out before a simple term was found that explains the rest.'
 
 
 @dataclass(frozen=True)
@@ -147,7 +148,7 @@ def propose(result: GapResult, estimator: Estimator, final: Fit, held_out: Recor
             result.proposal = _written(both, found, proved, validation)
             result.remarks.append(result.proposal.sentence)
             return
-    result.remarks.append(NONE)
+    result.remarks.append(NO_TIME if out_of_time() else NONE)
 
 
 def _refitted(learning: Estimator, final: Fit) -> Fit:
