@@ -15,6 +15,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 
@@ -120,6 +121,8 @@ def test_every_term_that_may_be_found_can_be_written(stand_in):
         effect = EffectText(stand_in, found, values, RANGES, 1.0, 'term')
         text = effect.text()
         compile(text, 'term.py', 'exec')
+        turns = any(term.channel.least < 0.0 for term in found)
+        assert turns == bool(re.search(r'Parameter\(.*, -[0-9.e+-]+, [0-9.e+-]+, d', text))
         assert all(f'\n    {one.symbol} ({one.meaning}) ' in text for one in effect.inputs)
         for term in found:
             assert f'{term.channel.symbol} -> ' in effect.equation or len(found) == 1

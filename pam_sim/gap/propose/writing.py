@@ -133,9 +133,11 @@ class EffectText:
                 "    source='Found from data by `pam gap`.',",
                 f'    equation={self.equation!r},  # noqa: E501', '    parameters=(']
         free = []
-        for name, (unit, value, _) in self.parameters.items():
+        for name, (unit, value, own) in self.parameters.items():
             least, most = (0.2 * value, 5.0 * value) if name.startswith('shape') else (
                 -20.0 * abs(value), 20.0 * abs(value))
+            if self._terms[int(own.rpartition('_')[2]) - 1].channel.least >= 0.0:
+                least = max(least, 0.0)         # a level of friction, a damping
             rows.append(f'        Parameter({name!r}, {unit!r}, {value:.6g}, {least:.3g}, '
                         f"{most:.3g}, description='Found from data.'),")
             free.append(f'        FreeParameter({name!r}, {abs(value):.6g}, {least:.3g}, '
