@@ -17,26 +17,30 @@ A joint as URDF, the robot description that other programs of a stack read.
 
 Two links, base and limb, and one revolute joint about y. The base has x forward and z up; a
 positive angle turns the limb, which points down at ``hanging_angle_rad``, backwards, as a knee
-flexes. Inertia is that of the joint's parameters, moved to the centre of mass.
+flexes. Inertia is that of the joint's parameters, moved to the centre of mass. For a picture the
+muscles are added: each has a prismatic joint that follows the angle as the pulley has it.
 """
 
 from typing import TYPE_CHECKING
 import xml.etree.ElementTree as ElementTree
 
+from pam_sim.joint.parameters import SIDES
 from pam_sim.joint.statics import largest_torque_n_m
-from pam_sim.units import P_ATM_PA
+from pam_sim.urdf import (
+    add_colours, add_cylinder, add_inner_tube, add_limit, add_muscle_joint, add_outer_tube,
+    as_text, largest_force_n, numbers, PRESSURE_PA, VELOCITY_M_PER_S)
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
 
     from pam_sim.joint.rig import JointRig
 
-PRESSURE_PA = P_ATM_PA + 600_000.0      # the pressure limit for which effort is stated
 VELOCITY_RAD_PER_S = 10.0               # URDF asks for a number; nothing here limits the rate
 SLENDERNESS = 0.02                      # inertia about the limb's own axis, share of the other
+LYING = '1.57079633 0 0'                # a cylinder along y
 
 
-def joint_urdf(joint: 'JointRig', name: str) -> str:
+def joint_urdf(joint: 'JointRig', name: str, muscles: bool = False) -> str:
     """
     Return the text of a URDF with the links ``NAME_base`` and ``NAME_limb``.
 
@@ -46,6 +50,9 @@ def joint_urdf(joint: 'JointRig', name: str) -> str:
         With its muscles.
     name : str
         Name of the joint, as in ``name`` of its messages.
+    muscles : bool
+        Also draw the muscles: the links ``NAME_flexor`` and ``NAME_extensor`` on joints of the
+        same names, which mimic the joint.
 
     """
     value = joint.parameters
@@ -57,15 +64,34 @@ def joint_urdf(joint: 'JointRig', name: str) -> str:
     ElementTree.SubElement(revolute, 'parent', link=f'{name}_base')
     ElementTree.SubElement(revolute, 'child', link=f'{name}_limb')
     ElementTree.SubElement(
-        revolute, 'origin', xyz='0 0 0', rpy=f'0 {_text(-value["hanging_angle_rad"])} 0')
+        revolute, 'origin', xyz='0 0 0', rpy=f'0 {numbers(-value["hanging_angle_rad"])} 0')
     ElementTree.SubElement(revolute, 'axis', xyz='0 1 0')
-    ElementTree.SubElement(
-        revolute, 'limit', lower=_text(lower), upper=_text(upper),
-        effort=_text(largest_torque_n_m(joint, PRESSURE_PA)), velocity=_text(VELOCITY_RAD_PER_S))
-    ElementTree.SubElement(revolute, 'dynamics', damping=_text(value['damping_n_m_s']),
-                           friction=_text(value['friction_n_m']))
-    ElementTree.indent(robot)
-    return '<?xml version="1.0"?>\n' + ElementTree.tostring(robot, encoding='unicode') + '\n'
+    add_limit(revolute, lower, upper, largest_torque_n_m(joint, PRESSURE_PA), VELOCITY_RAD_PER_S)
+    ElementTree.SubElement(revolute, 'dynamics', damping=numbers(value['damping_n_m_s']),
+                           friction=numbers(value['friction_n_m']))
+    if muscles:
+        _muscles(robot, joint, name)
+    return as_text(robot)
+
+
+def _muscles(robot: 'Element', joint: 'JointRig', name: str) -> None:
+    """Add both muscles above the axis, each over its pulley: the flexor behind, where x < 0."""
+    add_colours(robot)
+    base, value = robot.find('link'), joint.parameters
+    assert base is not None
+    for side, sign in zip(SIDES, (1.0, -1.0)):
+        rig, radius_m = getattr(joint, side), value[f'{side}_radius_m']
+        muscle = rig.muscle
+        add_cylinder(base, (0.0, 0.004 * sign, 0.0), 0.008, radius_m, 'load', LYING)
+        x_m, low_m = -sign * radius_m, muscle.stroke_m
+        add_outer_tube(base, muscle, (x_m, 0.0, low_m + muscle.length_m))
+        end = ElementTree.SubElement(robot, 'link', name=f'{name}_{side}')
+        add_inner_tube(end, muscle, low_m)
+        slide = add_muscle_joint(robot, f'{name}_{side}', f'{name}_base', f'{name}_{side}',
+                                 (x_m, 0.0, low_m))
+        add_limit(slide, 0.0, muscle.stroke_m, largest_force_n(rig), VELOCITY_M_PER_S)
+        ElementTree.SubElement(slide, 'mimic', joint=name, multiplier=numbers(sign * radius_m),
+                               offset=numbers(value[f'{side}_contraction_at_zero_m']))
 
 
 def _limb(robot: 'Element', name: str, value: dict[str, float]) -> None:
@@ -74,18 +100,14 @@ def _limb(robot: 'Element', name: str, value: dict[str, float]) -> None:
     swing = max(value['inertia_kg_m2'] - mass_kg * down_m ** 2, 0.0)
     link = ElementTree.SubElement(robot, 'link', name=name)
     inertial = ElementTree.SubElement(link, 'inertial')
-    at_centre = {'xyz': f'0 0 {_text(-down_m)}', 'rpy': '0 0 0'}
+    at_centre = {'xyz': f'0 0 {numbers(-down_m)}', 'rpy': '0 0 0'}
     ElementTree.SubElement(inertial, 'origin', at_centre)
-    ElementTree.SubElement(inertial, 'mass', value=_text(mass_kg))
+    ElementTree.SubElement(inertial, 'mass', value=numbers(mass_kg))
     ElementTree.SubElement(
-        inertial, 'inertia', ixx=_text(swing), iyy=_text(swing), izz=_text(SLENDERNESS * swing),
-        ixy='0', ixz='0', iyz='0')
+        inertial, 'inertia', ixx=numbers(swing), iyy=numbers(swing),
+        izz=numbers(SLENDERNESS * swing), ixy='0', ixz='0', iyz='0')
     visual = ElementTree.SubElement(link, 'visual')
     ElementTree.SubElement(visual, 'origin', at_centre)
     shape = ElementTree.SubElement(visual, 'geometry')
     ElementTree.SubElement(
-        shape, 'cylinder', radius=_text(0.1 * down_m), length=_text(2.0 * down_m))
-
-
-def _text(number: float) -> str:
-    return f'{number:.9g}'
+        shape, 'cylinder', radius=numbers(0.1 * down_m), length=numbers(2.0 * down_m))

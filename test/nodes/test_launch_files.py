@@ -24,15 +24,17 @@ from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription  # no
 from launch.actions import OpaqueFunction, SetLaunchConfiguration           # noqa: E402
 from launch.launch_description_sources import PythonLaunchDescriptionSource  # noqa: E402
 from launch.utilities import perform_substitutions                          # noqa: E402
-from launch_ros.actions import LifecycleNode                                # noqa: E402
+from launch_ros.actions import Node                                         # noqa: E402
 from launch_ros.utilities import evaluate_parameters                        # noqa: E402
 from pam_actuation.namespaces import node_name_of                          # noqa: E402
 from pam_actuation.nodes.interfaces import node_class                       # noqa: E402
 from pam_actuation.nodes.managed import COMMON_PARAMETERS                   # noqa: E402
 from pam_actuation.rigging import layouts                                   # noqa: E402
+from pam_actuation.rigging import model_view                                # noqa: E402
 from pam_sim.errors import InputError                                       # noqa: E402
 
 LAUNCH = Path(__file__).resolve().parents[2] / 'launch'
+FILES = sorted(path.name for path in LAUNCH.glob('*.launch.py'))
 
 
 def described(name, **given):
@@ -42,7 +44,7 @@ def described(name, **given):
 
     def visit(entities):
         for one in entities or ():
-            if isinstance(one, LifecycleNode):
+            if isinstance(one, Node):
                 if one.condition is None or one.condition.evaluate(context):
                     one._perform_substitutions(context)
                     parameters = {}
@@ -144,8 +146,39 @@ def test_a_launch_file_starts_what_pam_up_starts(case):
         assert effective(name, launched[name]) == effective(name, parameters), name
 
 
-def test_simulated_time_is_that_of_all_nodes():
-    for file in ('rig.launch.py', 'knee.launch.py'):
+@pytest.fixture
+def installed(monkeypatch):
+    """Let every package of ROS be installed, as far as launch files ask."""
+    monkeypatch.setattr('ament_index_python.packages.get_package_prefix', lambda name: '/ros')
+
+
+@pytest.mark.parametrize('given', [
+    {}, {'rig': 'dmsp_5_300_realistic', 'namespace': 'left', 'rviz': 'false'}])
+def test_the_view_starts_no_node_of_the_rig_and_hears_what_the_rig_publishes(installed, given):
+    launched = described('view.launch.py', **given)
+    wanted = model_view.model_view(
+        given.get('rig', 'joint_dmsp_5_300_realistic'), given.get('namespace', ''),
+        rviz='rviz' not in given)
+    assert launched == {f'{one.namespace}/{one.name}': {**one.parameters} for one in wanted}
+    assert not {f'{node.namespace}/{node.name}' for node in (
+        *layouts.rig('/left'), *layouts.knee())} & {*launched}
+
+
+def test_the_view_says_in_one_sentence_what_is_not_installed():
+    with pytest.raises(InputError, match='^robot_state_publisher: is not installed; install '):
+        described('view.launch.py')
+
+
+def test_simulated_time_is_an_argument_of_every_launch_file():
+    assert len(FILES) >= 4
+    for file in FILES:
+        description = PythonLaunchDescriptionSource(
+            str(LAUNCH / file)).get_launch_description(launch.LaunchContext())
+        assert 'use_sim_time' in {one.name for one in description.get_launch_arguments()}, file
+
+
+def test_simulated_time_is_that_of_all_nodes(installed):
+    for file in ('rig.launch.py', 'knee.launch.py', 'view.launch.py'):
         nodes = described(file, use_sim_time='true')
         assert nodes and all(parameters['use_sim_time'] is True for parameters in nodes.values())
 

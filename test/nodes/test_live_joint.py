@@ -20,6 +20,7 @@ import signal
 import subprocess
 import sys
 import time
+import xml.etree.ElementTree as ElementTree
 
 from killed_node import run_and_kill
 from live_rig import LiveRig, wait_for
@@ -32,12 +33,14 @@ from pam_actuation.nodes.controller_node import GIVING
 from pam_actuation.nodes.ros_messages import class_of
 from pam_actuation.replay.joint import replay_joint
 from pam_actuation.rigging.layouts import knee as nodes_of_a_knee
+from pam_actuation.rigging.model_view import model_view
 from pam_actuation.rigging.session import run_experiment
 from pam_actuation.rigging.supervisor import Supervisor
 from pam_actuation.topics.codec import Writer
 from pam_sim.joint.parameters import SIDES
 from pam_sim.units import P_ATM_PA
 import pytest
+from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
@@ -54,7 +57,7 @@ segments:
 EXAMPLE = Path(__file__).resolve().parents[2] / 'examples' / 'gait_stack.py'
 TOPICS = ('joint_state', 'joint_reference', *(
     f'{side}/{topic}' for side in SIDES
-    for topic in ('pressure', 'pressure_command', 'valve_signal')))
+    for topic in ('pressure', 'contraction', 'pressure_command', 'valve_signal')))
 
 
 SHORT = """
@@ -151,6 +154,22 @@ def holds(rig, angle_rad):
         abs(heard.plain.angle_rad - angle_rad) < 0.03 for heard in recent)
 
 
+def check_muscles_follow(rig):
+    """Check that muscles drawn by the angle are as short as they are measured."""
+    publisher, = model_view('joint_dmsp_5_300_realistic', rviz=False)
+    robot = ElementTree.fromstring(publisher.parameters['robot_description'].partition('?>')[2])
+    states = []
+    rig.hear(JointState, 'joint_state', lambda message, _: states.append(message))
+    wait_for(lambda: states, 10.0, 'a state of the joint')
+    assert list(states[-1].name) == ['knee']
+    for side in SIDES:
+        mimic = robot.find(f"joint[@name='knee_{side}']/mimic")
+        drawn_m = float(mimic.get('offset')) + (
+            float(mimic.get('multiplier')) * states[-1].position[0])
+        assert drawn_m == pytest.approx(
+            newest(rig, f'{side}/contraction').contraction_m, abs=0.0015)
+
+
 def walk(rig):
     """Let the gait stack walk one short stride; return the angles meanwhile."""
     begin_ns = time.time_ns()
@@ -196,6 +215,7 @@ def test_the_joint_goes_where_it_is_asked_and_is_vented_without_its_controller(k
 
     wait_for(lambda: knee.descriptions, 10.0, 'the robot description')
     assert '<joint name="knee" type="revolute">' in knee.descriptions[0].data
+    check_muscles_follow(knee)
 
     # A larger stack takes over: a movement sent once, then a trajectory ahead of the stride.
     processes = knee.supervisor.processes

@@ -20,6 +20,7 @@ import statistics
 import subprocess
 import sys
 import time
+import xml.etree.ElementTree as ElementTree
 
 import pytest
 
@@ -32,10 +33,13 @@ from pam_actuation.cli.main import main                                     # no
 from pam_actuation.control.sofc.persistence import load_rules               # noqa: E402
 from pam_actuation.nodes import operator                                    # noqa: E402
 from pam_actuation.nodes.ros_messages import class_of                      # noqa: E402
+from pam_sim import load_rig                                                # noqa: E402
 from pam_sim.units import P_ATM_PA                                          # noqa: E402
+from pam_sim.urdf import muscle_urdf                                        # noqa: E402
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue     # noqa: E402
 from rcl_interfaces.srv import DescribeParameters, SetParameters            # noqa: E402
 from rclpy.qos import qos_profile_sensor_data                              # noqa: E402
+from sensor_msgs.msg import JointState                                      # noqa: E402
 from std_srvs.srv import SetBool, Trigger                                   # noqa: E402
 
 pytestmark = pytest.mark.ros
@@ -97,6 +101,24 @@ def test_the_messages_make_sense(rig):
     rig.hear(class_of('force'), 'force', lambda message, _: frames.append(message.header.frame_id))
     wait_for(lambda: frames, 10.0, 'a force')
     assert frames[0] == 'muscle_base'
+
+
+def test_the_contraction_is_the_joint_state_that_a_robot_state_publisher_needs(rig):
+    text = muscle_urdf(load_rig('dmsp_5_300_realistic'), 'muscle')
+    joint = ElementTree.fromstring(text.partition('?>')[2]).find('joint')
+    states = {}
+    rig.hear(JointState, 'contraction', lambda message, _: states.setdefault(
+        message.header.stamp.sec * 10**9 + message.header.stamp.nanosec, message),
+        qos_profile_sensor_data)        # as it subscribes
+    wait_for(lambda: len(states) > 20, 10.0, 'states of the joint')
+    heard = {one.plain.stamp_ns: one.plain.contraction_m
+             for one in rig.heard['contraction'][-500:]}
+    common = states.keys() & heard.keys()
+    assert len(common) >= 10
+    for stamp_ns in common:
+        message = states[stamp_ns]
+        assert list(message.name) == [joint.get('name')]
+        assert list(message.position) == [heard[stamp_ns]]
 
 
 def test_every_node_tells_how_it_is(rig):
