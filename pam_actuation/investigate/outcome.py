@@ -23,12 +23,13 @@ from typing import Any, TYPE_CHECKING
 from pam_actuation.investigate.decide import (
     ANSWERED, DECLINED, FAILED, IMPOSSIBLE, MINUTES, REFUSED, ROUNDS)
 from pam_actuation.investigate.page import investigation_page
+from pam_actuation.investigate.store import MODEL, OPTIONAL, PAGE, RESULT, Store
 from pam_actuation.report.sections.replay import SHOWN
 from pam_sim.files import StrPath, whole_files, write_json, write_text
+from pam_sim.gap.propose.proposal import MODEL_FILE
 
 if TYPE_CHECKING:
     from pam_actuation.investigate.rounds import Round
-    from pam_actuation.investigate.store import Store
 
 SCHEMA = 1
 # What gap.json of the last round says of all recordings.
@@ -38,8 +39,7 @@ _NOTHING: dict[str, Any] = {
     'verdict': None, 'reason': '', 'effects': [], 'parameters': [], 'ambiguity_set': [],
     'subsystems': {}, 'signals': {}, 'unexplained_fraction': None, 'proposal': None,
     'next_experiment': None}
-PROPOSED_MODEL = 'proposed_model.yaml'
-OPTIONAL = ('model.yaml', 'proposed_effect.py', PROPOSED_MODEL)
+TUNED = 'tuned.yaml'         # that pam tune would write
 MAY_GO_ON = (ROUNDS, MINUTES, DECLINED, FAILED, IMPOSSIBLE)
 
 
@@ -94,7 +94,7 @@ class Outcome:
             'schema': SCHEMA, 'ended': self.ended, 'because': self.because,
             **{key: last[key] for key in _OF_THE_LAST},
             'rounds': [one.to_dict() for one in self.rounds],
-            'model': 'model.yaml' if self.has_model else None,
+            'model': MODEL if self.has_model else None,
             'next_command': self.next_command('.'), 'question': self.question}
 
     def next_command(self, folder: StrPath) -> str | None:
@@ -102,16 +102,14 @@ class Outcome:
         if not self.has_model:
             return None
         model, tuned = (shlex.quote(os.path.normpath(os.path.join(folder, name)))
-                        for name in ('model.yaml', 'tuned.yaml'))
+                        for name in (MODEL, TUNED))
         return f'pam tune --model {model} --out {tuned}'
 
     def text(self, folder: StrPath) -> str:
         """Return the outcome in lines for a person; ``folder`` is that of the investigation."""
         lines = []
         for one in self.rounds:
-            what = ', '.join(f'{each["experiment"] or each["path"]} ({each["duration_s"]:.0f} s)'
-                             for each in one.recordings)
-            lines.append(f'round {one.number}, {what}: {one.found()}')
+            lines.append(f'round {one.number}, {one.recorded()}: {one.found()}')
         lines.append(f'ended: {self.because}')
         if self.rounds:
             lines.append(f'answer: {self.rounds[-1].gap["reason"]}')
@@ -119,29 +117,29 @@ class Outcome:
             if self.proposal:
                 lines.append(f'proposed: {self.proposal["equation"]}; file '
                              f'{os.path.join(folder, self.proposal["file"])}')
-        lines.append(f'page: {os.path.join(folder, "report.html")}')
+        lines.append(f'page: {os.path.join(folder, PAGE)}')
         if self.has_model:
-            lines.append(f'model: {os.path.join(folder, "model.yaml")}')
+            lines.append(f'model: {os.path.join(folder, MODEL)}')
         if self.ended in MAY_GO_ON:
             more = f' (with --rounds {len(self.rounds) + 1} or more)' * (self.ended == ROUNDS)
             lines.append(f'the same command goes on from here{more}')
         command = self.next_command(folder)
         return '\n'.join([*lines, *([f'next: {command}'] if command else [])])
 
-    def write(self, store: 'Store') -> None:
+    def write(self, store: Store) -> None:
         """Write investigation.json, report.html and model.yaml, all of them or none."""
         with whole_files(store.folder) as folder:
-            write_json(folder / 'investigation.json', self.to_dict())
-            model, names = '', ['model.yaml'] * self.has_model
+            write_json(folder / RESULT, self.to_dict())
+            model, names = '', [MODEL] * self.has_model
             if self.proposal:
-                names += [os.path.basename(self.proposal['file']), PROPOSED_MODEL]
+                names += [os.path.basename(self.proposal['file']), MODEL_FILE]
             for name in names:
                 file = store.rounds / str(self.rounds[-1].number) / name
                 if file.is_file():
                     shutil.copyfile(file, folder / name)
-                    if name == 'model.yaml':
+                    if name == MODEL:
                         model = file.read_text(encoding='utf-8')
-            write_text(folder / 'report.html', investigation_page(self, model))
+            write_text(folder / PAGE, investigation_page(self, model))
             left_over = [name for name in OPTIONAL if not (folder / name).is_file()]
         for name in left_over:      # of an earlier run, which saw fewer rounds
             (store.folder / name).unlink(missing_ok=True)

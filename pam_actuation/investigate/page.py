@@ -130,7 +130,7 @@ def _asked(outcome: 'Outcome') -> Section:
 
 
 def _table(rounds: 'Sequence[Round]') -> Section:
-    rows = [[str(one.number), _recorded(one), VERDICT_TEXT[one.verdict],
+    rows = [[str(one.number), one.recorded(), VERDICT_TEXT[one.verdict],
              ', '.join(one.names) or None,
              ', '.join(one.rivals) if len(one.rivals) > 1 else None,
              _share(one.gap['unexplained_fraction'])] for one in rounds]
@@ -161,7 +161,7 @@ def _shrinking(rounds: 'Sequence[Round]') -> Section:
 
 
 def _round(one: 'Round') -> Section:
-    body = paragraph(f'Recorded: {_recorded(one)}. {one.why}')
+    body = paragraph(f'Recorded: {one.recorded()}. {one.why}')
     body += paragraph(f'{VERDICT_TEXT[one.verdict]}. {one.gap["reason"]}')
     rows = []
     for name, size in one.gap['signals'].items():
@@ -176,11 +176,6 @@ def _round(one: 'Round') -> Section:
     body += (f'<p><a href="rounds/{one.number}/report.html">The page of this round</a> has '
              'the evidence against each rival and the signals over time.</p>')
     return Section(f'round-{one.number}', f'Round {one.number}', body)
-
-
-def _recorded(one: 'Round') -> str:
-    return ', '.join(f'{each["experiment"] or each["path"]} ({each["duration_s"]:.0f} s)'
-                     for each in one.recordings)
 
 
 def _size(name: str, value: float | None) -> str | None:

@@ -78,6 +78,11 @@ class Round:
         """Return the names of what was played for this round."""
         return [one['experiment'] for one in self.recordings if one['experiment']]
 
+    def recorded(self) -> str:
+        """Return what this round added, in one line."""
+        return ', '.join(f'{each["experiment"] or each["path"]} ({each["duration_s"]:.0f} s)'
+                         for each in self.recordings)
+
     def found(self) -> str:
         """Return verdict and names in one line."""
         told = self.rivals if self.verdict == 'ambiguous' else self.names

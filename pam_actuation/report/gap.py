@@ -47,7 +47,7 @@ from pam_sim.files import check_folder, StrPath, whole_files, write_json, write_
 from pam_sim.gap import find_gap
 from pam_sim.gap.data.health import check_health, dead_signals, recorded_valve
 from pam_sim.gap.data.recording import Recording
-from pam_sim.gap.propose.proposal import MODEL_FILE
+from pam_sim.gap.propose.proposal import EFFECT_FILE, MODEL_FILE
 from pam_sim.gap.select.memory import memories
 from pam_sim.gap.subsystems.simulation import free_run
 from pam_sim.identify.before_gap import numbers_block, numbers_first, numbers_text
@@ -59,7 +59,7 @@ if TYPE_CHECKING:
     from pam_sim.run import Run
 
 FILES = ('gap.json', 'model.yaml', 'next_experiment.yaml', 'compare.mcap', 'report.html',
-         'proposed_effect.py', MODEL_FILE)
+         EFFECT_FILE, MODEL_FILE)
 NUMBERS_SHARE = 0.3          # of the progress, where numbers are unknown
 FOLDERS = ('measured', 'simulated_before', 'simulated_refit', 'simulated_after',
            'residual_before', 'residual_after')

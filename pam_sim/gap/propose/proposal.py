@@ -26,7 +26,7 @@ from pam_sim.gap.propose.library import STAND_INS, StandIn
 from pam_sim.gap.propose.ranges import ranges_of, waves_in
 from pam_sim.gap.propose.search import find_terms, Sum
 from pam_sim.gap.propose.words import range_texts
-from pam_sim.gap.propose.writing import EffectText
+from pam_sim.gap.propose.writing import EffectText, NAME
 from pam_sim.gap.result import GapResult
 from pam_sim.gap.select.comparison import gap
 from pam_sim.gap.subsystems.problem import SubsystemProblem
@@ -35,7 +35,7 @@ from pam_sim.gap.verify.validation import Validation
 from pam_sim.located_yaml import dump_yaml
 import yaml
 
-MODEL_FILE = 'proposed_model.yaml'
+EFFECT_FILE, MODEL_FILE = f'{NAME}.py', 'proposed_model.yaml'
 NONE = 'No simple term explains the rest on the data of the proof, so none is proposed.'
 NO_TIME = 'The time ran out before a simple term was found that explains the rest.'
 
