@@ -20,9 +20,8 @@ from typing import Any, TYPE_CHECKING
 from pam_actuation.report import figures
 from pam_actuation.report.page import paragraph, plot, render, Section, table, text
 from pam_actuation.report.pages import FOOTER
-from pam_actuation.report.sections.gap import VERDICT_TEXT
+from pam_actuation.report.sections.gap import interval, percent, quantity, size, VERDICT_TEXT
 from pam_actuation.report.sections.replay import SHOWN
-from pam_sim.gap.report.words import in_words
 
 if TYPE_CHECKING:
     from pam_actuation.investigate.outcome import Outcome
@@ -75,8 +74,8 @@ def _numbers(outcome: 'Outcome') -> list[tuple[str, str, str, str]]:
     for name, one in last.gap['signals'].items():
         if one['shrink_percent'] is not None:
             numbers.append((f'{one["shrink_percent"]:.0f} %', f'of the gap in {name} closed',
-                            f'from {_size(name, one["rmse_refit"])} to '
-                            f'{_size(name, one["rmse_after"])} rms', ''))
+                            f'from {size(name, one["rmse_refit"])} to '
+                            f'{size(name, one["rmse_after"])} rms', ''))
     return numbers
 
 
@@ -95,8 +94,7 @@ def _answer(outcome: 'Outcome') -> Section:
 
 
 def _effects(gap: dict[str, Any]) -> str:
-    rows = [[one['name'], one['subsystem'], in_words(name), f'{q["value"]:.4g} {q["unit"]}',
-             _interval(q['ci95'])]
+    rows = [[one['name'], one['subsystem'], *quantity(name, q)]
             for one in gap['effects'] for name, q in one['equivalent'].items()]
     return table(['effect', 'subsystem', 'quantity', 'value', '95 % interval'],
                  rows) if rows else ''
@@ -104,13 +102,9 @@ def _effects(gap: dict[str, Any]) -> str:
 
 def _parameters(gap: dict[str, Any]) -> str:
     rows = [[one['name'], f'{one["nominal"]:.5g} {one["unit"]}',
-             f'{one["value"]:.5g} {one["unit"]}', _interval(one['ci95'])]
+             f'{one["value"]:.5g} {one["unit"]}', interval(one['ci95'])]
             for one in gap['parameters']]
     return table(['parameter', 'given', 'found', '95 % interval'], rows) if rows else ''
-
-
-def _interval(ends: Sequence[float | None]) -> str:
-    return ' … '.join('open' if end is None else f'{end:.4g}' for end in ends)
 
 
 def _asked(outcome: 'Outcome') -> Section:
@@ -164,10 +158,9 @@ def _round(one: 'Round') -> Section:
     body = paragraph(f'Recorded: {one.recorded()}. {one.why}')
     body += paragraph(f'{VERDICT_TEXT[one.verdict]}. {one.gap["reason"]}')
     rows = []
-    for name, size in one.gap['signals'].items():
-        closed = size['shrink_percent']
-        rows.append([name, *(_size(name, size[key]) for key, _, _ in SIZES),
-                     None if closed is None else f'{closed:.0f} %'])
+    for name, sizes in one.gap['signals'].items():
+        rows.append([name, *(size(name, sizes[key]) for key, _, _ in SIZES),
+                     percent(sizes['shrink_percent'])])
     if rows:
         body += table(['signal', *(label for _, label, _ in SIZES), 'gap closed'], rows)
     following = one.gap['next_experiment']
@@ -176,11 +169,6 @@ def _round(one: 'Round') -> Section:
     body += (f'<p><a href="rounds/{one.number}/report.html">The page of this round</a> has '
              'the evidence against each rival and the signals over time.</p>')
     return Section(f'round-{one.number}', f'Round {one.number}', body)
-
-
-def _size(name: str, value: float | None) -> str | None:
-    factor, _, unit, _ = SHOWN[name]
-    return None if value is None else f'{value * factor:.3g} {unit}'
 
 
 def _share(value: float | None) -> str | None:

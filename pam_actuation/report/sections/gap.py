@@ -14,6 +14,7 @@
 
 """The gap between a recording and a model: verdict, size, place, overlays."""
 
+from collections.abc import Mapping, Sequence
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
@@ -91,14 +92,30 @@ def _subsystems(result: 'GapResult') -> str:
         'note') + '<h3>The whole chain</h3>'
 
 
-def _size(name: str, s: 'SignalGap') -> list[str | None]:
-    factor, _, unit, _ = SHOWN[name]
+def size(signal: str, value: float | None) -> str | None:
+    """Return an error of a signal [SI] in its readable unit, None without one."""
+    factor, _, unit, _ = SHOWN[signal]
+    return None if value is None else f'{value * factor:.3g} {unit}'
 
-    def shown(value: float | None) -> str | None:
-        return None if value is None else f'{value * factor:.3g} {unit}'
-    return [name, shown(s.noise_floor), shown(s.rmse_before), shown(s.rmse_refit),
-            shown(s.rmse_after),
-            None if s.shrink_percent is None else f'{s.shrink_percent:.0f} %']
+
+def percent(value: float | None) -> str | None:
+    """Return a share in per cent as text, None without one."""
+    return None if value is None else f'{value:.0f} %'
+
+
+def quantity(name: str, q: Mapping[str, Any]) -> list[str]:
+    """Return an equivalent quantity in words: its name, value with unit, 95 % interval."""
+    return [in_words(name), f'{q["value"]:.4g} {q["unit"]}', interval(q['ci95'])]
+
+
+def interval(ends: Sequence[float | None]) -> str:
+    """Return an interval as text; an end that is None is open."""
+    return ' … '.join('open' if end is None else f'{end:.4g}' for end in ends)
+
+
+def _size(name: str, s: 'SignalGap') -> list[str | None]:
+    return [name, *(size(name, value) for value in (
+        s.noise_floor, s.rmse_before, s.rmse_refit, s.rmse_after)), percent(s.shrink_percent)]
 
 
 def _effects(result: 'GapResult') -> str:
@@ -108,9 +125,7 @@ def _effects(result: 'GapResult') -> str:
     for e in result.effects:
         for name, q in e['equivalent'].items():
             rows.append([e['name'], e['family'], e['subsystem'], f'{e["confidence"]:.2f}',
-                         in_words(name),
-                         f'{q["value"]:.4g} {q["unit"]}',
-                         f'{q["ci95"][0]:.4g} … {q["ci95"][1]:.4g}'])
+                         *quantity(name, q)])
     body = ('<h3>What is likeliest to be missing</h3>' if result.verdict == 'ambiguous'
             else '<h3>What is missing in the model</h3>')
     body += table(['effect', 'family', 'subsystem', 'confidence', 'quantity', 'value',
