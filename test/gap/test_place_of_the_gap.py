@@ -43,6 +43,16 @@ STILL = {'contraction': SignalGap('m', 2e-5, 2e-5, 2e-5, 2e-5)}
 CELL = ForceErrors(0.5, 0.4, 0.01)
 
 
+def test_a_page_has_no_table_without_rows():
+    first, row = (Share('valve', 'pressure', 'all', 1.0, sure) for sure in (0.9, None))
+    heading = 'Where the gap of the whole chain sits'
+    result = GapResult('unknown', '', where=[first, row])
+    assert heading in gap_section(result).body
+    result.where.pop()
+    body = gap_section(result).body
+    assert heading not in body and first.text() in body
+
+
 @pytest.fixture(scope='module')
 def run():
     return recorded(nominal(), voltages(6.0))

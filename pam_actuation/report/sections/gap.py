@@ -163,9 +163,9 @@ def _next(result: 'GapResult', command: str) -> str:
 
 
 def _where(result: 'GapResult') -> str:
-    if not result.where:
+    rows = result.where[1:]         # the first one is told in a sentence
+    if not rows:
         return ''
-    rows = result.where[1:]
     whole = [w for w in rows if w.condition == 'all']
     body = '<h3>Where the gap of the whole chain sits</h3>'
     body += table(['signal', 'subsystem', 'share of the squared gap'],
