@@ -25,6 +25,7 @@ from pam_actuation.cli.options import (
     count, EXIT_INTERRUPTED, number, out_path, Parser, source)
 
 if TYPE_CHECKING:
+    from pam_actuation.bags.load import RecordedRun
     from pam_actuation.investigate.motion import Motion
     from pam_actuation.investigate.recorder import Recorder
     from pam_sim.rig import Rig
@@ -94,12 +95,12 @@ def run(args: argparse.Namespace) -> int:
     experiment = load_experiment(args.experiment)
     with progress(args, 1.0, '', 'investigate') as bar:
         recorder = _recorder(args, truth, model, bar)
-        _check_given(args)
+        given = _given(args)
         question = Question(model, experiment, tuple(args.run), args.namespace, names,
                             args.materiality, args.seed)
         outcome = Investigation(
             question, recorder, args.out, Budget(args.rounds, args.minutes), args.overwrite,
-            _reporter(args, bar)).run()
+            _reporter(args, bar), given).run()
     emit(args, {**outcome.to_dict(), 'out': args.out}, outcome.text(args.out))
     if outcome.ended == DECLINED:
         return EXIT_INTERRUPTED
@@ -125,11 +126,20 @@ def _rigs(args: argparse.Namespace) -> 'tuple[Rig | None, Rig]':
     return truth, model
 
 
-def _check_given(args: argparse.Namespace) -> None:
-    """Raise InputError for a bag that cannot be read or means something else than it says."""
+def _given(args: argparse.Namespace) -> 'list[RecordedRun]':
+    """
+    Return the bags that are there already.
+
+    Raises
+    ------
+    InputError
+        One cannot be read, or means something else than it says.
+
+    """
     from pam_actuation.bags.load import load_run
-    note_implausible(args, [load_run(path, namespace=args.namespace) for path in args.run],
-                     must_be_right=True)
+    runs = [load_run(path, namespace=args.namespace) for path in args.run]
+    note_implausible(args, runs, must_be_right=True)
+    return runs
 
 
 def _recorder(args: argparse.Namespace, truth: 'Rig | None', model: 'Rig',

@@ -14,7 +14,7 @@
 
 """The investigation: rounds of recording and looking, until an answer or the end of the budget."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 import time
 from typing import Any, TYPE_CHECKING
@@ -79,6 +79,8 @@ class Investigation:
         Whether the investigation of another question in this folder may be replaced.
     report : callable
         Told the share that is done and the step.
+    given : sequence of RecordedRun, optional
+        The recordings of the question, where they are loaded already.
 
     Raises
     ------
@@ -90,7 +92,8 @@ class Investigation:
 
     def __init__(self, question: 'Question', recorder: Recorder, folder: StrPath,
                  budget: Budget | None = None, overwrite: bool = False,
-                 report: Report = lambda share, step: None) -> None:
+                 report: Report = lambda share, step: None,
+                 given: 'Sequence[RecordedRun]' = ()) -> None:
         self._question, self._recorder = question, recorder
         self._budget, self._overwrite, self._report = budget or Budget(), overwrite, report
         self._store = Store(folder)
@@ -98,6 +101,7 @@ class Investigation:
         self._store.check(self._asked, overwrite)
         if not question.given:
             recorder.check(question.experiment)
+        self._given = given
         self._runs: dict[int, list[RecordedRun]] = {}      # by round, read once
 
     def run(self) -> Outcome:
@@ -219,8 +223,9 @@ class Investigation:
         if number not in self._runs:
             paths: list[Any] = list(self._question.given) if given else [
                 self._store.bag(number)]
-            runs = [load_run(path, namespace=self._question.namespace if given else None)
-                    for path in paths]
+            runs = list(self._given) if given and self._given else [
+                load_run(path, namespace=self._question.namespace if given else None)
+                for path in paths]
             for run, path in zip(runs, paths):
                 run.path = self._store.as_seen(path)
             self._runs[number] = runs

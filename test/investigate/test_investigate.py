@@ -200,7 +200,8 @@ def small(done, tmp_path, monkeypatch):
     """Return a function that runs an investigation whose looks give prepared verdicts."""
     asked = []
 
-    def investigate(verdicts, failing=None, given=(), folder=tmp_path / 'out', **budget):
+    def investigate(verdicts, failing=None, given=(), folder=tmp_path / 'out', loaded=(),
+                    **budget):
         left = list(verdicts)
 
         def gap_of(runs, model, played, progress, **options):
@@ -215,7 +216,7 @@ def small(done, tmp_path, monkeypatch):
         recorder = Copies(done / 'recordings' / '1' / 'bag', failing)
         outcome = Investigation(
             Question(load_rig(MODEL), load_experiment(EXPERIMENT), tuple(map(str, given))),
-            recorder, folder, Budget(**budget)).run()
+            recorder, folder, Budget(**budget), given=loaded).run()
         data = json.loads((folder / 'investigation.json').read_text())
         Draft202012Validator(investigation_schema()).validate(data)
         assert data == json.loads(json.dumps(outcome.to_dict()))
@@ -275,12 +276,16 @@ def test_a_live_recording_that_is_refused_is_made_again(small, tmp_path, monkeyp
         '1', '1_refused']
 
 
-def test_recordings_that_are_there_are_the_first_round(small, done):
+def test_recordings_that_are_there_are_the_first_round(small, done, tmp_path, monkeypatch):
     bags = [done / 'recordings' / '1' / 'bag'] * 2
     outcome, played = small(['unknown', 'refused'], given=bags)
     assert [one[0] for one in played] == [] and small.asked[0][0] == 2
     assert outcome.ended == 'not_named'     # what shows every effect is among them
     assert outcome.rounds[0].recordings[0]['path'].startswith('..')
+    runs = [load_run(bag) for bag in bags]
+    monkeypatch.setattr(loop, 'load_run', lambda *told, **more: pytest.fail('loaded again'))
+    again, _ = small(['unknown'], given=bags, folder=tmp_path / 'again', loaded=runs)
+    assert again.to_dict() == outcome.to_dict()
 
 
 def test_a_proposed_term_lies_beside_the_model(small, done, tmp_path):
