@@ -81,6 +81,13 @@ def rollouts() -> None:
                                 str(Path(folder) / 'bag'))
 
 
+def terms() -> None:
+    """Simulate a rig with a term that has no name, as the search for a form does."""
+    rig = load_rig(NOMINAL_RIG)
+    term = {'name': 'load_term', 'parameters': {'first_of_1': 1.0}}
+    rig.with_(effects=[term]).simulate(np.zeros(ROWS))
+
+
 def _law(name: str, rig: Any) -> Any:
     return load_controller(name, rig)
 
@@ -115,7 +122,7 @@ def warm_up(jobs: int = -1) -> None:
     """
     # What is compiled in the first round is part of all that the second one compiles.
     for uses in ([joblib.delayed(rollouts)(), joblib.delayed(muscle)()],
-                 [joblib.delayed(tracked_angle)(), joblib.delayed(tracked_force)(),
+                 [*(joblib.delayed(use)() for use in (terms, tracked_angle, tracked_force)),
                   *(joblib.delayed(tracked)(law) for law in LAWS)]):
         _all(in_processes(jobs, uses))
 

@@ -70,9 +70,10 @@ class Plant:
     def reset(self) -> None:
         """Go back to the start."""
         self.state, self.par = self.rig.pack(dt_s=self.dt_s, **self._initial)
+        self._kernel = kernel.entries_for(self.par)
         self._inp[:] = 0.0
         self._given.contraction_m[...] = fields(self.state, STATE).contraction_m
-        kernel.look(self.state, self.par, self._inp, self._out)
+        self._kernel.look(self.state, self.par, self._inp, self._out)
 
     def step(self, signal: float | Sequence[float], external_force_n: float = 0.0,
              contraction_m: float | None = None, steps: int = 1) -> None:
@@ -99,7 +100,7 @@ class Plant:
         """
         self._take(signal, external_force_n, contraction_m)
         for _ in range(steps):
-            kernel.step(self.state, self.par, self._inp, self._out)
+            self._kernel.step(self.state, self.par, self._inp, self._out)
         self._check()
 
     def roll(self, signal: float | Sequence[float], external_force_n: float = 0.0,
@@ -118,7 +119,7 @@ class Plant:
         inputs = np.empty((steps, len(self._inp)))
         inputs[:] = self._inp
         outputs = np.empty((steps + 1, len(self._out)))
-        kernel.rollout(self.state, self.par, inputs, outputs)
+        self._kernel.rollout(self.state, self.par, inputs, outputs)
         self._out[:] = outputs[-1]
         self._check()
         return outputs[1:]

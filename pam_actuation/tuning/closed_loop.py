@@ -39,6 +39,7 @@ from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.records import fields, size_of, zeros
 from pam_sim.rollout import layout
+from pam_sim.rollout.kernel import refuse_terms
 from pam_sim.short_repr import short_repr
 
 if TYPE_CHECKING:
@@ -142,6 +143,7 @@ class MuscleLoop:
         self.experiment = experiment
         self.hsv = rig.valve == 'hsv'
         self._state, self._par = rig.pack()
+        refuse_terms(self._par)
         dt_s = fields(self._par, layout.PARAMETERS).dt_s
         if dt_s != PHYSICS_S:
             raise InputError(f'the rig is packed for {dt_s} s, not {PHYSICS_S} s')

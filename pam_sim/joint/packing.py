@@ -23,6 +23,7 @@ from pam_sim.joint import layout
 from pam_sim.joint.statics import static_angle
 from pam_sim.records import fields, values_of, zeros
 from pam_sim.rollout import layout as muscle
+from pam_sim.rollout.kernel import refuse_terms
 from pam_sim.units import P_ATM_PA
 
 if TYPE_CHECKING:
@@ -73,6 +74,8 @@ def pack_joint(
     # Checks pressures and step, too.
     packed = [rig.pack(dt_s=dt_s, initial_pressure_pa=pressure, initial_contraction_m=0.0)
               for rig, pressure in zip((joint.flexor, joint.extensor), pressures)]
+    for _, par in packed:
+        refuse_terms(par)
     if initial_angle_rad is None:
         initial_angle_rad = static_angle(joint, pressures)
     for name, number, least, most, unit in (

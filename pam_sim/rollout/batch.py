@@ -289,7 +289,7 @@ def _run_all(pairs: 'list[tuple[Rig, Record]]', finish: Callable[[int, FloatArra
                 if len(buffer) <= len(inputs):
                     buffer = np.empty((len(inputs) + 1, size_of(OUTPUT)))
                 outputs = buffer[:len(inputs) + 1]
-                kernel.rollout(state, par, inputs, outputs)
+                kernel.entries_for(par).rollout(state, par, inputs, outputs)
                 check_outputs(rig, outputs)
                 results[index] = finish(index, outputs)
             except InputError as error:

@@ -19,14 +19,14 @@ These functions are known at run time only. numba cannot compile a call through 
 functions without losing its cache or the speed of a direct call. So the calls are written as text,
 one function per hook, and imported as a module. ``hooks`` is that module:
 ``hooks.volume(volume_m3, pressure_pa, contraction_m, beyond, state, par)`` has the arguments of
-the hook, whether the rig is ``beyond`` the nominal one, and its records. Where it is not, the
-compiler leaves nothing of the call.
+the hook, how far the rig is ``beyond`` the nominal one (see ``layout``), and its records. Where
+it is not, the compiler leaves nothing of the call.
 """
 
 from collections.abc import Iterator
 
 from pam_sim.compiled import named_arguments
-from pam_sim.effects.registry import all_effects
+from pam_sim.effects.registry import all_effects, effects
 from pam_sim.generated import generated_module
 from pam_sim.muscle.registry import laws
 from pam_sim.rollout.hooks import HOOKS
@@ -38,6 +38,7 @@ from pam_sim.compiled import compiled, inlined
 from pam_sim.effects.registry import all_effects
 from pam_sim.muscle.registry import laws
 from pam_sim.records import part
+from pam_sim.rollout.layout import EFFECTS, NOMINAL, TERMS
 from pam_sim.rollout.places import (
     ACTING, ACTING_PLACE, LAW_PLACE, PACKED, PACKED_PLACE, STATES, STATES_PLACE)
 
@@ -68,22 +69,37 @@ def _hook(hook: str) -> Iterator[str]:
     given = ', '.join(declared.arguments)
     result = ', '.join(declared.returns)
     users = [name for name, effect in all_effects().items() if hook in effect.hooks]
-    if users:
-        yield from ('', '', '@compiled', f'def _acting_{hook}({given}, state, par):',
-                    '    acting = part(par, ACTING_PLACE, ACTING)',
-                    '    packed = part(par, PACKED_PLACE, PACKED)',
-                    '    states = part(state, STATES_PLACE, STATES)')
-        for name in users:
-            # Flags are 0 or 1; `> 0.0` is one branch, `!= 0.0` two, as it must tell NaN.
-            yield f'    if acting.{name} > 0.0:'
-            yield f'        {result}{" = " if result else ""}{_call(name, hook)}'
-        if result:
-            yield f'    return {result}'
+    named = [name for name in users if name in effects()]
+    if named:
+        yield from _chain(f'_named_{hook}', hook, named)
+    if users != named:
+        yield from _chain(f'_acting_{hook}', hook, users)
+    elif users:
+        yield f'_acting_{hook} = _named_{hook}'
     yield from ('', '', '@inlined', f'def {hook}({given}, beyond, state, par):',
                 f'    """{declared.sentence}"""')
-    if users:
-        yield f'    if beyond and par.used.{hook} > 0.0:'
-        yield f'        {"return " if result else ""}_acting_{hook}({given}, state, par)'
+    passed = f'({given}, state, par)'
+    for function, acting, level in ((f'_acting_{hook}', users, 'TERMS'),
+                                    (f'_named_{hook}', named, 'EFFECTS')):
+        if acting:
+            yield f'    if beyond == {level} and par.used.{hook} > 0.0:'
+            yield f'        {"return " if result else ""}{function}{passed}'
+    if result:
+        yield f'    return {result}'
+
+
+def _chain(name: str, hook: str, users: list[str]) -> Iterator[str]:
+    """Write the function ``name`` that calls those of the effects ``users`` that act."""
+    result = ', '.join(HOOKS[hook].returns)
+    yield from ('', '', '@compiled',
+                f'def {name}({", ".join(HOOKS[hook].arguments)}, state, par):',
+                '    acting = part(par, ACTING_PLACE, ACTING)',
+                '    packed = part(par, PACKED_PLACE, PACKED)',
+                '    states = part(state, STATES_PLACE, STATES)')
+    for user in users:
+        # Flags are 0 or 1; `> 0.0` is one branch, `!= 0.0` two, as it must tell NaN.
+        yield f'    if acting.{user} > 0.0:'
+        yield f'        {result}{" = " if result else ""}{_call(user, hook)}'
     if result:
         yield f'    return {result}'
 
@@ -104,7 +120,7 @@ def _law_calls() -> Iterator[str]:
     yield from ('    return 0.0', '', '', '@inlined',
                 'def law_tension(gauge_pa, strain, beyond, par):',
                 '    """Value of the force law [N], negative where it would push."""',
-                '    if beyond and par.law > 0.0:',
+                '    if beyond > NOMINAL and par.law > 0.0:',
                 '        return _other_law(gauge_pa, strain, par)',
                 f'    return _law_{fast}(gauge_pa, strain, part(par, LAW_PLACE, _packed_{fast}))',
                 '', '', '@compiled', 'def law_damper(velocity_m_per_s, gauge_pa, strain, par):',

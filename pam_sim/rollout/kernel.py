@@ -16,19 +16,22 @@
 The compiled entry points of the rig: from float64 arrays to records and back.
 
 ``step(state, par, inp, out)`` may be called from other compiled functions; arrays are laid
-out as in :mod:`pam_sim.rollout.layout`.
+out as in :mod:`pam_sim.rollout.layout`. There are two sets of the same entry points. The one that
+also knows terms without a name, ``with_terms``, is compiled where a rig has one.
 """
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import allocating_entry_point, compiled, entry_point, source_key
+from pam_sim.errors import InputError
 from pam_sim.records import part, size_of
 from pam_sim.rollout import layout, step as steps
 from pam_sim.rollout.dispatch import hooks
-from pam_sim.rollout.layout import INPUT, OUTPUT, PARAMETERS, STATE
+from pam_sim.rollout.layout import (
+    EFFECTS, INPUT, NOMINAL, OUTPUT, PARAMETERS, STATE, TERMS)
 
 _INPUT_SIZE, _OUTPUT_SIZE = size_of(INPUT), size_of(OUTPUT)
 
@@ -36,10 +39,28 @@ _INPUT_SIZE, _OUTPUT_SIZE = size_of(INPUT), size_of(OUTPUT)
 @compiled
 def _step_beyond(state: np.record, par: np.record, given: np.record, seen: np.record) -> None:
     """Advance a rig with effects: one piece of machine code, called."""
-    steps.step_body(True, state, par, given, seen)
+    steps.step_body(EFFECTS, state, par, given, seen)
 
 
-def _entries(key: int) -> tuple[Callable[..., Any], ...]:
+@compiled
+def _step_terms(state: np.record, par: np.record, given: np.record, seen: np.record) -> None:
+    """Advance a rig with terms that have no name."""
+    steps.step_body(TERMS, state, par, given, seen)
+
+
+class Entries(NamedTuple):
+    """The entry points; what each does stands where it is made."""
+
+    step: Callable[..., Any]
+    look: Callable[..., Any]
+    settle: Callable[..., Any]
+    rest_contraction: Callable[..., Any]
+    driven_tension: Callable[..., Any]
+    driven_force: Callable[..., Any]
+    rollout: Callable[..., Any]
+
+
+def _entries(key: int, beyond: int) -> Entries:
     """Return the entry points as units of compiled code, stored under ``key``."""
     @entry_point
     def step(state: FloatArray, par: FloatArray, inp: FloatArray, out: FloatArray) -> None:
@@ -48,30 +69,33 @@ def _entries(key: int) -> tuple[Callable[..., Any], ...]:
             return
         of_rig, numbers = part(state, 0, STATE), part(par, 0, PARAMETERS)
         given, seen = part(inp, 0, INPUT), part(out, 0, OUTPUT)
-        if numbers.beyond_nominal > 0.0:
-            _step_beyond(of_rig, numbers, given, seen)
+        if numbers.beyond_nominal > NOMINAL:
+            if beyond == TERMS:
+                _step_terms(of_rig, numbers, given, seen)
+            else:
+                _step_beyond(of_rig, numbers, given, seen)
         else:
-            steps.step_body(False, of_rig, numbers, given, seen)
+            steps.step_body(NOMINAL, of_rig, numbers, given, seen)
 
     @entry_point
     def look(state: FloatArray, par: FloatArray, inp: FloatArray, out: FloatArray) -> None:
         """Fill ``out`` from ``state`` without a step."""
         if key >= 0:
-            steps.look_body(True, part(state, 0, STATE), part(par, 0, PARAMETERS),
+            steps.look_body(beyond, part(state, 0, STATE), part(par, 0, PARAMETERS),
                             part(inp, 0, INPUT), part(out, 0, OUTPUT))
 
     @entry_point
     def settle(state: FloatArray, par: FloatArray) -> None:
         """Make the dependent states agree with pressure and contraction before the first step."""
         if key >= 0:
-            steps.settle_body(True, part(state, 0, STATE), part(par, 0, PARAMETERS))
+            steps.settle_body(beyond, part(state, 0, STATE), part(par, 0, PARAMETERS))
 
     @entry_point
     def rest_contraction(p: float, state: FloatArray, par: FloatArray) -> float:
         """Return the contraction [m] at which a free load rests at a pressure [Pa]."""
         if key < 0:
             return 0.0
-        return steps.rest_body(p, True, part(state, 0, STATE), part(par, 0, PARAMETERS))
+        return steps.rest_body(p, beyond, part(state, 0, STATE), part(par, 0, PARAMETERS))
 
     @entry_point
     def driven_tension(state: FloatArray, par: FloatArray) -> float:
@@ -79,7 +103,7 @@ def _entries(key: int) -> tuple[Callable[..., Any], ...]:
         if key < 0:
             return 0.0
         of_rig = part(state, 0, STATE)
-        return steps.map_tension(of_rig.pressure_pa, of_rig.contraction_m, True, of_rig,
+        return steps.map_tension(of_rig.pressure_pa, of_rig.contraction_m, beyond, of_rig,
                                  part(par, 0, PARAMETERS))
 
     @entry_point
@@ -90,8 +114,8 @@ def _entries(key: int) -> tuple[Callable[..., Any], ...]:
             return 0.0, 0.0
         of_rig, numbers = part(state, 0, STATE), part(par, 0, PARAMETERS)
         p, x = of_rig.pressure_pa, of_rig.contraction_m
-        return (steps.muscle_force(tension, p, x, velocity, 0.0, 0.0, True, of_rig, numbers),
-                hooks.muscle_friction(0.0, p, x, velocity, True, of_rig, numbers))
+        return (steps.muscle_force(tension, p, x, velocity, 0.0, 0.0, beyond, of_rig, numbers),
+                hooks.muscle_friction(0.0, p, x, velocity, beyond, of_rig, numbers))
 
     @allocating_entry_point
     def rollout(state: FloatArray, par: FloatArray, inputs: FloatArray,
@@ -105,18 +129,47 @@ def _entries(key: int) -> tuple[Callable[..., Any], ...]:
             return
         of_rig, numbers = part(state, 0, STATE), part(par, 0, PARAMETERS)
         flat_in, flat_out = inputs.reshape(inputs.size), outputs.reshape(outputs.size)
-        steps.look_body(True, of_rig, numbers, part(flat_in, 0, INPUT), part(flat_out, 0, OUTPUT))
-        if numbers.beyond_nominal > 0.0:
+        steps.look_body(
+            beyond, of_rig, numbers, part(flat_in, 0, INPUT), part(flat_out, 0, OUTPUT))
+        if numbers.beyond_nominal > NOMINAL:
             for i in range(inputs.shape[0]):
-                _step_beyond(of_rig, numbers, part(flat_in, i * _INPUT_SIZE, INPUT),
-                             part(flat_out, (i + 1) * _OUTPUT_SIZE, OUTPUT))
+                step_given = part(flat_in, i * _INPUT_SIZE, INPUT)
+                step_seen = part(flat_out, (i + 1) * _OUTPUT_SIZE, OUTPUT)
+                if beyond == TERMS:
+                    _step_terms(of_rig, numbers, step_given, step_seen)
+                else:
+                    _step_beyond(of_rig, numbers, step_given, step_seen)
         else:
             for i in range(inputs.shape[0]):
-                steps.step_body(False, of_rig, numbers, part(flat_in, i * _INPUT_SIZE, INPUT),
+                steps.step_body(NOMINAL, of_rig, numbers, part(flat_in, i * _INPUT_SIZE, INPUT),
                                 part(flat_out, (i + 1) * _OUTPUT_SIZE, OUTPUT))
 
-    return step, look, settle, rest_contraction, driven_tension, driven_force, rollout
+    return Entries(
+        step, look, settle, rest_contraction, driven_tension, driven_force, rollout)
 
 
-(step, look, settle, rest_contraction, driven_tension, driven_force, rollout) = _entries(
-    source_key(steps, layout))
+_KEY = source_key(steps, layout)
+named = (step, look, settle, rest_contraction, driven_tension, driven_force, rollout) = _entries(
+    _KEY, EFFECTS)
+with_terms = _entries(_KEY, TERMS)
+
+
+def refuse_terms(par: FloatArray) -> None:
+    """
+    Check a packed rig for code that calls ``step`` itself, as compiled rollouts do.
+
+    Raises
+    ------
+    InputError
+        The rig has a term without a name.
+
+    """
+    if entries_for(par) is not named:
+        raise InputError(
+            'the rig has a term without a name, which only the search for a form simulates; '
+            'use the effect file that `pam gap` writes of it')
+
+
+def entries_for(par: FloatArray) -> Entries:
+    """Return the entry points that know all that acts in a rig packed into ``par``."""
+    return with_terms if part(par, 0, PARAMETERS).beyond_nominal == TERMS else named

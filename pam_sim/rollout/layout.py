@@ -104,9 +104,12 @@ PARAMETERS = record(
     'inverse_rt_kg_per_j',
     'law',                          # number of the force law, see places.law_codes
     'law_damper',                   # 1: the law has a damper of its own
-    'beyond_nominal',               # 1: an effect acts or the law is not that of the nominal rig
+    'beyond_nominal',               # how far the rig is beyond the nominal one, see below
     ('used', record(*HOOKS)),       # 1: an effect with this hook acts
 )
+
+# Values of ``beyond_nominal``: an effect acts or the law is another one; terms that have no name.
+NOMINAL, EFFECTS, TERMS = 0, 1, 2
 
 # Values of ``valve``.
 PPR, HSV_AVERAGED, HSV_SWITCHING = 0, 1, 2

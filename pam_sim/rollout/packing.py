@@ -27,7 +27,8 @@ from pam_sim.errors import InputError
 from pam_sim.load import LOADS
 from pam_sim.records import put, put_some, size_of
 from pam_sim.rollout import kernel, layout
-from pam_sim.rollout.places import FLAGS, law_codes, LAW_PLACE, PLACES, STATE_SIZE
+from pam_sim.rollout.places import (
+    BEYOND, BEYOND_PLACE, FLAGS, law_codes, LAW_PLACE, PLACES, STATE_SIZE)
 from pam_sim.units import (
     GAS_CONSTANT_AIR, GRAVITY_M_PER_S2, P_ATM_PA, RHO_REFERENCE, T_REFERENCE_K, TEMPERATURE_K)
 from pam_sim.valve import hsv, ppr
@@ -53,12 +54,12 @@ def pack_rig(rig: 'Rig', dt_s: float, initial_pressure_pa: float,
     _pack_base(rig, numbers, state, par)
     _pack_effects(rig, numbers, state, par)
     if initial_contraction_m is None and LOADS[rig.load].MOVES_FREELY:
-        rest_m = kernel.rest_contraction(numbers.pressure_pa, state, par)
+        rest_m = kernel.entries_for(par).rest_contraction(numbers.pressure_pa, state, par)
         if rest_m != numbers.contraction_m:         # effects start from where the load rests
             numbers = numbers._replace(contraction_m=rest_m)
             put_some(state, layout.STATE, {'contraction_m': rest_m})
             _pack_effects(rig, numbers, state, par)
-    kernel.settle(state, par)
+    kernel.entries_for(par).settle(state, par)
     return state, par
 
 
@@ -69,6 +70,7 @@ def _pack_effects(rig: 'Rig', numbers: Numbers, state: FloatArray, par: FloatArr
         if effect.pack_into(setting.parameters, numbers, par, place, state, state_place):
             for flag in FLAGS[setting.name]:
                 par[flag] = 1.0
+            par[BEYOND_PLACE] = max(par[BEYOND_PLACE], BEYOND[setting.name])
 
 
 def _numbers(rig: 'Rig', dt_s: float, pressure: float, contraction: float | None,

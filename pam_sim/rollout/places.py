@@ -19,10 +19,10 @@ What stands behind the rig's own records in ``state`` and ``par``: effects and f
 ``ACTING``, ``PACKED``, and last the record of the law, which may be of any length.
 """
 
-from pam_sim.effects.registry import all_effects
+from pam_sim.effects.registry import all_effects, effects
 from pam_sim.muscle.registry import laws
 from pam_sim.records import place_of, record, size_of
-from pam_sim.rollout.layout import PARAMETERS, STATE
+from pam_sim.rollout.layout import EFFECTS, PARAMETERS, STATE, TERMS
 
 _EFFECTS = all_effects()
 ACTING = record(*_EFFECTS)                  # 1: the effect acts
@@ -43,10 +43,14 @@ PLACES = {
     for name, effect in _EFFECTS.items()}
 
 # The numbers of ``par`` that are 1 when an effect acts.
-FLAGS = {name: (place_of(PARAMETERS, 'beyond_nominal'), ACTING_PLACE + place_of(ACTING, name),
+FLAGS = {name: (ACTING_PLACE + place_of(ACTING, name),
                 *(place_of(PARAMETERS, 'used') + place_of(PARAMETERS['used'], hook)
                   for hook in effect.hooks))
          for name, effect in _EFFECTS.items()}
+
+BEYOND_PLACE = place_of(PARAMETERS, 'beyond_nominal')
+# What stands there at least when an effect acts.
+BEYOND = {name: EFFECTS if name in effects() else TERMS for name in _EFFECTS}
 
 _FAST_LAW = 'sarosi'                        # of the nominal rig: no call is left of it
 

@@ -45,7 +45,7 @@ def simulate_rig(rig: 'Rig', valve_signal: ArrayLike,
     state, par, inputs = prepare(
         rig, valve_signal, external_force_n, contraction_m, dt_s, initial)
     outputs = np.empty((len(inputs) + 1, size_of(OUTPUT)))
-    kernel.rollout(state, par, inputs, outputs)
+    kernel.entries_for(par).rollout(state, par, inputs, outputs)
     check_outputs(rig, outputs)
     return Response(outputs)
 

@@ -16,9 +16,9 @@
 One step of the rig.
 
 ``state`` and ``par`` are the records ``layout.STATE`` and ``layout.PARAMETERS`` at the begin of
-the arrays of the kernel. ``beyond`` tells whether effects act or the law is another than that
-of the nominal rig; it is a constant where the step is called, so that the nominal rig gets
-machine code of its own, without hooks.
+the arrays of the kernel. ``beyond`` tells how far the rig is beyond the nominal one, as
+``layout.PARAMETERS`` says. It is a constant where the step is called. So the nominal rig gets
+machine code of its own, without hooks, and terms that have no name cost other rigs nothing.
 
 Scheme of one physics step h: the lag of the regulator is exact, and the air mass follows from
 Runge-Kutta of fourth order. A Nystroem step moves the load. Its contractions at middle and end
@@ -35,7 +35,7 @@ from pam_sim.compiled import inlined
 from pam_sim.load.hanging_mass import acceleration
 from pam_sim.muscle.geometry import volume_m3
 from pam_sim.rollout.dispatch import hooks
-from pam_sim.rollout.layout import HSV_AVERAGED, PPR
+from pam_sim.rollout.layout import HSV_AVERAGED, NOMINAL, PPR
 from pam_sim.valve.flow import mass_flow_kg_per_s
 from pam_sim.valve.hsv import clip_duty, open_time_in, pulse_edges
 from pam_sim.valve.ppr import set_point_pa
@@ -44,7 +44,7 @@ _HALVINGS = 52              # of the stroke, to the last bit
 
 
 @inlined
-def air_volume(p: float, x: float, beyond: bool, state: np.record, par: np.record) -> float:
+def air_volume(p: float, x: float, beyond: int, state: np.record, par: np.record) -> float:
     """Return the volume the air has [m^3] at pressure p [Pa] and contraction x [m]."""
     volume = par.dead_volume_m3 + volume_m3(
         x, par.length_m, par.thread_squared_m2, par.inverse_4_pi_n2)
@@ -52,7 +52,7 @@ def air_volume(p: float, x: float, beyond: bool, state: np.record, par: np.recor
 
 
 @inlined
-def map_tension(p: float, x: float, beyond: bool, state: np.record, par: np.record) -> float:
+def map_tension(p: float, x: float, beyond: int, state: np.record, par: np.record) -> float:
     """Return the static tension [N] at pressure p [Pa] and contraction x [m]."""
     gauge, strain = hooks.map_input(
         p - par.atmosphere_pa, x * par.inverse_length_per_m, beyond, state, par)
@@ -64,17 +64,17 @@ def map_tension(p: float, x: float, beyond: bool, state: np.record, par: np.reco
 
 @inlined
 def muscle_force(tension: float, p: float, x: float, v: float, dx: float, elapsed: float,
-                 beyond: bool, state: np.record, par: np.record) -> float:
+                 beyond: int, state: np.record, par: np.record) -> float:
     """Return the force the muscle transmits [N], its dry friction excepted."""
     force = tension - par.damping_n_s_per_m * v
-    if beyond and par.law_damper > 0.0 and tension > 0.0:
+    if beyond > NOMINAL and par.law_damper > 0.0 and tension > 0.0:
         force -= hooks.law_damper(
             v, p - par.atmosphere_pa, x * par.inverse_length_per_m, par)
     return hooks.muscle_force(force, p, x, v, dx, elapsed, beyond, state, par)
 
 
 @inlined
-def load_force(x: float, v: float, dx: float, elapsed: float, external: float, beyond: bool,
+def load_force(x: float, v: float, dx: float, elapsed: float, external: float, beyond: int,
                state: np.record, par: np.record) -> float:
     """Return the force of weight, spring, external load and load effects on the load [N]."""
     return hooks.load_force(
@@ -82,7 +82,7 @@ def load_force(x: float, v: float, dx: float, elapsed: float, external: float, b
 
 
 @inlined
-def valve_flows(fill: float, vent: float, p: float, supply: float, altered: bool, beyond: bool,
+def valve_flows(fill: float, vent: float, p: float, supply: float, altered: bool, beyond: int,
                 state: np.record, par: np.record) -> tuple[float, float]:
     """Return (fill, vent) mass flow [kg/s] of the HSV pair at mean openings 0..1."""
     flow_in = 0.0
@@ -100,7 +100,7 @@ def valve_flows(fill: float, vent: float, p: float, supply: float, altered: bool
 
 @inlined
 def pressure_per_kg(mass: float, inflow: float, net: float, p: float, volume: float, per_m3: float,
-                    elapsed: float, beyond: bool, state: np.record, par: np.record) -> float:
+                    elapsed: float, beyond: int, state: np.record, par: np.record) -> float:
     """
     Return R T / V [Pa/kg] ``elapsed`` into a step that began with ``mass`` at pressure p.
 
@@ -112,7 +112,7 @@ def pressure_per_kg(mass: float, inflow: float, net: float, p: float, volume: fl
 
 
 @inlined
-def ppr_pressures(voltage: float, h: float, beyond: bool, state: np.record,
+def ppr_pressures(voltage: float, h: float, beyond: int, state: np.record,
                   par: np.record) -> tuple[float, float]:
     """Return the PPR pressure [Pa] at the middle and the end of a physics step."""
     p = state.pressure_pa
@@ -121,7 +121,7 @@ def ppr_pressures(voltage: float, h: float, beyond: bool, state: np.record,
         set_point_pa(voltage, par.gain_ppr_pa_per_v, par.lowest_ppr_v, par.highest_ppr_v,
                      par.at_lowest_ppr_pa),
         par.time_constant_s, p, x, beyond, state, par)
-    if not (beyond and par.used.pressure_rate > 0.0):
+    if not (beyond > NOMINAL and par.used.pressure_rate > 0.0):
         decay = par.decay_half
         if time_constant != par.time_constant_s:
             decay = math.exp(-0.5 * h / time_constant)
@@ -146,7 +146,7 @@ def ppr_pressures(voltage: float, h: float, beyond: bool, state: np.record,
 
 
 @inlined
-def latch_pulses(fill: float, vent: float, beyond: bool, state: np.record, par: np.record) -> None:
+def latch_pulses(fill: float, vent: float, beyond: int, state: np.record, par: np.record) -> None:
     """Fix both valves' edges for the PWM period that begins now."""
     period = par.pwm_period_s
     open_s, close_s = hooks.switch_times(0.0, 0.0, beyond, state, par)
@@ -159,7 +159,7 @@ def latch_pulses(fill: float, vent: float, beyond: bool, state: np.record, par: 
 
 
 @inlined
-def openings(fill: float, vent: float, time_s: float, h: float, beyond: bool, state: np.record,
+def openings(fill: float, vent: float, time_s: float, h: float, beyond: int, state: np.record,
              par: np.record) -> tuple[float, float]:
     """Return the mean openings of both valves over one physics step."""
     period = par.pwm_period_s
@@ -186,7 +186,7 @@ def openings(fill: float, vent: float, time_s: float, h: float, beyond: bool, st
 
 @inlined
 def physics_step(signal_0: float, signal_1: float, external: float, x_target: float, time_s: float,
-                 beyond: bool, state: np.record, par: np.record) -> None:
+                 beyond: int, state: np.record, par: np.record) -> None:
     """
     Advance valve, muscle and load by one physics step.
 
@@ -256,10 +256,11 @@ def physics_step(signal_0: float, signal_1: float, external: float, x_target: fl
     else:
         fill, vent = openings(signal_0, signal_1, time_s, h, beyond, state, par)
         mass0 = state.air_mass_kg
-        altered = (beyond and par.used.valve_flow > 0.0)
-        warm = (beyond and par.used.air_rt > 0.0)
+        altered = beyond > NOMINAL and par.used.valve_flow > 0.0
+        warm = beyond > NOMINAL and par.used.air_rt > 0.0
         # Both valves shut and no air lost: the mass stays, and no stage needs a flow.
-        flowing = fill > 0.0 or vent > 0.0 or altered or (beyond and par.used.mass_flow > 0.0)
+        flowing = fill > 0.0 or vent > 0.0 or altered or (
+            beyond > NOMINAL and par.used.mass_flow > 0.0)
         if flowing:
             in1, out1 = valve_flows(fill, vent, p0, supply, altered, beyond, state, par)
             q1 = hooks.mass_flow(in1 - out1, p0, x0, supply, beyond, state, par)
@@ -371,7 +372,7 @@ def physics_step(signal_0: float, signal_1: float, external: float, x_target: fl
 
 
 @inlined
-def cell_force(external: float, beyond: bool, state: np.record,
+def cell_force(external: float, beyond: int, state: np.record,
                par: np.record) -> tuple[float, float]:
     """Return (load cell force [N], acceleration [m/s^2]) of the present state."""
     p = state.pressure_pa
@@ -399,7 +400,7 @@ def cell_force(external: float, beyond: bool, state: np.record,
 
 
 @inlined
-def observe(force: float, a: float, beyond: bool, state: np.record, par: np.record,
+def observe(force: float, a: float, beyond: int, state: np.record, par: np.record,
             seen: np.record) -> None:
     """Fill ``seen`` from ``state`` and what ``cell_force`` returned for it."""
     p = state.pressure_pa
@@ -424,7 +425,7 @@ def observe(force: float, a: float, beyond: bool, state: np.record, par: np.reco
 
 
 @inlined
-def step_body(beyond: bool, state: np.record, par: np.record, given: np.record,
+def step_body(beyond: int, state: np.record, par: np.record, given: np.record,
               seen: np.record) -> None:
     """Advance ``state`` by one step of ``par.dt_s`` with ``inp[i…]`` and fill ``out[o…]``."""
     dt = par.dt_s
@@ -447,7 +448,7 @@ def step_body(beyond: bool, state: np.record, par: np.record, given: np.record,
 
 
 @inlined
-def look_body(beyond: bool, state: np.record, par: np.record, given: np.record,
+def look_body(beyond: int, state: np.record, par: np.record, given: np.record,
               seen: np.record) -> None:
     """Fill the outputs ``seen`` from ``state`` without advancing anything."""
     force, a = cell_force(given.external_force_n, beyond, state, par)
@@ -455,7 +456,7 @@ def look_body(beyond: bool, state: np.record, par: np.record, given: np.record,
 
 
 @inlined
-def settle_body(beyond: bool, state: np.record, par: np.record) -> None:
+def settle_body(beyond: int, state: np.record, par: np.record) -> None:
     """Make the dependent states agree with pressure and contraction before the first step."""
     p = state.pressure_pa
     x = state.contraction_m
@@ -467,7 +468,7 @@ def settle_body(beyond: bool, state: np.record, par: np.record) -> None:
 
 
 @inlined
-def rest_body(p: float, beyond: bool, state: np.record, par: np.record) -> float:
+def rest_body(p: float, beyond: int, state: np.record, par: np.record) -> float:
     """Return the contraction [m] at which a free load rests at a pressure [Pa], by bisection."""
     low = 0.0
     high = par.max_contraction_m

@@ -17,11 +17,15 @@
 import math
 
 import numpy as np
+from pam_actuation.experiments import load_experiment
+from pam_actuation.tuning.closed_loop import ClosedLoop
 from pam_sim import load_rig
 from pam_sim.effects.registry import effects, get_effect
+from pam_sim.errors import InputError
+from pam_sim.joint import load_joint
 from pam_sim.records import columns, fields, size_of, values_of
 from pam_sim.rollout import kernel
-from pam_sim.rollout.layout import OUTPUT, PARAMETERS
+from pam_sim.rollout.layout import EFFECTS, OUTPUT, PARAMETERS, TERMS
 from pam_sim.rollout.simulate import input_array
 from pam_sim.valve.flow import flow_function, mass_flow_kg_per_s
 import pytest
@@ -30,7 +34,10 @@ STEPS = 600
 VALVES = (('ppr', 'averaged'), ('hsv', 'averaged'), ('hsv', 'switching'))
 
 
-def rolled(rig, used=None):
+TERM = {'name': 'muscle_term', 'parameters': {'first_of_1': 2.0}}
+
+
+def rolled(rig, used=None, beyond=EFFECTS):
     """Return the outputs of a rollout; with hooks ``used``, as if effects acted through them."""
     phase = np.arange(STEPS) * 0.02
     signal = 3.0 + 2.0 * np.sin(phase)
@@ -41,11 +48,11 @@ def rolled(rig, used=None):
     state, par = rig.pack(initial_pressure_pa=300e3)
     if used is not None:
         numbers = fields(par, PARAMETERS)
-        numbers.beyond_nominal = 1.0
+        numbers.beyond_nominal = beyond
         for hook in used:
             numbers.used[hook] = 1.0
     outputs = np.empty((STEPS + 1, size_of(OUTPUT)))
-    kernel.rollout(state, par, inputs, outputs)
+    kernel.entries_for(par).rollout(state, par, inputs, outputs)
     return outputs
 
 
@@ -69,6 +76,25 @@ def test_only_the_nominal_rig_takes_the_short_way():
     assert beyond(nominal.with_(effects=['pressure_bias'])) == 1.0
     silent = {'name': 'pressure_bias', 'parameters': {'bias_pa': 0.0}}
     assert beyond(nominal.with_(effects=[silent])) == 0.0
+    assert beyond(nominal.with_(effects=[TERM])) == TERMS
+    assert beyond(nominal.with_(effects=[TERM, 'pressure_bias'])) == TERMS
+
+
+def test_what_knows_terms_without_a_name_has_the_same_bits_for_effects_that_have_one():
+    for valve, fidelity in VALVES:
+        rig = load_rig('dmsp_5_300_realistic', valve=valve, fidelity=fidelity)
+        assert np.array_equal(rolled(rig, ()), rolled(rig, (), TERMS))
+        assert np.abs(rolled(rig.with_(effects=[*rig.effects, TERM])) - rolled(rig)).max() > 1e-4
+
+
+def test_code_that_does_not_know_terms_without_a_name_refuses_them():
+    rig = load_rig('dmsp_5_300_hanging_mass').with_(effects=[TERM])
+    with pytest.raises(InputError, match='a term without a name'):
+        ClosedLoop(rig, load_experiment('short_sine'))
+    joint = load_joint('joint_dmsp_5_300')
+    joint = joint.with_(flexor=joint.flexor.with_(effects=[TERM]))
+    with pytest.raises(InputError, match='a term without a name'):
+        joint.simulate(*np.zeros((3, 5)))
 
 
 @pytest.mark.parametrize('ratio', [0.05, 0.3, 0.5, 0.9])
