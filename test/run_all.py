@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Run every test: the live ones that judge times, and beside them all others.
+Run every test: the live ones that judge times in two lanes, and beside them all others.
 
 Live nodes wait more than they compute, and the others take what is left of the cores: they have
 a low priority, so that a live process that wakes gets a core at once. Live tests that failed
@@ -28,16 +28,29 @@ import subprocess
 import sys
 import tempfile
 
-from stall_watch import EXIT_STOOD_STILL, TIMED
+from stall_watch import EXIT_STOOD_STILL, NAMES_A_LIVE_TEST, TIMED
 
 ROOT = Path(__file__).resolve().parent.parent
-# A cache of their own: the list of what failed last belongs to one run.
-LIVE = ('-m', TIMED, '-o', 'cache_dir=.pytest_cache/live')
-# File by file in this order, so that the long files do not come last.
-OTHERS = ('-m', f'not ({TIMED})', '--numprocesses', 'auto', '--dist', 'loadfile',
-          '--no-loadscope-reorder')
+# Whole runs as a user starts them: the longest live tests, about half of the time of all.
+WHOLE_RUNS = (
+    'test/docs/test_tutorials.py', 'test/cli/test_verbs.py', 'test/nodes/test_session.py',
+    'test/nodes/test_simulated_time.py', 'test/nodes/test_stopped.py')
+# One process more than cores: some of these tests wait as well. File by file in this order, so
+# that the long files do not come last.
+OTHERS = ('-m', f'not ({TIMED})', '--numprocesses', str(1 + (os.cpu_count() or 1)),
+          '--dist', 'loadfile', '--no-loadscope-reorder')
 # A tenth of the time where a live process wants the core as well.
 NICE = 10
+
+
+def live_lanes():
+    """Return the arguments of pytest for the two lanes of live tests; they share no file."""
+    others = [name for path in sorted((ROOT / 'test').rglob('test_*.py'))
+              if NAMES_A_LIVE_TEST.search(path.read_text(encoding='utf-8'))
+              and (name := path.relative_to(ROOT).as_posix()) not in WHOLE_RUNS]
+    # A cache of their own: the list of what failed last belongs to one run.
+    return [('-m', TIMED, '-o', f'cache_dir=.pytest_cache/live_{number}', *files)
+            for number, files in enumerate((WHOLE_RUNS, others))]
 
 
 def pytest(*arguments, **options):
@@ -67,17 +80,21 @@ def to_background():
 
 def main():
     """Run the tests and print what they say; return 1 if any failed."""
-    with tempfile.TemporaryFile('w+') as said:
-        code, others = ended(
-            pytest(*LIVE, stdout=said, stderr=subprocess.STDOUT),
-            pytest(*OTHERS, preexec_fn=to_background))
-        said.seek(0)
-        print('\nThe live tests that ran beside them:\n', said.read(), sep='', flush=True)
-    if code == EXIT_STOOD_STILL:
-        print('The machine stood still during the live tests that failed; these once more:',
-              flush=True)
-        code, = ended(pytest(*LIVE, '--last-failed'))
-    return int(code != 0 or others != 0)
+    lanes = live_lanes()
+    with contextlib.ExitStack() as files:
+        said = [files.enter_context(tempfile.TemporaryFile('w+')) for _ in lanes]
+        live = [pytest(*lane, stdout=file, stderr=subprocess.STDOUT)
+                for lane, file in zip(lanes, said)]
+        *codes, others = ended(*live, pytest(*OTHERS, preexec_fn=to_background))
+        for file in said:
+            file.seek(0)
+            print('\nThe live tests that ran beside them:\n', file.read(), sep='', flush=True)
+    for place, lane in enumerate(lanes):
+        if codes[place] == EXIT_STOOD_STILL:
+            print('The machine stood still during the live tests that failed; these once more:',
+                  flush=True)
+            codes[place], = ended(pytest(*lane, '--last-failed'))
+    return int(any((*codes, others)))
 
 
 if __name__ == '__main__':

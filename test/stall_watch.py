@@ -22,6 +22,7 @@ the code. A process beside the tests writes down every such moment.
 
 import os
 from pathlib import Path
+import re
 import subprocess
 import sys
 import threading
@@ -29,6 +30,8 @@ import time
 
 # What judges times, as an expression of markers: its priority stays.
 TIMED = 'timed or ros and not shared'
+# A file whose text names no such marker has no such test; conftest.py holds every file to it.
+NAMES_A_LIVE_TEST = re.compile(r'\bmark\.(ros|timed)\b')
 # Exit code of a run in which tests failed, but only while the machine stood still.
 EXIT_STOOD_STILL = 75       # EX_TEMPFAIL of sysexits.h: try again
 PERIOD_S = 0.01
