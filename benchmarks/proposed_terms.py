@@ -20,14 +20,14 @@ What `pam gap` proposes where no library holds the effect: rigs of an independen
     python benchmarks/proposed_terms.py --nulls 60 --kinds none
 
 Each rig hides one effect that no library holds. Of each there are three recordings: one to learn
-from, one for the proof, and a third of another motion that nothing is fitted to, chosen by or
-proved on. The table states the share of the squared gap after calibration that the final model
-removes, on the proof and on the third recording.
+from, one for the proof, and a third of another motion. Nothing is fitted to the third, chosen by
+it or proved on it. The table states the share of the squared gap after calibration that the
+final model removes, on the proof and on the third recording.
 
 Null records are rigs without an effect, half of them hard: coloured noise, drift, skew.
 
-Every record is looked at as if its verdict had been `unknown`, so that the search for a term is
-tested itself, also where the library would name something. With --whole, `pam gap` decides.
+Every record is looked at as if its verdict had been `unknown`. This tests the search for a term
+also where the library would name something. With --whole, `pam gap` decides.
 """
 
 import argparse

@@ -18,8 +18,8 @@ The demo: the real nodes on DDS for both valves, then everything that can be don
 The steps are live tracking on the PPR with learning, the same with frozen rules, and live tracking
 on the HSV pair. Then bags are checked with two independent readers and the controller is replayed.
 A short offline tuning, the gap to the nominal model and one page follow. Every step is what the
-``pam`` verbs do. The search of the gap and the independent readers take long: they begin as soon
-as their bag is there, as processes of low priority beside the next live run.
+``pam`` verbs do. The search of the gap and the independent readers take long. They begin as soon
+as their bag is there, and run at low priority beside the next live run.
 """
 
 from collections.abc import Callable

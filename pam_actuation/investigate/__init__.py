@@ -15,8 +15,8 @@
 """
 From a question to an answer: record, find the gap, record what would tell rivals apart, again.
 
-``question`` is what is asked. ``recorder`` is the interface of what records, ``simulated`` and
-``live`` are its two forms, and ``motion`` is what a person is told before a muscle moves.
+``question`` is what is asked. ``recorder`` is the interface of what records; ``simulated`` and
+``live`` are its two forms. ``motion`` is what a person is told before a muscle moves.
 ``store`` keeps the folder, ``rounds`` reads a round from it, ``decide`` says what follows it.
 ``loop`` is the investigation itself. ``outcome`` and ``page`` tell the result. No module here
 imports ROS.

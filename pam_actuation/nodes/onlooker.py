@@ -16,7 +16,7 @@
 A node that looks at rigs of a ROS domain and disturbs none.
 
 It has no parameters and services of its own. It subscribes as an onlooker: publishers send
-each message once and keep nothing for it, so it may be slow, stop or be killed at any time.
+each message once and keep nothing for it. So it may be slow, stop or be killed at any time.
 """
 
 from collections.abc import Container

@@ -93,8 +93,8 @@ def measured(rows, chain, rng, reservoir=True):
     """
     Return {topic: (stamps in s from the start, values)} as they go into a bag.
 
-    The instant of sampling scatters and is stamped; the stamp has an error of its own and the
-    skew of its topic; a few times some messages of a topic are missing for 5 ms.
+    The instant of sampling scatters and is stamped. The stamp has an error of its own and the
+    skew of its topic. A few times some messages of a topic are missing for 5 ms.
     """
     clean = readings(rows, chain)
     end_s = (rows.shape[0] - 1) * ROW_S

@@ -17,9 +17,11 @@ The one place in which the disagreement lives after calibration: the first row o
 
 Each subsystem runs on its own measured inputs, so what it misses is its own. What a confirmed
 name explains of a subsystem is of that name's subsystem. The rest of muscle and load divides by
-the balance of forces. It is of a sensor where the readings of one sensor alone contradict the
-others, where its error follows the contraction as that of a sensor does, or where an error of a
-sensor would explain more than any other effect.
+the balance of forces.
+
+A gap is of a sensor in three cases. Its readings alone contradict those of the others. Or the
+error of the contraction follows the motion as that of a sensor does. Or an error of a sensor
+would explain more than any other effect.
 """
 
 from collections.abc import Callable, Mapping, Sequence

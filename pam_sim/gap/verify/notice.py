@@ -15,9 +15,9 @@
 """
 Whether a subsystem leaves a gap that its noise cannot make, however its free run drifts.
 
-Means of the errors, over half a second and over 20 ms, are compared with those that noise, stamps
-and the drift of sensors make in the same run. What the numbers of the model may do is taken out
-before.
+Errors are averaged over half a second and over 20 ms. These means are compared with those that
+noise, stamps and the drift of sensors make in the same run. What the numbers of the model may do
+is taken out before.
 
 A muscle behind on/off valves integrates the errors of its flow. Errors of stamps alone take its
 free run far away, and a gap of the flow hides in that. Its errors count against their own mean
