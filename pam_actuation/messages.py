@@ -193,6 +193,15 @@ LEVEL_OK, LEVEL_WARN, LEVEL_ERROR, LEVEL_STALE = 0, 1, 2, 3      # of a status
 
 
 @dataclass(frozen=True, slots=True)
+class Marker:
+    """A short text that a person set at an instant: topic marker. ``source``: who sent it."""
+
+    stamp_ns: int
+    text: str
+    source: str = ''
+
+
+@dataclass(frozen=True, slots=True)
 class Status:
     """
     One diagnostic status: topic /diagnostics.

@@ -34,6 +34,7 @@ from pam_actuation.bags.facts import recorded_rig_title
 from pam_actuation.bags.info_text import render_text
 from pam_actuation.bags.load import is_rig_topic, namespaces
 from pam_actuation.bags.losses import count_of, missing_messages, PublishedCounts
+from pam_actuation.bags.markers import markers_of
 from pam_actuation.bags.recorder import RECORDING_RECORD
 from pam_actuation.bags.recover import RECOVERY_RECORD
 from pam_actuation.bags.source import Bag, read_bag, TopicData
@@ -86,8 +87,10 @@ class BagInfo:
     Everything ``pam info`` shows.
 
     ``remarks`` are sentences on what is odd or implausible, empty for a good bag; ``notes`` are
-    harmless ones. ``complete`` is False when messages are known to be missing or the run stopped
-    early. It is True when every topic of the rig has been checked, and None if that is not known.
+    harmless ones. ``markers``: ``time_s`` from the begin of the bag, ``text`` and ``namespace`` of
+    what a person set. ``complete`` is False when messages are known to be missing or the run
+    stopped early. It is True when every topic of the rig has been checked, and None if that is
+    not known.
     """
 
     path: str
@@ -102,6 +105,7 @@ class BagInfo:
     remarks: list[str]
     notes: list[str]
     recovered: bool = False
+    markers: list[dict[str, Any]] = field(default_factory=list)
 
     @property
     def lost(self) -> int:
@@ -212,7 +216,9 @@ def bag_info(path: StrPath, recover: bool = False) -> BagInfo:
         path=str(path), storage=bag.storage, size_bytes=_size(Path(path)), start_ns=start_ns,
         duration_s=(end_ns - start_ns) * 1e-9, message_count=sum(bag.counts.values()),
         namespaces=sorted(muscles), topics=topics, metadata=bag.experiment, remarks=remarks,
-        notes=notes, recovered=bag.recovered or bool(recovery))
+        notes=notes, recovered=bag.recovered or bool(recovery),
+        markers=[{'time_s': (one.stamp_ns - start_ns) * 1e-9, 'text': one.text,
+                  'namespace': place} for place, one in markers_of(bag)])
 
 
 def _size(path: Path) -> int:

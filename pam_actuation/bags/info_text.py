@@ -45,6 +45,9 @@ def render_text(info: 'BagInfo') -> str:
     ranges = [line for topic in info.topics for line in _range_lines(topic)]
     if ranges:
         lines += ['', *ranges]
+    if info.markers:
+        lines += ['', *(f'{one["time_s"]:.2f} s, marker in {one["namespace"] or "/"}: '
+                        f'{one["text"]}' for one in info.markers)]
     lines += ['', _verdict(info)]
     lines += [f'- {remark}' for remark in info.remarks]
     lines += [f'Note: {note}' for note in info.notes]

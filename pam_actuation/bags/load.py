@@ -26,9 +26,10 @@ from functools import cache, cached_property
 import numpy as np
 
 from pam_actuation.bags import renamed, series
+from pam_actuation.bags.markers import is_marker, markers_of
 from pam_actuation.bags.plausibility import Implausible, recorded_length_m, topic_findings
 from pam_actuation.bags.source import Bag, read_bag, TopicData
-from pam_actuation.messages import ReferenceTrajectory, VALVE_NAMES, valve_of
+from pam_actuation.messages import Marker, ReferenceTrajectory, VALVE_NAMES, valve_of
 from pam_actuation.topics.codec import decode
 from pam_actuation.topics.table import BY_NAME, KEPT, OF_A_RUN, RECORDED, short_name, TOLD
 from pam_sim.annotations import BoolArray, FloatArray, IntArray
@@ -53,11 +54,14 @@ class RecordedRun(Run):
         All messages of ``reference_trajectory``, by stamp.
     remarks : tuple of str
         Sentences on anything odd in the bag.
+    markers : tuple of Marker
+        What a person set meanwhile, by stamp.
 
     """
 
     reference_trajectories: tuple[ReferenceTrajectory, ...] = ()
     remarks: tuple[str, ...] = ()
+    markers: tuple[Marker, ...] = ()
 
     @property
     def valve(self) -> str:
@@ -117,7 +121,8 @@ def load_run(path: StrPath, namespace: str | None = None, recover: bool = False,
     """
     named = renamed.checked(topics)
     bag = read_bag(path, recover=recover, wanted=lambda name, type_name, encoding: (
-        name in named.values() or is_read(name, type_name, encoding)))
+        name in named.values() or is_read(name, type_name, encoding)
+        or is_marker(name, type_name, encoding)))
     return run_of(bag, path, namespace, named)
 
 
@@ -148,7 +153,8 @@ def run_of(bag: Bag, path: StrPath, namespace: str | None = None,
                 series_of[short] = one
     return RecordedRun(
         topics=series_of, metadata=bag.experiment, namespace=chosen or '', path=str(path),
-        reference_trajectories=trajectories, remarks=tuple(remarks))
+        reference_trajectories=trajectories, remarks=tuple(remarks),
+        markers=tuple(marker for _, marker in markers_of(bag, chosen or '')))
 
 
 def topics_of(bag: Bag, namespace: str) -> dict[str, TopicData]:

@@ -21,6 +21,7 @@ The topics of a joint are named relative to it: ``joint_state``, ``flexor/pressu
 import os
 
 from pam_actuation.bags.load import read_series, RecordedRun, run_of
+from pam_actuation.bags.markers import is_marker, markers_of
 from pam_actuation.bags.source import Bag, read_bag, TopicData
 from pam_actuation.topics.table import BY_NAME, JOINT, MUSCLE, short_name
 from pam_sim.errors import InputError
@@ -51,7 +52,8 @@ def load_recording(path: str | os.PathLike[str], namespace: str | None = None,
         As of ``load_run``; the bag has both muscles of a joint but not its angle.
 
     """
-    bag = read_bag(path, recover=recover, wanted=_is_of_rig)
+    bag = read_bag(path, recover=recover, wanted=lambda *topic: (
+        _is_of_rig(*topic) or is_marker(*topic)))
     joints = [name.rpartition('/')[0] for name, topic in bag.topics.items()
               if short_name(name) == MEASURED and is_joint_topic(topic)]
     if namespace is not None:
@@ -70,7 +72,8 @@ def load_recording(path: str | os.PathLike[str], namespace: str | None = None,
             if len(series):
                 topics[relative] = series
     return RecordedRun(topics=topics, metadata=bag.experiment, namespace=joints[0],
-                       path=str(path), remarks=tuple(remarks))
+                       path=str(path), remarks=tuple(remarks),
+                       markers=tuple(one for _, one in markers_of(bag, joints[0])))
 
 
 def _check_no_half_joint(bag: Bag, path: str | os.PathLike[str]) -> None:

@@ -20,7 +20,7 @@ from pam_actuation.models.markdown import row
 from pam_actuation.topics import cdr
 from pam_actuation.topics.contents import NamedNumbers, Numbers, Trajectory, Value
 from pam_actuation.topics.quality import Service
-from pam_actuation.topics.table import JOINT, RECORDED, RECORDER, ROOT, Topic
+from pam_actuation.topics.table import JOINT, RECORDED, RECORDER, RIG, ROOT, Topic
 from pam_sim.units import allowed_range, unit_of
 
 INDEX = 'README.md'
@@ -83,7 +83,8 @@ reliability at start.
 def page(topic: Topic) -> str:
     """Return the page of a topic, all of it from its row in the table."""
     full = topic.full_name(NAMESPACE)
-    place = {ROOT: 'one for all', JOINT: 'one namespace per joint'}.get(
+    place = {ROOT: 'one for all', JOINT: 'one namespace per joint',
+             RIG: 'in that of a joint, or of a muscle alone'}.get(
         topic.place, 'one namespace per muscle')
     consumers = (*topic.consumed_by, *([RECORDER] if topic.name in RECORDED else []))
     rate = '100 Hz or more' if topic.steady else 'any'

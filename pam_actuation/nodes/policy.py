@@ -18,7 +18,8 @@ The access policy of some nodes, for the security tools of ROS 2 (SROS2, policy 
 Least rights: each node may publish, subscribe and serve what it does with exactly its
 parameters, and nothing else. One enclave per node, named after it; one more for an operator,
 who reads the diagnostics and calls the services the nodes offer, the emergency stop first of all.
-Another one is for the live page (``pam view``): it reads what it draws, and may stop and reset.
+Another one is for the live page (``pam view``): it reads what it draws, sets markers, and may
+stop and reset.
 """
 
 from collections.abc import Iterable
@@ -27,7 +28,7 @@ import xml.etree.ElementTree as ElementTree
 from pam_actuation.nodes.interfaces import Inspector, OF_EVERY_NODE
 from pam_actuation.rigging.client import NAME
 from pam_actuation.rigging.node_spec import NodeSpec
-from pam_actuation.topics.table import short_name
+from pam_actuation.topics.table import MARKER, short_name
 from pam_actuation.view.plots import KEPT
 from pam_actuation.view.requests import ACTIONS
 
@@ -84,7 +85,11 @@ def policy(nodes: Iterable[NodeSpec]) -> str:
     _allow(operator, 'topic', 'subscribe', ('/diagnostics',))
     _allow(operator, 'service', 'request', offered)
     page = _profile(enclaves, '/', PAGE)
-    _allow(page, 'topic', 'subscribe', ('/diagnostics', *drawn))
+    places = {node.namespace for node in nodes}
+    marked = [f'{place}/{MARKER}' for place in sorted(places)
+              if not any(place.startswith(f'{other}/') for other in places)]
+    _allow(page, 'topic', 'publish', marked)
+    _allow(page, 'topic', 'subscribe', ('/diagnostics', *drawn, *marked))
     _allow(page, 'service', 'request', [
         one for one in offered if short_name(one) in ACTIONS])
     ElementTree.indent(root)

@@ -23,11 +23,12 @@ from pam_actuation.bags.series import table
 from pam_actuation.nodes.endpoints import PolledSubscription
 from pam_actuation.nodes.onlooker import DIAGNOSTICS, Onlooker
 from pam_actuation.nodes.operator import is_below, serving
+from pam_actuation.nodes.view_marking import Marking
 from pam_actuation.nodes.view_player import experiments, PLAYER, Playing, RECORDER
 from pam_actuation.topics.codec import Reader
-from pam_actuation.topics.table import short_name
+from pam_actuation.topics.table import MARKER, short_name
 from pam_actuation.view.plots import KEPT
-from pam_actuation.view.requests import ACTIONS, EMERGENCY_STOP, PLAY, Request
+from pam_actuation.view.requests import ACTIONS, EMERGENCY_STOP, MARK, PLAY, Request
 from pam_actuation.view.source import Answer
 from pam_actuation.view.store import Store
 from std_srvs.srv import Trigger
@@ -53,7 +54,8 @@ class ViewListener(Onlooker):
         super().__init__(domain_id, namespace)
         self.title = namespace
         self.store = Store()
-        self._read = Reader(short_name(DIAGNOSTICS))
+        self._read, self._read_marker = Reader(short_name(DIAGNOSTICS)), Reader(MARKER)
+        self._marking = Marking(self._node, self.store)
         self._clients: dict[str, dict[str, Any]] = {}       # driver: action: client
         self._players: list[str] = []
         self._asked: queue.SimpleQueue[tuple[Request, Answer]] = queue.SimpleQueue()
@@ -91,6 +93,9 @@ class ViewListener(Onlooker):
 
     def _begin(self, request: Request, answer: Answer) -> None:
         """Ask those whom a request is for."""
+        if request.do == MARK:
+            answer(self._marking.mark(request.view, request.text))
+            return
         if request.do in ACTIONS:
             self._waiting.append(_Question(self._clients, request.do, answer))
             return
@@ -104,7 +109,8 @@ class ViewListener(Onlooker):
 
     def _look(self) -> None:
         """Find topics and drivers that came, forget drivers that went."""
-        self.find_topics(KEPT)
+        self.find_topics((*KEPT, MARKER))
+        self._marking.look()
         self._players = sorted(self._found_players())
         found = set(serving(self._node, self._namespace, EMERGENCY_STOP))
         for driver in self._clients.keys() - found:
@@ -137,6 +143,9 @@ class ViewListener(Onlooker):
                     if not self._namespace or is_below(status.name, self._namespace))
             return
         namespace, _, short = full_name.rpartition('/')
+        if short == MARKER:
+            self.store.add_markers(namespace, filter(None, map(self._read_marker, raws)))
+            return
         stamps_ns, values, bad = table(short, raws, KEPT[short])
         if bad.any():
             stamps_ns = stamps_ns[~bad]

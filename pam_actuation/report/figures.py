@@ -22,6 +22,7 @@ tell apart.
 """
 
 from collections.abc import Iterable, Sequence
+import html
 import math
 from typing import Any
 
@@ -168,6 +169,32 @@ def stack(
             data.append(dict(trace, xaxis='x' + suffix, yaxis='y' + suffix, legend=legend,
                              showlegend=len(traces) > 1))
     return {'data': data, 'layout': layout}
+
+
+def with_markers(figure: dict[str, Any], markers: Sequence[tuple[float, str]]) -> dict[str, Any]:
+    """
+    Return a figure of :func:`stack` with a vertical line and a text at each marker.
+
+    Parameters
+    ----------
+    figure : dict
+        Changed in place.
+    markers : list of (time_s, text)
+        On the x axis of the stack.
+
+    """
+    if not markers:
+        return figure
+    layout = figure['layout']
+    layout['shapes'] = [
+        {'type': 'line', 'xref': 'x', 'yref': 'paper', 'x0': round(time_s, 4),
+         'x1': round(time_s, 4), 'y0': 0, 'y1': 1,
+         'line': {'color': '@residual', 'width': 1, 'dash': 'dot'}} for time_s, _ in markers]
+    layout['annotations'] = [*layout.get('annotations', []), *(
+        {'text': html.escape(text), 'x': round(time_s, 4), 'xref': 'x', 'xanchor': 'left',
+         'y': 1.0, 'yref': 'paper', 'yanchor': 'top', 'showarrow': False, 'font': {'size': 11}}
+        for time_s, text in markers)]
+    return figure
 
 
 def bars(categories: Iterable[object],

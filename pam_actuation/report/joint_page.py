@@ -23,6 +23,7 @@ import numpy as np
 from pam_actuation.report import figures, metrics, signals
 from pam_actuation.report.page import plot, render, Section, table
 from pam_actuation.report.pages import default_titles, early_section
+from pam_actuation.report.sections.markers import markers_sections
 from pam_actuation.report.sections.metrics_table import interrupted_text, value_at
 from pam_actuation.report.sections.provenance import provenance
 from pam_actuation.report.sections.timing import timing
@@ -132,6 +133,7 @@ def joint_report(runs: Sequence[Run], out_path: str | os.PathLike[str],
     for k, (title, run) in enumerate(zip(titles, runs)):
         heading = 'Signals over time' + (f': {title}' if len(runs) > 1 else '')
         sections.append(_plots(run, f'signals-{k}', heading))
+    sections += markers_sections(list(zip(titles, runs)))
     sections += [timing(list(zip(titles, runs, found))), provenance(list(zip(titles, runs)))]
     name = runs[0].metadata.get('experiment_name') or 'Recording'
     write_text(out_path, render(
@@ -195,7 +197,9 @@ def _plots(run: Run, key: str, title: str) -> Section:
                 ('ppr_voltage', None), ('fill_duty', None), ('vent_duty', 'dot')))))]
     shown = [(label, traces) for label, traces in rows if traces]
     return Section(key, title, plot(
-        figures.stack(shown, 'time since the start of the experiment [s]'),
+        figures.with_markers(
+            figures.stack(shown, 'time since the start of the experiment [s]'),
+            signals.markers(run)),
         'Drag to zoom, all rows follow; double click to go back.'))
 
 

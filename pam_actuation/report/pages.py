@@ -23,6 +23,7 @@ from pam_actuation.report.metrics import run_metrics, RunMetrics
 from pam_actuation.report.page import paragraph, render, Section, signed, table
 from pam_actuation.report.sections.cycles import cycles
 from pam_actuation.report.sections.gap import gap_section
+from pam_actuation.report.sections.markers import markers_sections
 from pam_actuation.report.sections.metrics_table import metrics
 from pam_actuation.report.sections.overlaid import overlaid
 from pam_actuation.report.sections.provenance import provenance
@@ -127,6 +128,7 @@ def experiment_report(runs: 'Sequence[Run]', out_path: StrPath,
         sections.append(overlays(overlay))
     if replays:
         sections.append(controller_replays(replays))
+    sections += markers_sections(list(zip(titles, runs)))
     sections.append(timing(list(zip(titles, runs, measured))))
     if gap is not None:
         sections.append(gap_section(gap))

@@ -41,6 +41,12 @@ def start_ns(run: 'Run') -> int:
     return min(first) if first else 0
 
 
+def markers(run: 'Run') -> list[tuple[float, str]]:
+    """Return (time [s since the experiment's start], text) of the markers of a recorded run."""
+    begin_ns = start_ns(run)
+    return [((one.stamp_ns - begin_ns) * 1e-9, one.text) for one in getattr(run, 'markers', ())]
+
+
 def duration_s(run: 'Run') -> float:
     """Return the time from the first to the last stamp of all topics [s]."""
     spans = [(int(s.stamp_ns[0]), int(s.stamp_ns[-1]))

@@ -365,6 +365,29 @@ class Statuses(Content):
             for one in cdr.diagnostic_array(raw))
 
 
+@dataclass(frozen=True)
+class Text(Content):
+    """A DiagnosticArray of one status: its message is the text, its name the sender."""
+
+    message: type = messages.Marker
+    type_name: str = DIAGNOSTIC_ARRAY
+
+    def encoder(self, name: str = 'muscle', frame_id: str = '') -> Encode:
+        """Return the function that makes CDR bytes of plain messages."""
+        def encode(message: messages.Marker) -> bytes:
+            return cdr.diagnostic_bytes(message.stamp_ns, [
+                cdr.DiagnosticStatus(0, message.source, message.text, '', ())], frame_id)
+
+        return encode
+
+    def decode(self, raw: bytes) -> messages.Marker:
+        """Return the plain message; several texts are joined."""
+        found = cdr.diagnostic_array(raw)
+        return messages.Marker(
+            cdr.stamp_of(raw), '; '.join(one.message for one in found),
+            found[0].name if found else '')
+
+
 def _firsts(sequences: Sequence[Sequence[float]]) -> tuple[float, ...]:
     """Return the first number of each, NaN where there is none: a missing value is not 0."""
     return tuple([numbers[0] if numbers else math.nan for numbers in sequences])

@@ -26,13 +26,15 @@ from dataclasses import dataclass, field
 
 from pam_actuation import messages
 from pam_actuation.topics.contents import (
-    AnyJoints, Content, JOINT_STATE, NamedNumbers, Numbers, Numeric, Statuses, Trajectory, Value)
+    AnyJoints, Content, JOINT_STATE, NamedNumbers, Numbers, Numeric, Statuses, Text, Trajectory,
+    Value)
 from pam_actuation.topics.quality import Service, USUAL
 from pam_sim.errors import InputError
 from pam_sim.joint.parameters import SIDES
 
-# Where a topic lies: in the namespace of a muscle, in that of a joint, or at the root.
-MUSCLE, JOINT, ROOT = 'muscle', 'joint', 'root'
+# Where a topic lies: in the namespace of a muscle, in that of a joint, in that of the rig, which
+# is a joint or a muscle alone, or at the root.
+MUSCLE, JOINT, RIG, ROOT = 'muscle', 'joint', 'rig', 'root'
 # How much a recording of a muscle is worth without it.
 NEEDED, USED, EXTRA = 'needed', 'used', 'extra'
 # What a number means that is missing or not finite: a fault to be told; that the one before it
@@ -41,6 +43,8 @@ TOLD, KEPT, ALLOWED = 'told', 'kept', 'allowed'
 
 RECORDER = 'experiment_recorder'
 EVERY_NODE = 'every node'
+ONLOOKER = 'pam_view'           # the live page
+MARKER = 'marker'
 
 
 @dataclass(frozen=True)
@@ -58,7 +62,7 @@ class Topic:
         In a few words, for the list of topics.
     published_by, consumed_by : tuple of str
         Nodes; the recorder, which listens to all of a muscle, is left out.
-    place : {'muscle', 'joint', 'root'}
+    place : {'muscle', 'joint', 'rig', 'root'}
         Where it lies.
     held : bool
         Whether a value counts until the next one; others are measured points of a curve.
@@ -157,6 +161,8 @@ TOPICS = (
           missing=KEPT, drawn=True),
     Topic('followed_pressure', _PRESSURE, 'what the driver makes of the command', DRIVER,
           CONTROLLERS, held=True, drawn=True),
+    Topic(MARKER, Text(), 'a short text that a person set at an instant', (ONLOOKER,), (),
+          place=RIG),
     Topic('diagnostics', Statuses(), 'health of every node', (EVERY_NODE,), (), place=ROOT),
     Topic('joint_state', Numbers(JOINT_STATE, messages.JointAngle, (
         Value('angle_rad', 'position'), Value('torque_n_m', 'effort'))),
@@ -185,7 +191,7 @@ _BELOW = tuple(name for name, topic in OF_A_RUN.items() if name != 'controller_s
     {'joint_simulator', 'joint_controller', *DRIVER} & {*topic.published_by}))
 RECORDED_OF_JOINT = {
     **{topic.name: topic for topic in TOPICS if topic.place == JOINT},
-    'controller_state': BY_NAME['controller_state'], 'diagnostics': BY_NAME['diagnostics'],
+    **{name: BY_NAME[name] for name in ('controller_state', 'diagnostics', MARKER)},
     **{f'{side}/{name}': BY_NAME[name] for side in SIDES for name in _BELOW}}
 
 

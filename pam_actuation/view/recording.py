@@ -17,10 +17,11 @@
 from dataclasses import dataclass
 from functools import partial
 
+from pam_actuation.bags.markers import is_marker, markers_of
 from pam_actuation.bags.series import table
 from pam_actuation.bags.source import Bag, read_bag
 from pam_actuation.topics.codec import decode
-from pam_actuation.topics.table import BY_NAME, short_name
+from pam_actuation.topics.table import BY_NAME, MARKER, short_name
 from pam_actuation.view.plots import KEPT
 from pam_actuation.view.store import Store
 from pam_sim.errors import InputError
@@ -68,6 +69,8 @@ def load(path: StrPath, recover: bool = False, namespace: str = '') -> Recording
         if not len(topic.payloads) or not _is_shown(full_name, topic.type_name, topic.encoding):
             continue
         short = short_name(full_name)
+        if short == MARKER:
+            continue
         if short == DIAGNOSTICS:
             _add_statuses(store, bag, full_name)
             continue
@@ -78,6 +81,8 @@ def load(path: StrPath, recover: bool = False, namespace: str = '') -> Recording
         order = stamps_ns[good].argsort(kind='stable')
         store.add(full_name.rpartition('/')[0], short, stamps_ns[good][order],
                   {name: column[good][order] for name, column in values.items()})
+    for place, marker in markers_of(bag, namespace or None):
+        store.add_markers(place, [marker])
     if not store.lines(''):
         named = f' in the namespace {namespace}' if namespace else ''
         raise InputError(f'the bag has no signal of a rig{named}; its topics: '
@@ -88,8 +93,9 @@ def load(path: StrPath, recover: bool = False, namespace: str = '') -> Recording
 
 def _is_shown(name: str, type_name: str, encoding: str) -> bool:
     short = short_name(name)
-    return (encoding == 'cdr' and (short in KEPT or short == DIAGNOSTICS)
-            and BY_NAME[short].type_name == type_name)
+    return is_marker(name, type_name, encoding) or (
+        encoding == 'cdr' and (short in KEPT or short == DIAGNOSTICS)
+        and BY_NAME[short].type_name == type_name)
 
 
 def _add_statuses(store: Store, bag: Bag, full_name: str) -> None:

@@ -21,11 +21,12 @@ import math
 from pam_actuation.view.stream import WINDOWS_S
 from pam_sim.errors import InputError
 
-WATCH, EMERGENCY_STOP, RESET = 'watch', 'emergency_stop', 'reset'
+WATCH, EMERGENCY_STOP, RESET, MARK = 'watch', 'emergency_stop', 'reset', 'mark'
 ACTIONS = (EMERGENCY_STOP, RESET)       # of drivers, by the names of their services
 PLAY, HALT = 'play', 'halt'
-ALL = (WATCH, *ACTIONS, PLAY, HALT)
+ALL = (WATCH, *ACTIONS, PLAY, HALT, MARK)
 LONGEST = 4096          # bytes of a request
+LONGEST_MARKER = 80     # characters
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,8 @@ class Request:
     Parameters
     ----------
     do : str
-        ``WATCH``: show another window; one of ``ACTIONS``; ``PLAY`` or ``HALT`` an experiment.
+        ``WATCH``: show another window; one of ``ACTIONS``; ``PLAY`` or ``HALT`` an experiment;
+        set a marker: ``MARK``.
     number : int
         By which the page finds the answer.
     view : str
@@ -47,6 +49,8 @@ class Request:
         Of a bag: end of the window, from the begin of the bag on [s].
     experiment : str
         What is to be played.
+    text : str
+        Of a marker.
 
     """
 
@@ -56,6 +60,7 @@ class Request:
     window_s: float = 10.0
     end_s: float | None = None
     experiment: str = ''
+    text: str = ''
 
 
 def parse(text: str | bytes) -> Request:
@@ -89,6 +94,8 @@ def parse(text: str | bytes) -> Request:
         if not isinstance(experiment, str) or (do == PLAY) != bool(experiment):
             raise InputError('experiment is needed to play, and only there', 'request')
         return Request(do, number, view, experiment=experiment)
+    if do == MARK:
+        return Request(do, number, view, text=_marker_text(found.get('text')))
     window_s, end_s = found.get('window_s', 10), found.get('end_s')
     if window_s not in WINDOWS_S:
         raise InputError(
@@ -97,3 +104,12 @@ def parse(text: str | bytes) -> Request:
             isinstance(end_s, (int, float)) and math.isfinite(end_s) and abs(end_s) < 1e9):
         raise InputError(f'end_s is {end_s!r}; allowed is a time in s', 'request')
     return Request(do, number, view, float(window_s), None if end_s is None else float(end_s))
+
+
+def _marker_text(given: object) -> str:
+    """Return the text of a marker without spaces around it; InputError."""
+    text = given.strip() if isinstance(given, str) else ''
+    if not (0 < len(text) <= LONGEST_MARKER and text.isprintable()):
+        raise InputError(f'text is {given!r}; a marker has 1 to {LONGEST_MARKER} characters on '
+                         'one line', 'request')
+    return text

@@ -20,13 +20,14 @@ import threading
 from typing import Any, Final
 
 import numpy as np
-from pam_actuation.messages import Status
+from pam_actuation.messages import Marker, Status
 from pam_actuation.view.history import History
 from pam_actuation.view.plots import DERIVED, Difference, DIFFERENCES, KEPT, Signal, SIGNALS
 from pam_sim.annotations import FloatArray, IntArray
 
 SPAN_NS: Final = 60_000_000_000         # of what is kept of a live rig
 RATE_NS: Final = 1_000_000_000          # over which a rate is counted
+MOST_MARKERS: Final = 100               # of a live rig
 STALE, SILENT_AFTER_NS = 3, 2_000_000_000     # nodes speak twice a second
 Key = tuple[str, str]                   # namespace and short name of a topic
 
@@ -54,6 +55,8 @@ class Store:
         Topics by short name, and what is derived of them as ``plots.DERIVED``.
     lost : dict of (namespace, topic) to int
         Messages that were sent and did not arrive here.
+    markers : list of (namespace, Marker)
+        In order of arrival.
 
     """
 
@@ -62,6 +65,7 @@ class Store:
         self.histories: dict[Key, History] = {}
         self.lost: dict[Key, int] = {}
         self._span_ns = span_ns
+        self.markers: list[tuple[str, Marker]] = []
         self._statuses: dict[str, list[Status]] = {}
         self._differences: dict[tuple[str, str], int] = {}      # rows that are dealt with
         self._drawn: dict[Key, set[str]] = {}                   # values that were ever finite
@@ -139,6 +143,15 @@ class Store:
                     known.clear()
                 known.append(status)
 
+    def add_markers(self, namespace: str, markers: Iterable[Marker]) -> None:
+        """Take markers of a rig, each once, however often it comes; of a live rig the recent."""
+        with self.lock:
+            for marker in markers:
+                if (namespace, marker) not in self.markers:
+                    self.markers.append((namespace, marker))
+            if self._span_ns is not None:
+                del self.markers[:-MOST_MARKERS]
+
     def now_ns(self) -> int | None:
         """
         Return the time of the newest messages [ns], None before the first.
@@ -192,7 +205,8 @@ class Store:
         -------
         dict
             ``nodes``: name, level, message and values of each node; ``topics``: name, rate [Hz],
-            lost (None: not counted) and late messages of each topic.
+            lost (None: not counted) and late messages of each topic; ``markers``: namespace,
+            time [s] and text of each.
 
         """
         with self.lock:
@@ -203,8 +217,10 @@ class Store:
                 if not topic.startswith(DERIVED)]
             found = [_at(statuses, now_ns if self._span_ns is None else None)
                      for _, statuses in sorted(self._statuses.items())]
+            markers = [{'namespace': namespace, 'time_s': one.stamp_ns * 1e-9, 'text': one.text}
+                       for namespace, one in self.markers]
         return {'nodes': [_node(status, now_ns) for status in found if status is not None],
-                'topics': topics}
+                'topics': topics, 'markers': markers}
 
     @staticmethod
     def _rate(history: History, now_ns: int | None) -> float:

@@ -64,6 +64,7 @@ def messages_of_a_rig(i, valve):
         'external_force': messages.Force(stamp_ns, -0.5),
         'controller_state': messages.ControllerState(
             stamp_ns, ('tick', 'error_m', 'learning'), (float(i), 1e-4, 1.0)),
+        'marker': messages.Marker(stamp_ns, f'mark {i}', '/pam_view_1'),
         'diagnostics': (
             messages.Status(
                 stamp_ns, 0, '/muscle/valve_driver', 'tracking',

@@ -105,6 +105,9 @@ SAMPLES = [
     ('joint_effort', messages.NamedEfforts(STAMP_NS, ('hip', 'knee'), (1.5, -20.0)),
      joint(('hip', 'knee'), effort=(1.5, -20.0))),
     ('joint_effort', messages.NamedEfforts(STAMP_NS, (), (1.5,)), joint((), effort=(1.5,))),
+    ('marker', messages.Marker(STAMP_NS, 'à 6 bar', '/pam_view_1'),
+     DiagnosticArray(status=[DiagnosticStatus(
+         level=b'\0', name='/pam_view_1', message='à 6 bar')])),
 ]
 ONE_OF_EACH = {topic: plain for topic, plain, _ in reversed(SAMPLES)}
 

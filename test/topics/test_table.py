@@ -52,7 +52,7 @@ def test_messages_of_numbers_are_those_of_ros(type_name):
 def test_names_are_unique_and_words_are_known():
     assert len(BY_NAME) == len(TOPICS)
     for topic in TOPICS:
-        assert topic.place in ('muscle', 'joint', 'root') and topic.meaning
+        assert topic.place in ('muscle', 'joint', 'rig', 'root') and topic.meaning
         assert topic.need in ('needed', 'used', 'extra')
         # Told without the type store, which takes long to read.
         assert typestore().fielddefs[topic.type_name][1][0][0] == 'header'

@@ -79,6 +79,11 @@ class MadeRig:
     def act(self, request, answer):
         self.asked.append(request.do)
         ok = not self.silent
+        if request.do == 'mark':
+            self.store.add_markers('/muscle', [
+                messages.Marker(self.store.now_ns(), request.text)])
+            answer([{'node': '/muscle', 'ok': True, 'message': 'recorded'}])
+            return
         if request.do in ('play', 'halt'):
             answer([{'node': PLAYER, 'ok': ok, 'message': f'plays {request.experiment}'}])
             return

@@ -110,6 +110,25 @@ def test_an_experiment_is_started_by_two_presses_and_ended_by_one(browser, serve
     assert rig.asked == ['play', 'halt']
 
 
+def test_a_marker_is_set_listed_and_drawn(browser, server, rig):
+    browser.go_to(server.url)
+    browser.wait_for(READY)
+    browser.run("""(() => { document.querySelector('#marker').value = ' supply <on> ';
+        document.querySelector('#marking').requestSubmit(); })()""")
+    browser.wait_for("document.querySelector('#banner').className === 'good'")
+    assert browser.text('#banner') == 'Marker "supply <on>" confirmed. /muscle: recorded'
+    browser.wait_for('page.markers.length === 1')
+    assert browser.text('#markers li').endswith('supply <on>') and rig.asked == ['mark']
+    browser.wait_for(
+        'page.markers[0].time_s < page.time.now_s && page.markers[0].time_s > page.time.now_s - 9')
+    assert browser.run("""(() => { const canvas = document.querySelector('canvas');
+        page.charts[0].draw({...page.time, cursor: null, markers: []}, () => '#000');
+        const without = canvas.toDataURL();
+        page.charts[0].draw({...page.time, cursor: null, markers: page.markers}, () => '#000');
+        return without !== canvas.toDataURL(); })()""")
+    assert browser.text('#marker') == ''
+
+
 def test_it_comes_back_after_the_server_died(browser, rig):
     first = ViewServer(rig, port=0)
     first.start()

@@ -29,7 +29,7 @@ from pam_actuation.nodes.view_listener import ViewListener  # noqa: E402
 from pam_actuation.rigging.client import local_context  # noqa: E402
 from pam_actuation.rigging.domain import DomainLock  # noqa: E402
 from pam_actuation.rigging.view_process import page_beside  # noqa: E402
-from pam_actuation.topics.codec import encode  # noqa: E402
+from pam_actuation.topics.codec import decode, encode  # noqa: E402
 from pam_actuation.view.requests import Request  # noqa: E402
 import rclpy  # noqa: E402
 from rclpy.executors import SingleThreadedExecutor  # noqa: E402
@@ -117,6 +117,47 @@ def test_signals_states_and_the_emergency_stop_of_a_driver(domain, driver):
         assert answers[0][0]['ok'] is False and 'no answer' in answers[0][0]['message']
     finally:
         listener.close()
+
+
+def test_a_marker_reaches_the_recorder_and_every_page(domain, driver):
+    node, executor, _ = driver
+    listener, other = ViewListener(domain), ViewListener(domain)
+    recorder = Node('experiment_recorder', namespace='/muscle', context=node.context)
+    try:
+        pressure = node.create_publisher(class_of('pressure'), 'pressure', qos.PUBLISHER)
+        recorded, stamps = [], []
+        recorder.create_subscription(class_of('marker'), 'marker', recorded.append, 10, raw=True)
+        executor.add_node(recorder)
+
+        def send():
+            stamps.append(time.time_ns())
+            pressure.publish(encode('pressure', messages.Pressure(stamps[-1], 3.0e5)))
+            other.run_once()
+
+        answers = []
+
+        def ready():
+            return node.count_subscribers('/muscle/marker') == 3 and (
+                other.store.namespaces() and listener.store.namespaces())
+
+        until(listener, executor, ready, send)
+        listener.act(Request('mark', view='/muscle', text='valve open'), answers.append)
+        until(listener, executor, lambda: recorded and other.store.markers, send)
+        assert answers[0] == [{'node': '/muscle', 'ok': True, 'message': 'recorded'}]
+        marker = decode('marker', recorded[0])
+        assert marker.text == 'valve open' and marker.stamp_ns in stamps     # time of the rig
+        assert '/pam_view_' in marker.source
+        for store in (listener.store, other.store):     # once, though its own comes back too
+            assert store.markers == [('/muscle', marker)]
+        answers.clear()
+        listener.act(Request('mark', view='/elsewhere', text='x'), answers.append)
+        until(listener, executor, lambda: answers, send)
+        assert answers[0] == [] and len(recorded) == 1
+    finally:
+        executor.remove_node(recorder)
+        recorder.destroy_node()
+        listener.close()
+        other.close()
 
 
 def test_publishers_keep_nothing_for_it(domain, driver):

@@ -117,7 +117,9 @@ def test_emergency_stop_and_reset_reach_the_driver_and_are_answered(server, rig)
     ('{"do": "play"}', 'experiment is needed'), ('{"do": "play", "view": 1}', 'view is not'),
     ('{"do": "halt", "experiment": "x"}', 'only there'),
     ('{"do": "watch", "end_s": 1e400}', 'end_s is inf'),
-    ('{"do": "reset", "number": -1}', 'number is not')])
+    ('{"do": "reset", "number": -1}', 'number is not'), ('{"do": "mark"}', 'text is None'),
+    ('{"do": "mark", "text": " "}', '1 to 80 characters'),
+    ('{"do": "mark", "text": "a\\nb"}', 'on one line')])
 def test_other_requests_are_refused_in_one_sentence(request_text, why):
     with pytest.raises(InputError, match=why):
         parse(request_text)

@@ -40,7 +40,8 @@ def time_plots(run: 'Run', key: str = 'signals', title: str = 'Signals over time
         _force(run, max_points), _valve(run, max_points)) if row]
     if not rows:
         return Section(key, title, '<p>This recording holds no signal of the rig.</p>')
-    figure = figures.stack(rows, 'time since the start of the experiment [s]')
+    figure = figures.with_markers(
+        figures.stack(rows, 'time since the start of the experiment [s]'), signals.markers(run))
     return Section(key, title, plot(
         figure, 'Drag to zoom, all rows follow; double click to go back.'))
 

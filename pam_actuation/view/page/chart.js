@@ -95,6 +95,7 @@ class Chart {
     pen.lineWidth = 1.4; pen.lineJoin = 'round';
     const gap = Math.max(Math.ceil(GAP_S / time.width_s), 2);
     for (const line of this.lines) this.trace(pen, line, begin, end, gap, x, y, style);
+    this.markers(pen, time, end, x, high, style);
     if (time.cursor !== null) {
       const at = LEFT + time.cursor * (wide - LEFT - RIGHT);
       pen.strokeStyle = style('--soft'); pen.lineWidth = 1;
@@ -106,6 +107,21 @@ class Chart {
       const text = shown(line.trace.at(column, gap), step / 100);
       if (line.value.textContent !== text) line.value.textContent = text;
     }
+  }
+
+  markers(pen, time, end, x, high, style) {
+    pen.font = '11px system-ui, sans-serif';
+    pen.textAlign = 'left'; pen.textBaseline = 'top';
+    pen.strokeStyle = pen.fillStyle = style('--warn'); pen.lineWidth = 1;
+    pen.setLineDash([4, 3]);
+    for (const one of time.markers || []) {
+      const column = end - (time.now_s - one.time_s) / time.width_s;
+      if (column < end - time.count || column > end) continue;
+      const at = Math.round(x(column)) + 0.5;
+      pen.beginPath(); pen.moveTo(at, TOP); pen.lineTo(at, high - BOTTOM); pen.stroke();
+      pen.fillText(one.text, at + 3, TOP);
+    }
+    pen.setLineDash([]);
   }
 
   // Set the range of values to whole steps; return the step.

@@ -9,7 +9,7 @@ const page = {
   socket: null, live: true, wait_ms: 250, number: 0, asked: new Map(), hello: null,
   charts: [], traces: [], time: null, layout: null, cursor: null, held: false, dirty: true,
   views: '', frames: 0, drawn: 0, end_s: null, playing: false, pending: false, drivers: [], players: [],
-  surfaces: [], surfaceTitles: '',
+  surfaces: [], surfaceTitles: '', markers: [],
 };
 
 // ---- connection ----
@@ -52,6 +52,8 @@ function buttons() {
   $('stop').disabled = $('reset').disabled = !open || !page.drivers.length;
   $('play_row').hidden = !page.players.length;
   $('begin').disabled = $('halt').disabled = !open;
+  $('marking').hidden = !page.live;
+  $('mark').disabled = !open;
   $('stop').title = open && !page.drivers.length ? 'No valve driver is running.'
     : 'Every valve driver vents its muscle and stays so until reset.';
 }
@@ -163,7 +165,31 @@ function state(content) {
   $('nodes').replaceChildren(...content.nodes.map(nodeItem));
   if (!content.nodes.length) $('nodes').textContent = 'No node has said anything yet.';
   $('topics').replaceChildren(...content.topics.map(topicRow));
+  setMarkers(content.markers);
   if (page.live && !content.namespaces.length && !page.charts.length) nothing();
+}
+
+// ---- markers ----
+
+function setMarkers(markers) {
+  const view = $('view').value;
+  page.markers = markers.filter((one) => !view || `${one.namespace}/`.startsWith(`${view}/`)
+    || `${view}/`.startsWith(`${one.namespace}/`));
+  const texts = page.markers.map((one) => `${markerTime(one)}  ${one.text}`);
+  if (texts.join('\n') === page.markerTexts) return;
+  page.markerTexts = texts.join('\n');
+  $('marked').hidden = !texts.length;
+  $('markers').replaceChildren(...texts.reverse().map((text) => {
+    const item = document.createElement('li');
+    item.textContent = text;
+    return item;
+  }));
+  page.dirty = true;
+}
+
+function markerTime(marker) {
+  return page.live ? new Date(marker.time_s * 1000).toLocaleTimeString()
+    : `${(marker.time_s - page.hello.begin_s).toFixed(2)} s`;
 }
 
 function nodeItem(node) {
@@ -211,7 +237,9 @@ function rules(content) {
 // ---- emergency stop and reset ----
 
 function ask(action, words, more = {}) {
-  const number = ++page.number, asked = more.view === undefined ? page.drivers : page.players;
+  const number = ++page.number;
+  const asked = action === 'mark' ? [$('view').value || 'all rigs']
+    : more.view === undefined ? page.drivers : page.players;
   if (!send({do: action, number, ...more})) {
     banner('bad', `${words} was NOT sent: no connection.`);
     return;
@@ -265,6 +293,12 @@ function twice(id, words, action) {
 twice('reset', 'Press again to reset', () => ask('reset', 'Reset'));
 twice('begin', 'Press again to start', () => ask('play', `Start of ${$('experiment').value}`, {
   view: $('view').value, experiment: $('experiment').value}));
+$('marking').onsubmit = (event) => {
+  event.preventDefault();
+  ask('mark', `Marker "${$('marker').value.trim()}"`, {
+    view: $('view').value, text: $('marker').value});
+  $('marker').value = '';
+};
 $('halt').onclick = () => ask('halt', 'End of the experiment', {view: $('view').value});
 
 // ---- settings ----
@@ -338,7 +372,7 @@ function draw() {
   page.frames++; page.drawn++;
   const styles = getComputedStyle(document.documentElement), known = {};
   const style = (name) => known[name] ??= styles.getPropertyValue(name).trim();
-  const time = {...page.time, cursor: page.cursor};
+  const time = {...page.time, cursor: page.cursor, markers: page.markers};
   for (const chart of page.charts) chart.draw(time, style);
   for (const one of page.surfaces) one.draw(style);
 }
