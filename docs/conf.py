@@ -16,7 +16,9 @@
 
 from collections import defaultdict
 from functools import cached_property, lru_cache
+import gc
 import importlib.util
+import logging
 from pathlib import Path
 import sys
 
@@ -30,9 +32,13 @@ sys.path[:0] = [str(ROOT), str(ROOT / 'docs')]
 
 from generate import pages                      # noqa: E402
 from generate.mathml import add_mathml          # noqa: E402
+from generate.navigation import add_quick_navigation    # noqa: E402
 from pam_actuation import __version__           # noqa: E402
 from sphinx.domains.python import PythonDomain  # noqa: E402
 from sphinx.search.en import SearchEnglish      # noqa: E402
+
+# The trees of all pages are kept: looks for garbage among them took a quarter of the time.
+gc.set_threshold(200_000, 50, 50)
 
 project = 'pam_actuation'
 author = 'pam_actuation developers'
@@ -103,9 +109,12 @@ class RememberingEnglish(SearchEnglish):
 
 def setup(app):
     """Put the pages together beside the output: docs/ holds only what is written by hand."""
+    if not app.verbosity:       # thousands of remarks that nobody reads
+        logging.getLogger('sphinx').setLevel(logging.INFO)
     target = Path(app.doctreedir).resolve() / 'source'
     pages.write_all(ROOT, Path(app.srcdir), target)
     app.srcdir = target
     add_mathml(app)
+    add_quick_navigation(app)
     app.add_domain(RememberingDomain, override=True)
     app.add_search_language(RememberingEnglish)
