@@ -31,6 +31,7 @@ SOURCES = sorted(
     if not any(part.startswith('.') or part in HIDDEN for part in path.relative_to(ROOT).parts))
 HEADER = ''.join(
     f'{line}\n' for line in (ROOT / 'setup.py').read_text(encoding='utf-8').splitlines()[:13])
+QUICK_FLAKE8 = 'test/quick_flake8.py'
 # What ament_flake8 and ament_pep257 of ROS 2 Jazzy leave out; its linters read no setup.cfg.
 FLAKE8_IGNORED = 'B902,C816,D100,D101,D102,D103,D104,D105,D106,D107,D203,D212,D404,I202'
 PEP257_IGNORED = 'D100,D101,D102,D103,D104,D105,D106,D107,D203,D212,D404'
@@ -77,12 +78,25 @@ class Two:
 def seven():
     """"""
 '''
+BAD_SOURCE = """import sys, os
+from json import *
+from abc import ABC
 
 
-def checked(module, *arguments):
+class Two():
+    x = "double"
+    def id(self, list = [] ):
+        l = dict([(a, 1) for a in list])    # noqa: E741
+        m = "double"    # noqa
+        return f"{l}{m}", lambda: undefined
+    def assertEquals(self): self.assertEquals(1, 2); return list([_ for _ in ABC])
+"""
+
+
+def checked(*command):
     """Run a linter on everything it would look at in this repository; fail with what it says."""
     done = subprocess.run(
-        [sys.executable, '-m', module, *arguments], cwd=ROOT, capture_output=True, text=True)
+        [sys.executable, *command], cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout[-5000:] + done.stderr[-5000:]
 
 
@@ -94,7 +108,7 @@ def test_linters_find_nothing():
     The plug-in for docstrings is pydocstyle, with the convention ``all`` every rule of it.
     """
     pytest.importorskip('flake8')
-    checked('flake8', '--config', 'setup.cfg', '--docstring-convention', 'all',
+    checked(QUICK_FLAKE8, '--config', 'setup.cfg', '--docstring-convention', 'all',
             *map(str, SOURCES))
 
 
@@ -111,6 +125,20 @@ def test_flake8_says_of_a_docstring_what_pydocstyle_says(tmp_path):
              str(file)], cwd=ROOT, capture_output=True, text=True)
         found.append(sorted(re.findall(r'\bD\d{3}\b', done.stdout)))
     assert found[0] == found[1] and len(set(found[0])) > 10
+
+
+def test_quick_flake8_says_what_flake8_says(tmp_path):
+    pytest.importorskip('flake8')
+    files = [tmp_path / name for name in ('one.py', 'two.py', 'three.py')]
+    for file, text in zip(files, (BAD_SOURCE, BAD_DOCSTRINGS, f'{BAD_SOURCE}def three(:\n')):
+        file.write_text(text, encoding='utf-8')
+    said = [subprocess.run(
+        [sys.executable, *linter, '-j1', '--config', str(ROOT / 'setup.cfg'),
+         '--docstring-convention', 'all', *map(str, files)], cwd=ROOT, capture_output=True,
+        text=True).stdout for linter in (('-m', 'flake8'), (QUICK_FLAKE8,))]
+    assert said[0] == said[1]
+    codes = set(re.findall(r': ([A-Z]\d{3}) ', said[0]))
+    assert {code[0] for code in codes} >= set('ACDEFQ') and len(codes) > 25
 
 
 def test_setup_cfg_holds_the_rules_of_the_ament_linters():
@@ -138,7 +166,7 @@ def test_the_plug_ins_of_ament_flake8_are_installed():
 def test_the_linters_of_ros_2_find_nothing(linter):
     """Where they are installed, which is on a machine with ROS 2."""
     pytest.importorskip(linter)
-    checked(f'{linter}.main')
+    checked('-m', f'{linter}.main')
 
 
 def test_every_source_begins_with_the_licence_header():
