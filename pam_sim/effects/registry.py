@@ -28,7 +28,7 @@ _NOT_EFFECTS = ('effect', 'fitting', 'registry')
 # What several effects call.
 _SHARED = ('air_volume', 'lag', 'loop_level', 'presliding', 'progressive')
 _UNNAMED_FOLDER = _OWN_FOLDER / 'unnamed'
-_NOT_TERMS = ('terms',)
+_NOT_TERMS = ('reading', 'terms')
 
 
 def effect_files() -> list[Path]:
