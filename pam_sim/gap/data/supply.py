@@ -23,6 +23,7 @@ from collections.abc import Iterable
 
 import numpy as np
 from pam_sim.gap.criteria import Criteria
+from pam_sim.gap.data.means import means_of
 from pam_sim.gap.data.noise import noise_of
 from pam_sim.gap.data.recording import Recording
 
@@ -44,14 +45,12 @@ def supply_scatter(recording: Recording) -> tuple[float, float, float] | None:
     if time_s.size < LEAST_MEANS:
         return None
     noise = noise_of(time_s, values)
-    place = (time_s // MEAN_S).astype(int)
-    count = np.bincount(place)
-    full = count > 0.5 * count.max()
-    if full.sum() < LEAST_MEANS or noise.sd <= 0.0:
+    means = means_of(values, time_s, MEAN_S)
+    if means.size < LEAST_MEANS or noise.sd <= 0.0:
         return None
-    means = np.bincount(place, values)[full] / count[full]
+    most = np.bincount((time_s // MEAN_S).astype(int)).max()
     return float(means.std()), noise.sd * float(np.hypot(
-        1.0 / np.sqrt(count.max()), DRIFT_SD)), noise.sd
+        1.0 / np.sqrt(most), DRIFT_SD)), noise.sd
 
 
 def supply_stands(recordings: Iterable[Recording], criteria: Criteria) -> bool:

@@ -15,10 +15,9 @@
 """Under which condition a gap lives: motion, pressure, or part of the recording."""
 
 import numpy as np
-from pam_sim.annotations import FloatArray
 from pam_sim.gap.criteria import Criteria
 from pam_sim.gap.data.recording import Recording
-from pam_sim.gap.report.location import signal_conditions
+from pam_sim.gap.report.location import signal_conditions, squares_beyond
 from pam_sim.gap.verify.own_runs import OwnRuns
 
 
@@ -39,14 +38,10 @@ def condition_of(recording: Recording, runs: OwnRuns, problem: str, signal: str,
     if float(np.sqrt(np.mean(errors ** 2))) < criteria.floor_error * floor:
         return found, 1.0                 # too little to say when
     for conditions in signal_conditions(recording, time_s):
-        squares = {name: _squares(errors[mask], floor) for name, mask in conditions.items()}
+        squares = {name: squares_beyond(errors[mask], floor) for name, mask in conditions.items()}
         total = sum(squares.values())
         for name, mask in conditions.items():
             share = squares[name] / total if total > 0.0 else 0.0
             if share > max(least, best) and float(np.mean(mask)) < least * share:
                 found, best = name, share
     return found, best or 1.0
-
-
-def _squares(errors: FloatArray, floor: float) -> float:
-    return max(float(np.sum(errors ** 2)) - floor ** 2 * errors.size, 0.0)

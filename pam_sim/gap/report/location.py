@@ -247,10 +247,14 @@ def _bands(recording: Recording, time_s: FloatArray) -> dict[str, BoolArray]:
             f'above {second} kPa': p >= edges[1]}
 
 
+def squares_beyond(errors: FloatArray, floor: float) -> float:
+    """Return the sum of squared errors beyond what the noise floor makes of it."""
+    return max(float(np.sum(errors ** 2)) - floor ** 2 * errors.size, 0.0)
+
+
 def _by_condition(residual: FloatArray, floor: float, conditions: Mapping[str, BoolArray],
                   subsystem: str, signal: str) -> list[Share]:
-    sums = {name: max(float(np.sum(residual[mask] ** 2)) - floor ** 2 * mask.sum(), 0.0)
-            for name, mask in conditions.items()}
+    sums = {name: squares_beyond(residual[mask], floor) for name, mask in conditions.items()}
     total = sum(sums.values())
     if total <= 0.0:
         return []

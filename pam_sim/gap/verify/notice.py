@@ -36,14 +36,14 @@ import numpy as np
 from pam_sim.annotations import BoolArray, FloatArray
 from pam_sim.effects.registry import get_effect
 from pam_sim.gap.criteria import Criteria
+from pam_sim.gap.data.means import free_of, means_of, recent
 from pam_sim.gap.data.noise import autocorrelation_time, MAD_TO_SD, noise_of, STAMP_SD_S
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.split import FIT, SELECT
-from pam_sim.gap.data.supply import supply_scatter
+from pam_sim.gap.data.supply import DRIFT_SD, supply_scatter
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit
 from pam_sim.gap.subsystems.problem import SubsystemProblem
-from pam_sim.gap.verify.means import free_of, means_of, recent
 from pam_sim.gap.verify.own_runs import OwnRuns
 from pam_sim.rig import Rig
 
@@ -53,7 +53,6 @@ MEMORY_S = 1.0               # of the mean before that errors behind on/off valv
 # they are as large after some tenths of a second.
 FLOW_MEAN_S, FLOW_MEMORY_S = 0.1, 0.25
 DRAWS = 4
-DRIFT_SD = 0.2               # of a sensor over a recording, in its standard deviations
 LEAST_STAMP_SD_S = 0.05e-3   # stamps as regular as that may be those of a clock, not of the valve
 SPARE = 10                   # means that are left for the noise once all is fitted
 
