@@ -94,6 +94,8 @@ def measured_run(checkout: Path, folder: str, ahead: bool) -> dict[str, float]:
     asked_s = run.topics['reference'].stamp_ns[0] * 1e-9 - done.began_s
     moved = run.topics['contraction']
     above_m = moved.values['contraction_m'] - np.median(moved.values['contraction_m'][:AT_REST])
+    if not np.any(above_m > MOVED_M):
+        sys.exit(f'{EXPERIMENT} of {checkout}: the muscle did not move')
     first = int(np.argmax(above_m > MOVED_M))
     return {
         'command to first reference': asked_s,
