@@ -208,9 +208,17 @@ def whole_file(path: StrPath, suffix: str = '', parents: bool = True) -> Iterato
 
 
 @contextlib.contextmanager
-def whole_files(folder: StrPath) -> Iterator[Path]:
+def whole_files(folder: StrPath, among: Iterable[str] = ()) -> Iterator[Path]:
     """
     Give a folder whose files all go into ``folder`` when the block ends well, else none.
+
+    Parameters
+    ----------
+    folder : path
+        Made if needed.
+    among : iterable of str
+        All names that such results may have. Files of these names that are not written now are
+        of an earlier result, and are removed.
 
     Raises
     ------
@@ -231,6 +239,9 @@ def whole_files(folder: StrPath) -> Iterator[Path]:
         for name in names:
             os.replace(temporary / name, folder / name)
         written = True
+        for name in {*among}.difference(names):
+            if stat.S_ISREG(_mode(folder / name) or 0):
+                os.unlink(folder / name)
     except OSError as error:
         raise cannot_write(folder, error) from None
     finally:

@@ -128,7 +128,7 @@ class Outcome:
 
     def write(self, store: Store) -> None:
         """Write investigation.json, report.html and model.yaml, all of them or none."""
-        with whole_files(store.folder) as folder:
+        with whole_files(store.folder, OPTIONAL) as folder:
             write_json(folder / RESULT, self.to_dict())
             model, names = '', [MODEL] * self.has_model
             if self.proposal:
@@ -140,9 +140,6 @@ class Outcome:
                     if name == MODEL:
                         model = file.read_text(encoding='utf-8')
             write_text(folder / PAGE, investigation_page(self, model))
-            left_over = [name for name in OPTIONAL if not (folder / name).is_file()]
-        for name in left_over:      # of an earlier run, which saw fewer rounds
-            (store.folder / name).unlink(missing_ok=True)
 
 
 def shrunk(gap: dict[str, Any]) -> list[str]:

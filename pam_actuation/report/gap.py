@@ -160,9 +160,11 @@ def save_gap(result: 'GapResult', run: 'Run', out_dir: StrPath, of: str = '') ->
     Write gap.json, model.yaml, compare.mcap and report.html of a result.
 
     Where rivals are left, next_experiment.yaml too, which ``pam run`` executes. Where a term is
-    proposed, its effect file and the model with it.
+    proposed, its effect file and the model with it. Such files of an earlier result are removed.
     """
-    with whole_files(out_dir) as folder:
+    # A model that has the proposed effect needs its file.
+    kept = (EFFECT_FILE, MODEL_FILE) if Path(EFFECT_FILE).stem in result.model_yaml else ()
+    with whole_files(out_dir, set(FILES).difference(kept)) as folder:
         _save_into(folder, result, run, of)
 
 

@@ -55,7 +55,7 @@ def save_identification(result: 'Identification', runs: 'Sequence[Run]', out_dir
         The folder cannot be written.
 
     """
-    with whole_files(out_dir) as folder:
+    with whole_files(out_dir, FILES) as folder:
         write_json(folder / 'identify.json', result.to_dict())
         write_text(folder / 'rig.yaml', result.rig.to_yaml())
         if result.next_experiment is not None:

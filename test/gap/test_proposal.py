@@ -13,6 +13,7 @@
 # limitations under the License.
 """A term without a name: found, proved, written as an effect file that simulates the same."""
 
+from dataclasses import replace
 import json
 import os
 import re
@@ -20,12 +21,14 @@ import subprocess
 import sys
 
 from gap_runs import assert_form, nominal, recorded, voltages
+from pam_actuation.report.gap import save_gap
 from pam_sim.effects.unnamed import terms
 from pam_sim.gap.criteria import CRITERIA
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.propose.library import Factor, library, NOTHING, STAND_INS, Term
-from pam_sim.gap.propose.proposal import NO_TIME, NONE, propose
+from pam_sim.gap.propose.proposal import (
+    EFFECT_FILE, MODEL_FILE, NO_TIME, NONE, propose)
 from pam_sim.gap.propose.search import candidate_of, ends_of
 from pam_sim.gap.propose.writing import EffectText
 from pam_sim.gap.result import GapResult
@@ -105,6 +108,15 @@ def written(number, effect, channel, one, two, size):
     text = EffectText(stand_in, [term], values, RANGES, 1.0, f'term_{number}')
     trial = candidate_of(stand_in, [term], ends_of(stand_in, RANGES)).setting(values)
     return text.text(), {'name': text.name, 'parameters': text.values()}, trial, stand_in.valves
+
+
+def test_a_proposal_of_an_earlier_result_goes_unless_it_is_used(drag, tmp_path):
+    run, files = recorded(nominal(), voltages(2.0)), {EFFECT_FILE, MODEL_FILE}
+    # As of a model with the effect in it, which cannot be loaded here.
+    used = replace(drag, proposal=None, model_yaml=f'{drag.model_yaml}# proposed_effect\n')
+    for result, left in ((drag, files), (used, files), (replace(drag, proposal=None), set())):
+        save_gap(result, run, tmp_path)
+        assert files & set(os.listdir(tmp_path)) == left
 
 
 @pytest.mark.parametrize('stand_in', STAND_INS, ids=lambda s: s.effect)

@@ -149,6 +149,22 @@ def test_a_pipe_is_not_waited_for(tmp_path):
     files.refuse_pipe('/dev/zero')
 
 
+def test_what_an_earlier_result_left_is_removed(tmp_path):
+    (tmp_path / 'mine.txt').write_text('mine')
+    (tmp_path / 'link').symlink_to('mine.txt')
+    for number in (2, 1):
+        with files.whole_files(tmp_path, ('one', 'two', 'three', 'link')) as folder:
+            for name in ('one', 'two')[:number]:
+                (folder / name).write_text(str(number))
+        assert sorted(os.listdir(tmp_path)) == sorted(
+            ['link', 'mine.txt', 'one', 'two'][:2 + number])
+    with pytest.raises(ValueError, match='half way'), \
+            files.whole_files(tmp_path, ('one', 'two')) as folder:
+        (folder / 'two').write_text('2')
+        raise ValueError('half way')
+    assert sorted(os.listdir(tmp_path)) == ['link', 'mine.txt', 'one']
+
+
 def test_json_is_written_whole_or_not_at_all(tmp_path):
     path = tmp_path / 'found.json'
     assert files.write_json(path, {'a': [1, 0.5]}) == path
