@@ -19,7 +19,7 @@ import os
 from typing import Any, TYPE_CHECKING
 
 from pam_actuation.cli.common import (
-    add_seed_option, emit, EXIT_DONE, EXIT_FINDING, progress)
+    add_seed_option, effect_names, emit, EXIT_DONE, EXIT_FINDING, progress)
 from pam_actuation.cli.options import count, number, out_path, Parser, source
 
 if TYPE_CHECKING:
@@ -71,10 +71,7 @@ def run(args: argparse.Namespace) -> int:
     from pam_actuation.campaign.page import campaign_page
     from pam_actuation.campaign.results import PAGE, seen_before, write_results
     from pam_actuation.workers import ClusterLost
-    from pam_sim.effects.registry import get_effect
-    effects = tuple(args.effects.split(',')) if args.effects else ()
-    for name in effects:
-        get_effect(name, '--effects')
+    effects = tuple(effect_names(args))
     cases = find_cases(args.recordings, without=args.out)
     settings = Settings(args.work, args.model or '', effects, args.seconds, args.materiality,
                         tuple(args.unknown), args.seed)

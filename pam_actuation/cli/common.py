@@ -54,6 +54,24 @@ def emit(args: argparse.Namespace, payload: dict[str, Any], text: str) -> None:
     print(json.dumps(payload, indent=2, default=str) if args.json else text)
 
 
+def effect_names(args: argparse.Namespace) -> list[str]:
+    """
+    Return the effects that ``--effects`` lists, none without the option.
+
+    Raises
+    ------
+    InputError
+        A name that no effect of the library has.
+
+    """
+    from pam_sim.effects.registry import effects
+    from pam_sim.plugins import pick
+    names: list[str] = args.effects.split(',') if args.effects else []
+    for name in names:
+        pick(effects(), name, 'effect', '--effects')
+    return names
+
+
 def note_implausible(args: argparse.Namespace, runs: 'list[RecordedRun]',
                      must_be_right: bool = False) -> None:
     """

@@ -20,7 +20,8 @@ import os
 from typing import TYPE_CHECKING
 
 from pam_actuation.cli.common import (
-    add_overwrite_option, emit, EXIT_DONE, EXIT_FINDING, note_implausible, progress)
+    add_overwrite_option, effect_names, emit, EXIT_DONE, EXIT_FINDING, note_implausible,
+    progress)
 from pam_actuation.cli.options import number, out_path, Parser, source
 
 if TYPE_CHECKING:
@@ -70,7 +71,6 @@ def run(args: argparse.Namespace) -> int | None:
     from pam_actuation.bags.load import load_run
     from pam_actuation.report.gap import FILES, write_gap
     from pam_actuation.report.origin import is_of, origin
-    from pam_sim.effects.registry import get_effect
     from pam_sim.errors import InputError
     from pam_sim.files import check_folder
     if args.explain is not None:
@@ -79,9 +79,7 @@ def run(args: argparse.Namespace) -> int | None:
         return _plan(args)
     if not args.run or args.out is None:
         raise InputError('needs at least one recorded bag and --out DIR')
-    names = args.effects.split(',') if args.effects else None
-    for name in names or ():
-        get_effect(name, '--effects')
+    names = effect_names(args) or None
     page = os.path.join(args.out, 'report.html')
     of = origin(args.run, page, 'gap', args.model, args.certify)
     check_folder(args.out, FILES, args.overwrite or is_of(page, of))
@@ -114,13 +112,10 @@ def _plan(args: argparse.Namespace) -> int:
     from pam_actuation.experiments import load_experiment
     from pam_actuation.experiments.protocols import plan
     from pam_sim import load_rig
-    from pam_sim.effects.registry import get_effect
     from pam_sim.files import check_folder, whole_files, write_text
     from pam_sim.located_yaml import dump_yaml
     rig = load_rig(args.model, valve=args.valve)
-    names = args.effects.split(',') if args.effects else None
-    for name in names or ():
-        get_effect(name, '--effects')
+    names = effect_names(args) or None
     if args.out is not None:
         check_folder(args.out, ('plan.json', 'experiment.yaml'), args.overwrite)
     experiments = [load_experiment(one) for one in args.run]

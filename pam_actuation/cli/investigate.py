@@ -19,8 +19,8 @@ import sys
 from typing import Any, TYPE_CHECKING
 
 from pam_actuation.cli.common import (
-    add_overwrite_option, add_seed_option, emit, EXIT_DONE, EXIT_FINDING, note_implausible,
-    progress)
+    add_overwrite_option, add_seed_option, effect_names, emit, EXIT_DONE, EXIT_FINDING,
+    note_implausible, progress)
 from pam_actuation.cli.options import (
     count, EXIT_INTERRUPTED, number, out_path, Parser, source)
 
@@ -87,10 +87,7 @@ def run(args: argparse.Namespace) -> int:
     from pam_actuation.investigate.decide import DECLINED
     from pam_actuation.investigate.loop import Budget, Investigation
     from pam_actuation.investigate.question import Question
-    from pam_sim.effects.registry import get_effect
-    names = tuple(args.effects.split(',')) if args.effects else ()
-    for name in names:
-        get_effect(name, '--effects')
+    names = tuple(effect_names(args))
     truth, model = _rigs(args)
     experiment = load_experiment(args.experiment)
     with progress(args, 1.0, '', 'investigate') as bar:

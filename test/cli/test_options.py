@@ -116,6 +116,17 @@ def test_empty_and_impossible_paths_are_told(capsys):
     assert '300 bytes' in capsys.readouterr().err
 
 
+def test_only_names_of_the_library_are_tried(capsys):
+    """A stand-in for a term without a name is none: nothing would be tried."""
+    for words in (['gap', 'bag', '--out', 'x'], ['gap', 'short_sine', '--plan'],
+                  ['campaign', 'runs', '--out', 'x'], ['investigate', '--out', 'x']):
+        for name in ('muscle_term', 'creep,', 'creepp'):
+            assert main([*words, '--effects', name]) == 2, words
+            said = capsys.readouterr().err
+            assert said.startswith(f'pam {words[0]}: --effects: unknown effect `'), said
+            assert ' creep, ' in said and said.count('\n') == 1, said
+
+
 def test_allowed_values_are_read():
     assert number(0.0, 5.0, 's')('5') == 5.0 and number()('-1e3') == -1000.0
     assert count(1, 64, {-1: 'one a core'})('-1') == -1 and count(0)('7') == 7
