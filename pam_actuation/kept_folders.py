@@ -29,7 +29,7 @@ import tempfile
 from typing import Any
 
 from pam_sim.errors import InputError
-from pam_sim.files import StrPath, UNFINISHED
+from pam_sim.files import cannot_write, StrPath, UNFINISHED
 
 LOCK = '.lock'
 _BLOCK = 1 << 20
@@ -71,7 +71,15 @@ def only_one(folder: Path, what: str, below: Iterable[Path] = ()) -> Iterator[No
 
 @contextlib.contextmanager
 def kept_folder(parent: Path, name: str) -> Iterator[Path]:
-    """Give a folder that becomes ``name`` in the folder ``parent`` when the block ends well."""
+    """
+    Give a folder that becomes ``name`` in the folder ``parent`` when the block ends well.
+
+    Raises
+    ------
+    InputError
+        The system refuses to rename it.
+
+    """
     folder = Path(tempfile.mkdtemp(prefix=UNFINISHED, dir=parent))
     try:
         yield folder
@@ -81,8 +89,11 @@ def kept_folder(parent: Path, name: str) -> Iterator[Path]:
                 with open(path, 'rb') as stream:
                     os.fsync(stream.fileno())
         # Where another worker was faster, the folder is there already and holds the same.
-        with contextlib.suppress(OSError):
+        try:
             os.rename(folder, parent / name)
+        except OSError as error:
+            if not (parent / name).is_dir():
+                raise cannot_write(parent / name, error) from None
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 

@@ -159,6 +159,9 @@ def test_what_a_kill_left_half_done_is_removed(tmp_path):
         assert store.result('key') == {'verdict': 'no_gap'}
         with kept_folder(store.cases, 'key') as folder:     # a slower worker, same case
             (folder / 'case.json').write_text('{"verdict": "no_gap"}')
+        with pytest.raises(InputError, match='cannot be written'), \
+                kept_folder(store.cases, 'gone/key') as folder:
+            (folder / 'case.json').write_text('{}')
     assert [path.name for path in store.cases.iterdir()] == ['key']
 
 
