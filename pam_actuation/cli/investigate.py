@@ -115,6 +115,10 @@ def _rigs(args: argparse.Namespace) -> 'tuple[Rig | None, Rig]':
         raise InputError('goes without --hardware: a rig is simulated or real', '--rig')
     if args.live and args.hardware is not None:
         raise InputError('goes without --hardware, which is live already', '--live')
+    if args.domain_id is not None and not args.live and args.hardware is None:
+        raise InputError('goes with --live or --hardware', '--domain-id')
+    if args.namespace is not None and not args.run:
+        raise InputError('goes with bags that are there already', '--namespace')
     truth = None if args.rig is None else load_rig(args.rig, valve=args.valve)
     valve = truth.valve if truth is not None else args.valve
     model = load_rig(args.model, valve=valve if args.model in preset_names() else None)

@@ -159,6 +159,8 @@ def test_mistakes_are_told_before_anything_moves(lab, tmp_path, capsys, monkeypa
             (['--hardware', 'dummy', '--live'], 'is live already'),
             (['--hardware', 'dumy', '--yes'], '`dummy`'),
             (['--hardware', 'dummy'], 'nobody can be asked'),
+            ([*rig, '--domain-id', '7'], 'goes with --live or --hardware'),
+            ([*rig, '--namespace', '/muscle'], 'goes with bags'),
             ([*rig, '--effects', 'leak'], '`leakage`'),
             ([*rig, '--experiment', 'sine'], 'experiment'),
             ([*rig, '--experiment', 'force_sine'], 'moves freely'),
