@@ -158,9 +158,10 @@ def _work(todo: dict[str, Task], settings: Settings, store: Store, jobs: int,
                     done(task.key, result)
                 return
             except (ClusterLost, InputError) as error:
-                gone = isinstance(error, ClusterLost)
-                if not gone and attempt == 1 or attempt == _ATTEMPTS:
-                    raise ClusterLost(f'{error}; {len(todo)} cases are left') if gone else error
+                if attempt == 1 and not isinstance(error, ClusterLost):
+                    raise           # it was never there
+                if attempt == _ATTEMPTS:
+                    raise ClusterLost(f'{error}; {len(todo)} cases are left') from error
         for key in [key for key in todo if store.result(key) is not None]:
             todo.pop(key)       # done, but not told any more
 

@@ -14,9 +14,10 @@
 
 """Tasks on a Dask cluster that exists already."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
 import contextlib
+import math
 import time
 from typing import Any
 
@@ -65,37 +66,55 @@ class DaskCluster:
                 warm_up(*modules)
 
         self._address = address
+        self._size, self._counted_s = 1, -math.inf
+        with contextlib.ExitStack() as stack:
+            try:
+                self._client = Client(address, timeout=WAIT_S, set_as_default=False)
+                stack.callback(self.close)
+                self._client.register_plugin(WarmUp())
+            except (OSError, ValueError) as error:
+                raise InputError(
+                    f'no Dask scheduler answers at {address}: {error}', 'cluster') from None
+            stack.pop_all()
+
+    @contextlib.contextmanager
+    def _asked(self) -> Iterator[None]:
+        """Ask the scheduler; ClusterLost where the connection breaks meanwhile."""
         try:
-            self._client = Client(address, timeout=WAIT_S, set_as_default=False)
-        except (OSError, TimeoutError, ValueError) as error:
-            raise InputError(
-                f'no Dask scheduler answers at {address}: {error}', 'cluster') from None
-        try:
-            self._client.register_plugin(WarmUp())
-        except BaseException:
-            self.close()
-            raise
+            yield
+        except (OSError, CancelledError) as error:
+            raise self.lost() from error
 
     @property
     def size(self) -> int:
-        """Return the number of tasks that the workers of now do at a time, at least one."""
-        return max(sum(self._client.nthreads().values()), 1)
+        """
+        Return the number of tasks that the workers do at a time, at least one.
+
+        The scheduler is asked every ``LOOKED_S`` at most. ClusterLost where it is gone.
+        """
+        if time.monotonic() - self._counted_s > LOOKED_S:
+            with self._asked():
+                self._size = max(sum(self._client.nthreads().values()), 1)
+            self._counted_s = time.monotonic()
+        return self._size
 
     def share(self, shared: Any) -> tuple[str, Any]:
         """
         Return what ``submit`` takes for something that all tasks need.
 
         The bytes are the result of a task: the scheduler makes them anew where the workers
-        that held them are lost.
+        that held them are lost. ClusterLost as ``wait``.
         """
         key, blob = packed(shared)
-        return key, self._client.submit(_same, blob, key=f'pam-shared-{key}')
+        with self._asked():
+            return key, self._client.submit(_same, blob, key=f'pam-shared-{key}')
 
     def submit(self, function: Callable[[Any, Any], Any], shared: tuple[str, Any],
                item: Any) -> '_Task':
-        """Begin a task."""
+        """Begin a task; ClusterLost as ``wait``."""
         key, blob = shared
-        return _Task(self, self._client.submit(call, function, key, blob, item, pure=False))
+        with self._asked():
+            return _Task(self, self._client.submit(call, function, key, blob, item, pure=False))
 
     def wait(self, tasks: 'Iterable[_Task]') -> 'list[_Task]':
         """
@@ -127,15 +146,17 @@ class DaskCluster:
                items: list[Any]) -> list[Any]:
         """Return the results of all items, in order; ClusterLost as ``wait``."""
         (key, blob), n = shared, len(items)
-        tasks = [_Task(self, future) for future in self._client.map(
-            call, [function] * n, [key] * n, [blob] * n, items, pure=False)]
+        with self._asked():
+            tasks = [_Task(self, future) for future in self._client.map(
+                call, [function] * n, [key] * n, [blob] * n, items, pure=False)]
         waiting = tasks
         while waiting:
             for task in self.wait(waiting):
                 if task.future.status != 'finished':
                     task.result()       # raises
             waiting = [task for task in waiting if not task.future.done()]
-        found: list[Any] = self._client.gather([task.future for task in tasks])
+        with self._asked():
+            found: list[Any] = self._client.gather([task.future for task in tasks])
         return found
 
     def lost(self) -> ClusterLost:
@@ -156,13 +177,14 @@ class _Task:
     def result(self) -> Any:
         """Return what the task returned; raise what it raised, WorkerLost or ClusterLost."""
         from dask.distributed import KilledWorker
+        from distributed.comm import CommClosedError
         if self.future.status in ('cancelled', 'lost'):
             raise self._cluster.lost()
         try:
             return self.future.result(timeout=WAIT_S)
         except KilledWorker:
             raise WorkerLost('the workers that began it ended before it was done') from None
-        except (CancelledError, TimeoutError):
+        except (CancelledError, CommClosedError, TimeoutError):
             raise self._cluster.lost() from None
 
 

@@ -14,7 +14,8 @@
 
 """Tasks on a Ray cluster that exists already."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+import contextlib
 from typing import Any
 
 from pam_actuation.workers.calls import call, packed, THREADS, warm_up
@@ -65,30 +66,42 @@ class RayCluster:
         self._ray, self._address, self._modules = engine, address, modules
         self._call = engine.remote(_warm_call).options(max_retries=TRIES_AGAIN, num_cpus=1)
 
+    @contextlib.contextmanager
+    def _asked(self) -> Iterator[None]:
+        """Ask the cluster; ClusterLost where the connection breaks meanwhile."""
+        try:
+            yield
+        except OSError as error:
+            raise self._lost() from error
+
+    def _lost(self) -> ClusterLost:
+        return ClusterLost(f'the Ray cluster at {self._address} was lost')
+
     @property
     def size(self) -> int:
-        """Return the number of tasks that the cluster does at a time, at least one."""
-        return max(int(self._ray.cluster_resources().get('CPU', 1)), 1)
+        """Return the number of tasks that the cluster does at a time; ClusterLost if gone."""
+        with self._asked():
+            return max(int(self._ray.cluster_resources().get('CPU', 1)), 1)
 
     def share(self, shared: Any) -> tuple[str, Any]:
-        """Return what ``submit`` takes for something that all tasks need."""
+        """Return what ``submit`` takes for something that all tasks need; ClusterLost if gone."""
         key, blob = packed(shared)
-        return key, self._ray.put(blob)
+        with self._asked():
+            return key, self._ray.put(blob)
 
     def submit(self, function: Callable[[Any, Any], Any], shared: tuple[str, Any],
                item: Any) -> '_Task':
-        """Begin a task."""
-        return _Task(self, self._call.remote(self._modules, function, *shared, item))
+        """Begin a task; ClusterLost where Ray is gone."""
+        with self._asked():
+            return _Task(self, self._call.remote(self._modules, function, *shared, item))
 
     def wait(self, tasks: 'Iterable[_Task]') -> 'list[_Task]':
         """Wait until some task is done; return all that are. ClusterLost where Ray is gone."""
         tasks = list(tasks)
         by_reference = {task.reference: task for task in tasks}
-        try:
+        with self._asked():
             done, _ = self._ray.wait(list(by_reference), num_returns=1)
             more, _ = self._ray.wait(list(by_reference), num_returns=len(tasks), timeout=0)
-        except (ConnectionError, OSError) as error:
-            raise self._lost() from error
         return [by_reference[one] for one in dict.fromkeys([*done, *more])]
 
     def gather(self, function: Callable[[Any, Any], Any], shared: tuple[str, Any],
@@ -106,11 +119,8 @@ class RayCluster:
             raise (error.cause if isinstance(error.cause, Exception) else error) from None
         except (errors.WorkerCrashedError, errors.OutOfMemoryError, errors.NodeDiedError):
             raise WorkerLost('the workers that began it ended before it was done') from None
-        except (ConnectionError, OSError) as error:
+        except OSError as error:        # last: an error of a task may be one as well
             raise self._lost() from error
-
-    def _lost(self) -> ClusterLost:
-        return ClusterLost(f'the Ray cluster at {self._address} was lost')
 
     def close(self) -> None:
         """Let go of the cluster; it goes on."""

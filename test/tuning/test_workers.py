@@ -23,7 +23,7 @@ from pam_actuation.experiments.experiment import load_experiment
 from pam_actuation.tuning.loops_of_rigs import loops_of
 from pam_actuation.tuning.problem import cost_of, costs_of, Problem
 from pam_actuation.tuning.tune import tune
-from pam_actuation.workers import WorkerLost, Workers
+from pam_actuation.workers import ClusterLost, dask_cluster, WorkerLost, Workers
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.rollout.batch import Record, simulate_batch, TASK_RUNS
@@ -42,7 +42,7 @@ def tuned(rig, **where):
                 budget=BUDGET, seed=4, **where)
 
 
-def test_same_bytes_with_any_number_of_threads_and_on_a_dask_cluster(rig):
+def test_same_bytes_with_any_number_of_threads_and_on_a_dask_cluster(rig, monkeypatch):
     distributed = pytest.importorskip(
         'distributed', reason='Dask is not installed: pip install "pam_actuation[cluster]"')
     one, two = tuned(rig), tuned(rig, jobs=2)
@@ -53,6 +53,12 @@ def test_same_bytes_with_any_number_of_threads_and_on_a_dask_cluster(rig):
             worker_dashboard_address=None) as cluster:
         cluster.wait_for_workers(2, timeout=60)
         spread = tuned(rig, cluster=cluster.scheduler_address)
+        monkeypatch.setattr(dask_cluster, 'SILENT_S', 0.5)
+        with Workers(cluster=cluster.scheduler_address) as workers:
+            assert workers.map(pow, 2, (3, 4)) == [8, 16]
+            cluster.close()
+            with pytest.raises(ClusterLost, match='was lost'):
+                list(workers.stream(pow, 2, (3, 4)))
     assert spread.to_yaml() == one.to_yaml()
     assert spread.history == one.history
     assert spread.held_out_after == one.held_out_after
