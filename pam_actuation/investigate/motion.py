@@ -14,7 +14,7 @@
 
 """What a person is told and asked before a muscle moves."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -78,7 +78,7 @@ Ask = Callable[[Motion], bool]      # whether the motion is allowed
 
 def limit_of(file: str, default: float) -> float:
     """
-    Return the pressure limit [Pa gauge] that a file of hardware states, else the default.
+    Return the lowest pressure limit [Pa gauge] that a file of hardware states, or the default.
 
     Parameters
     ----------
@@ -88,14 +88,13 @@ def limit_of(file: str, default: float) -> float:
         Limit of the driver without one.
 
     """
-    return _limit_in(load_yaml(file), default)
+    return min(_limits_in(load_yaml(file)), default=default)
 
 
-def _limit_in(tree: Located, default: float) -> float:
+def _limits_in(tree: Located) -> Iterator[float]:
     found = tree.get(LIMIT)
     if isinstance(found, (int, float)):
-        return float(found)
+        yield float(found)
     for value in tree.values():
         if isinstance(value, Located):
-            default = _limit_in(value, default)
-    return default
+            yield from _limits_in(value)
