@@ -132,14 +132,14 @@ def test_the_limit_told_is_the_lower_one(tmp_path):
                     'max_pressure_gauge_pa: 250000.0}\n')
     recorder = LiveRecorder(load_rig(MODEL), lambda motion: True, str(file))
     assert recorder.motion(load_experiment('rest')).limit_gauge_pa == 250e3
+    recorder.check(load_experiment('rest'))
+    with pytest.raises(InputError, match='asks for 539 kPa gauge; the driver allows 0 to 250'):
+        recorder.check(load_experiment('random_steps'))
     for first, second in ((1e5, 2e5), (2e5, 1e5)):      # of two nodes: the lowest again
         file.write_text(''.join(
             f'{node}:\n  ros__parameters: {{max_pressure_gauge_pa: {limit}}}\n'
             for node, limit in (('/**', first), ('/muscle/valve_driver', second))))
         assert recorder.motion(load_experiment('rest')).limit_gauge_pa == 1e5
-    recorder.check(load_experiment('rest'))
-    with pytest.raises(InputError, match='asks for 539 kPa gauge; the driver allows 0 to 250'):
-        recorder.check(load_experiment('random_steps'))
     simulated = LiveRecorder(load_rig(MODEL), lambda motion: True)
     told = simulated.motion(load_experiment('rest'))
     assert told.limit_gauge_pa == 600e3 and 'a simulated muscle' in told.text()
