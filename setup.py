@@ -181,6 +181,7 @@ setup(
             'pid_controller = pam_actuation.nodes.executables:pid_controller',
             'joint_simulator = pam_actuation.nodes.executables:joint_simulator',
             'joint_controller = pam_actuation.nodes.executables:joint_controller',
+            'joint_trajectory_server = pam_actuation.nodes.executables:joint_trajectory_server',
             'reference_generator = pam_actuation.nodes.executables:reference_generator',
             'hardware_sensors = pam_actuation.nodes.executables:hardware_sensors',
             'experiment_recorder = pam_actuation.nodes.executables:experiment_recorder',

@@ -38,7 +38,7 @@ ROOT = Path(__file__).resolve().parent.parent
 EXECUTABLES = (
     'valve_driver', 'plant_simulator', 'sofc_controller', 'pid_controller',
     'reference_generator', 'experiment_recorder', 'hardware_sensors', 'joint_simulator',
-    'joint_controller', 'valve_watchdog')
+    'joint_controller', 'joint_trajectory_server', 'valve_watchdog')
 
 # Import name -> name in setup.py, where they differ.
 DISTRIBUTIONS = {'yaml': 'pyyaml', 'mcap_ros2': 'mcap-ros2-support',

@@ -84,6 +84,11 @@ def joint_controller() -> int:
     return start('joint_controller')
 
 
+def joint_trajectory_server() -> int:
+    """Run the node of this name; return its exit code."""
+    return start('joint_trajectory_server')
+
+
 def reference_generator() -> int:
     """Run the node of this name; return its exit code."""
     return start('reference_generator')

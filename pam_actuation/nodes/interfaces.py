@@ -47,7 +47,7 @@ VARIANTS: dict[str, tuple[dict[str, Any], ...]] = {
         {'experiment': 'voltage_steps'}, {'experiment': 'joint_sine'}),
     'experiment_recorder': ({'rig': 'joint_dmsp_5_300'},),
     'joint_simulator': ({'valve_type': 'hsv'},),
-    'joint_controller': ()}
+    'joint_controller': (), 'joint_trajectory_server': ()}
 NEEDED: dict[str, dict[str, Any]] = {'hardware_sensors': {'backend': 'dummy'}}
 
 

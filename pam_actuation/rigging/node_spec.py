@@ -21,7 +21,7 @@ from typing import Any
 # That of the end, read backwards.
 ORDER = ('experiment_recorder', 'plant_simulator', 'hardware_sensors', 'joint_simulator',
          'valve_watchdog', 'valve_driver', 'sofc_controller', 'pid_controller',
-         'joint_controller', 'reference_generator')
+         'joint_controller', 'joint_trajectory_server', 'reference_generator')
 
 
 @dataclass(frozen=True)

@@ -159,7 +159,7 @@ def test_a_verb_or_node_starts_without_the_slow_half_of_scipy():
 
 def test_every_node_says_what_to_install_where_ros_is_missing(tmp_path):
     names = nodes()
-    assert len(names) == 10
+    assert len(names) == 11
     # One process each, started at the same time: as a module, and as an executable.
     started = {}
     for name in names:

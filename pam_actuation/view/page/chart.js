@@ -111,15 +111,18 @@ class Chart {
 
   markers(pen, time, end, x, high, style) {
     pen.font = '11px system-ui, sans-serif';
-    pen.textAlign = 'left'; pen.textBaseline = 'top';
+    pen.textBaseline = 'top';
     pen.strokeStyle = pen.fillStyle = style('--warn'); pen.lineWidth = 1;
     pen.setLineDash([4, 3]);
-    for (const one of time.markers || []) {
+    const middle = x(end - time.count / 2);
+    for (const [k, one] of (time.markers || []).entries()) {
       const column = end - (time.now_s - one.time_s) / time.width_s;
       if (column < end - time.count || column > end) continue;
       const at = Math.round(x(column)) + 0.5;
       pen.beginPath(); pen.moveTo(at, TOP); pen.lineTo(at, high - BOTTOM); pen.stroke();
-      pen.fillText(one.text, at + 3, TOP);
+      // Towards the middle, and neighbours in lines of their own.
+      pen.textAlign = at < middle ? 'left' : 'right';
+      pen.fillText(one.text, at < middle ? at + 3 : at - 3, TOP + 13 * (k % 3));
     }
     pen.setLineDash([]);
   }
