@@ -34,7 +34,8 @@ NODES = (
     'valve_driver', 'plant_simulator', 'sofc_controller', 'pid_controller',
     'reference_generator', 'experiment_recorder')
 # They need devices, a joint instead of a muscle, or a driver; their own tests start them.
-FOR_OTHER_RIGS = ('hardware_sensors', 'joint_simulator', 'joint_controller', 'valve_watchdog')
+FOR_OTHER_RIGS = ('hardware_sensors', 'joint_simulator', 'joint_controller',
+                  'joint_trajectory_server', 'valve_watchdog')
 PASSIVE = 'configured, not active'
 SOURCES = (
     'package.xml', 'setup.py', 'setup.cfg', 'pyproject.toml', 'README.md', 'LICENSE', 'resource',

@@ -64,7 +64,7 @@ def answers(calls):
 
 @pytest.mark.timed
 def test_help_is_printed_by_every_executable_without_ros():
-    assert len(NAMES) == 10
+    assert len(NAMES) == 11
     calls = [(name, [*before, word]) for name in NAMES for word in ('-h', '--help')
              for before in ([], ['--ros-args', '-r', '__ns:=/leg'])]
     for (name, _), (code, out, err, took_s) in zip(calls, answers(calls)):
