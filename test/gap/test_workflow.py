@@ -29,13 +29,13 @@ import pytest
 
 
 @pytest.fixture(scope='module')
-def two_effects():
-    """Return (recording of a rig with two effects, its gap to the nominal one)."""
+def two_effects(tmp_path_factory):
+    """Return (folder, result) of the gap of a rig with two effects to the nominal one."""
     rig = nominal().with_(effects=[
         {'name': 'valve_dead_time', 'parameters': {'delay_s': 0.03}},
         {'name': 'coulomb_friction', 'parameters': {'force_n': 1.5}}])
-    run = recorded(rig, voltages(20.0))
-    return run, find_gap(run, nominal())
+    folder = tmp_path_factory.mktemp('two_effects') / 'gap'
+    return folder, write_gap([recorded(rig, voltages(20.0))], NOMINAL, folder)
 
 
 def shares(result, signal, condition='all'):
@@ -210,10 +210,9 @@ def test_shrink_takes_the_noise_out():
     assert SignalGap('m', 1.0, 9.0, 0.9, 0.9).shrink_percent is None
 
 
-def test_the_folder_holds_what_others_rely_on(two_effects, tmp_path):
-    run, _ = two_effects
-    result = write_gap([run], NOMINAL, tmp_path / 'gap')
-    found = json.loads((tmp_path / 'gap' / 'gap.json').read_text())
+def test_the_folder_holds_what_others_rely_on(two_effects):
+    folder, result = two_effects
+    found = json.loads((folder / 'gap.json').read_text())
     assert found['schema'] == 1 and found['verdict'] == result.verdict
     assert set(found) == {
         'schema', 'verdict', 'subsystems', 'proposal', 'effects', 'parameters',
@@ -224,18 +223,17 @@ def test_the_folder_holds_what_others_rely_on(two_effects, tmp_path):
     assert set(found['subsystems']['valve']) >= {'verdict', 'names', 'unexplained', 'unit'}
     assert set(found['signals']['pressure']) == {
         'unit', 'noise_floor', 'rmse_before', 'rmse_refit', 'rmse_after', 'shrink_percent'}
-    assert load_rig(str(tmp_path / 'gap' / 'model.yaml')).valve == 'ppr'
-    assert (tmp_path / 'gap' / 'report.html').stat().st_size > 1e6
-    assert sorted(p.name for p in (tmp_path / 'gap').iterdir()) == [
+    assert load_rig(str(folder / 'model.yaml')).valve == 'ppr'
+    assert (folder / 'report.html').stat().st_size > 1e6
+    assert sorted(p.name for p in folder.iterdir()) == [
         'compare.mcap', 'gap.json', 'model.yaml', 'report.html']
 
 
-def test_the_comparison_opens_with_an_independent_reader(two_effects, tmp_path):
+def test_the_comparison_opens_with_an_independent_reader(two_effects):
     from mcap_ros2.reader import read_ros2_messages
-    run, _ = two_effects
-    write_gap([run], NOMINAL, tmp_path, effects=['valve_dead_time'])
+    folder, _ = two_effects
     counts = {}
-    for message in read_ros2_messages(str(tmp_path / 'compare.mcap')):
+    for message in read_ros2_messages(str(folder / 'compare.mcap')):
         counts[message.channel.topic] = counts.get(message.channel.topic, 0) + 1
     assert set(counts) == {
         f'/muscle/{folder}/{signal}' for signal in ('pressure', 'contraction', 'force')
