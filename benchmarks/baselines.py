@@ -42,7 +42,7 @@ KINDS = {'pid_plain': 'PID', 'pid': 'PID + inverse, preview', 'lqi': 'LQI',
          'mpc': 'MPC', 'ilc': 'ILC + PID + inverse'}
 # What a search begins with, beside the defaults.
 STARTS = {'pid_plain': {}, 'pid': {'use_static_inverse': 1, 'lead_s': 0.1}, 'lqi': {},
-          'mpc': {}, 'ilc': {}}
+          'mpc': {'change_weight': 5.0, 'disturbance_pa': 700.0}, 'ilc': {}}
 WORDS = {
     'pid_plain': 'PID with anti-windup and without static inverse: knows nothing of the muscle.',
     'pid': 'PID with anti-windup on top of the static inverse with preview.',

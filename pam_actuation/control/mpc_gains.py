@@ -17,10 +17,13 @@ What model predictive control knows of a muscle: a linear model behind the stati
 The model is written in an *equivalent pressure*: the contraction that the static inverse gives to
 a pressure, times the slope of the inverse at the operating point. So the force map, the largest
 nonlinearity, is no error of the model. From equivalent pressure to contraction it is a delay, a
-lag and a mass on a damped spring whose stiffness is that slope. Delay, lag, rate and damping are
-found by least squares from the record that the LQI is identified on. The model of the LQI, of free
-form, was tried first: it explains the record as well, and its inverse is far too lively to plan
-with.
+lag and a mass on a damped spring. They are found by least squares from the record that the LQI is
+identified on, together with a gain. That gain is about 0.8 of what the static inverse says: dry
+friction and creep hold back a part of a fast motion. A fit without it explains that part by a lag
+twice as long and no delay. The model then gets the gain of the static inverse, which holds at rest
+and in large motions. What friction and creep hold back is a disturbance to the observer. The model
+of the LQI, of free form, was tried first: it explains the record as well, and its inverse is far
+too lively to plan with.
 
 A step of the horizon is a tick. The commands are constant over blocks of ticks that grow. With
 the outputs of the horizon as ``y = F x + G w + P u``, the commands minimise::
@@ -50,8 +53,14 @@ BLOCKS = (2, 4, 6, 8, 12, 18)             # ticks over which a command of the ho
 MOVES, HORIZON = len(BLOCKS), sum(BLOCKS)
 MAX_DELAY_S = 0.07
 DRIFT_HZ = 0.3                            # corner of the high-pass
-_STARTS = 0.05, 30.0, 0.3                 # lag [s], rate of the mass [rad/s], damping
-_EVALUATIONS = 25
+# Of the fit: lag [s], rate of the mass [rad/s], damping, gain over that of the static inverse.
+_STARTS = 0.05, 30.0, 0.3, 1.0
+_LOWEST = 1e-3, 3.0, 0.01, 0.05
+_HIGHEST = 2.0, 500.0, 10.0, 20.0
+# Difference step of the fit, of a logarithm. The residuals are rounded at 1e-12 of them, so a
+# slope is right to 1e-6; and they bend so little over the step that it is right to 1e-6 there too.
+_DIFF_STEP = 1e-6
+_EVALUATIONS = 50
 MODEL = record(
     'order',
     'delay_ticks',
@@ -141,34 +150,58 @@ def identify_lag_and_mass(command_pa: FloatArray, contraction_m: FloatArray, rat
     rate_hz : float
         Of the ticks.
     pa_per_m : float
-        Slope of the static inverse, which holds at rest.
+        Slope of the static inverse, which holds at rest: the model gets its gain. ``fit`` is
+        that of the gain that explains the record best.
 
     """
     from scipy.optimize import least_squares
-    from scipy.signal import butter, cont2discrete, lfilter
+    from scipy.signal import butter, lfilter
     high_pass = butter(2, DRIFT_HZ, 'high', fs=rate_hz)
-    u, y = (lfilter(*high_pass, one - one[0]) for one in (command_pa, contraction_m))
-
-    def discrete(logs: FloatArray) -> tuple[FloatArray, FloatArray]:
-        lag_s, rate, damping = np.exp(logs)
-        numerator, denominator, _ = cont2discrete(
-            ([rate ** 2 / pa_per_m],
-             np.polymul([lag_s, 1.0], [1.0, 2.0 * damping * rate, rate ** 2])), 1.0 / rate_hz)
-        return numerator.ravel(), denominator
+    # Both in metres: next to a denominator of order one, a numerator in m/Pa drowns in rounding.
+    u, y = (lfilter(*high_pass, one - one[0]) for one in (command_pa / pa_per_m, contraction_m))
+    spread = np.std(y)
 
     best = None
     for delay in range(round(MAX_DELAY_S * rate_hz) + 1):
         late = np.r_[np.zeros(delay), u][:u.size]
         found = least_squares(
-            lambda logs, late=late: (lfilter(*discrete(logs), late) - y) / np.std(y),
-            np.log(_STARTS), max_nfev=_EVALUATIONS)
+            lambda logs, late=late: (
+                lfilter(*_lag_and_mass(np.exp(logs), rate_hz), late) - y) / spread,
+            np.log(_STARTS), bounds=(np.log(_LOWEST), np.log(_HIGHEST)),
+            diff_step=_DIFF_STEP, max_nfev=_EVALUATIONS)
         if best is None or found.cost < best[0]:
             best = found.cost, delay, found.x
     assert best is not None
-    numerator, denominator = discrete(best[2])
+    numerator, denominator = _lag_and_mass(np.r_[np.exp(best[2][:3]), 1.0], rate_hz)
     return LinearModel(
-        rate_hz, best[1], tuple(denominator[1:].tolist()), tuple(numerator[1:].tolist()),
-        0.0, 0.0, 1.0 - 2.0 * float(best[0]) / y.size)
+        rate_hz, best[1], tuple(denominator[1:].tolist()),
+        tuple((numerator[1:] / pa_per_m).tolist()), 0.0, 0.0, 1.0 - 2.0 * float(best[0]) / y.size)
+
+
+def _lag_and_mass(values: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArray]:
+    """
+    Return (numerator, denominator) of lag [s], rate [rad/s], damping and gain, input held a tick.
+
+    ``scipy.signal.cont2discrete`` gives the same, but the numerator as a difference of two
+    polynomials, which leaves too few digits of it for the differences of a fit.
+    """
+    from scipy.linalg import expm
+    lag_s, rate, damping, gain = values
+    # State: pressure behind the lag, contraction, its speed over the rate; last the input.
+    held = expm(np.array([
+        [-1.0 / lag_s, 0.0, 0.0, 1.0 / lag_s],
+        [0.0, 0.0, rate, 0.0],
+        [rate, -rate, -2.0 * damping * rate, 0.0],
+        [0.0, 0.0, 0.0, 0.0]]) / rate_hz)
+    advance, arriving = held[:3, :3], held[:3, 3]
+    contraction = np.array([0.0, 1.0, 0.0])
+    pulse = np.array([contraction @ np.linalg.matrix_power(advance, k) @ arriving
+                      for k in range(3)])
+    root = np.sqrt(complex(damping ** 2 - 1.0))
+    denominator = np.real(np.poly(np.exp(np.array([
+        -1.0 / lag_s, rate * (-damping + root), rate * (-damping - root)]) / rate_hz)))
+    numerator = gain * np.convolve(denominator, pulse)[:3]
+    return np.r_[0.0, numerator], denominator
 
 
 def _observer(model: LinearModel, disturbance_pa: float, noise_m: float) -> FloatArray:

@@ -87,12 +87,14 @@ LQI_AXES = (
     Axis('command_weight', 1e-5, 10.0),
     Axis('disturbance_pa', 1.0, 1e5),
 )
+# Of disturbance and noise only the ratio counts, so the noise stays. With a smaller weight of the
+# changes or a faster disturbance, sines are tracked as well, but the command is so restless that a
+# muscle comes back late from venting.
 MPC_AXES = (
     Axis('lead_s', 0.0, 0.2, log=False),
     Axis('command_weight', 1e-5, 10.0),
-    Axis('change_weight', 1e-6, 10.0),
-    Axis('disturbance_pa', 1.0, 1e5),
-    Axis('noise_m', 1e-6, 1e-3),
+    Axis('change_weight', 4.0, 1e3),
+    Axis('disturbance_pa', 10.0, 3000.0),
 )
 
 AXES_OF = {'lqi': LQI_AXES, 'ilc': ILC_AXES, 'mpc': MPC_AXES}

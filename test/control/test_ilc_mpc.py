@@ -174,15 +174,20 @@ def test_a_plan_beyond_a_bound_is_the_best_one_within():
     assert st.plan_pa == pytest.approx(best, abs=20.0)
 
 
-def test_identification_finds_delay_lag_and_mass():
+@pytest.mark.parametrize('starts', [mpc_gains._STARTS, (0.15, 12.0, 0.9, 0.6)])
+def test_identification_finds_delay_lag_and_mass_from_any_start(starts, monkeypatch):
+    """And the gain at rest is that of the static inverse, whatever the record lacks of it."""
+    monkeypatch.setattr(mpc_gains, '_STARTS', starts)
     model = model_of_lag_and_mass()
     random = np.random.default_rng(0)
     command = np.repeat(random.uniform(-4e4, 4e4, 60), 60)
-    moved = model.simulate(command)
+    moved = 0.014 + 0.8 * (model.simulate(command) - 0.014)
     _, slope = mpc_gains.equivalent_pa(INVERSE, 4e5, 0.014)
     found = mpc_gains.identify_lag_and_mass(command, moved, RATE_HZ, slope)
-    assert found.delay_ticks == model.delay_ticks and found.fit > 0.99
-    assert found.denominator == pytest.approx(model.denominator, rel=0.02)
+    assert found.delay_ticks == model.delay_ticks and found.fit > 0.9999
+    assert found.denominator == pytest.approx(model.denominator, rel=1e-4)
+    assert found.numerator == pytest.approx(model.numerator, rel=1e-3)
+    assert found.gain_m_per_pa == pytest.approx(1.0 / slope)
 
 
 def test_text_and_mistakes():
