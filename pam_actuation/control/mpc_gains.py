@@ -57,8 +57,8 @@ DRIFT_HZ = 0.3                            # corner of the high-pass
 _STARTS = 0.05, 30.0, 0.3, 1.0
 _LOWEST = 1e-3, 3.0, 0.01, 0.05
 _HIGHEST = 2.0, 500.0, 10.0, 20.0
-# Difference step of the fit, of a logarithm. The residuals are rounded at 1e-12 of them, so a
-# slope is right to 1e-6; and they bend so little over the step that it is right to 1e-6 there too.
+# Difference step of the fit, of a logarithm: far above rounding, and small enough for a slope.
+# From the default of SciPy up to 1e-4 it ends at the same model.
 _DIFF_STEP = 1e-6
 _EVALUATIONS = 50
 MODEL = record(
