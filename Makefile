@@ -53,6 +53,7 @@ clean:
 	rm -rf $(VENV) build install log *.egg-info .pytest_cache
 
 # A name on the PATH proves nothing (version managers put stubs there), so each candidate is run.
+# One within the environment would be deleted with it, so the interpreter behind it is used.
 $(STAMP): setup.py pyproject.toml
 	@found=''; \
 	for python in $(if $(PYTHON),'$(PYTHON)',python3.12 python3.11 python3 python); do \
@@ -66,6 +67,7 @@ $(STAMP): setup.py pyproject.toml
 	  echo '$(if $(PYTHON),(PYTHON=$(PYTHON) is not one or does not start).,(on Debian and Ubuntu: apt install python3-venv). Name one with: make PYTHON=/path/to/python3.12)' >&2; \
 	  exit 1; \
 	fi; \
+	found="$$("$$found" -c 'import sys; print(sys._base_executable)')"; \
 	echo "Creating the environment $(VENV) with $$("$$found" --version) (once; needs a network or a pip cache)"; \
 	rm -rf '$(VENV)' && "$$found" -m venv '$(VENV)' \
 	&& '$(BIN)/python' -m pip install --quiet --disable-pip-version-check --editable '.[ros,test]' \
