@@ -32,6 +32,7 @@ from pam_actuation.campaign.campaign import Task, work_and_keep
 from pam_actuation.campaign.store import CASES
 from pam_actuation.workers import Workers
 from pam_actuation.workers.calls import call, packed
+from pam_sim.errors import InputError
 from pam_sim.files import UNFINISHED
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -181,12 +182,7 @@ def ray_cluster(size):
             start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
             env={**os.environ, 'PYTHONPATH': f'{ROOT}:{ROOT / "benchmarks"}'})
         try:
-            until = time.monotonic() + 120.0
-            while time.monotonic() < until:
-                with contextlib.suppress(OSError), socket.create_connection(
-                        ('127.0.0.1', client), 1.0):
-                    break
-                time.sleep(0.5)
+            _until_it_answers(f'ray://127.0.0.1:{client}')
             yield f'ray://127.0.0.1:{client}'
         finally:
             process.terminate()
@@ -194,6 +190,19 @@ def ray_cluster(size):
                 process.wait(30)
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
+
+
+def _until_it_answers(address):
+    """Wait for a Ray cluster: its port is open some time before it takes clients."""
+    until = time.monotonic() + 120.0
+    while True:
+        try:
+            with Workers(1, address):
+                return
+        except InputError:
+            if time.monotonic() > until:
+                raise
+        time.sleep(1.0)
 
 
 def free_port():
