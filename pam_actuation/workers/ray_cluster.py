@@ -16,6 +16,7 @@
 
 from collections.abc import Callable, Iterable, Iterator
 import contextlib
+import time
 from typing import Any
 
 from pam_actuation.workers.calls import call, packed, THREADS, warm_up
@@ -25,6 +26,8 @@ from pam_sim.errors import InputError
 NO_CLIENT = ('needs the client of Ray, which `ray` alone does not bring: '
              'pip install "pam_actuation[ray]"')
 TRIES_AGAIN = 3     # of a task whose worker was lost
+# A busy cluster may fail to start the process that serves a client, and do it a moment later.
+CONNECTS, BETWEEN_S, NOT_YET = 5, 1.0, 'Initialization failure'
 
 
 class RayCluster:
@@ -53,16 +56,21 @@ class RayCluster:
                 'needs Ray: pip install "pam_actuation[ray]", here and on the workers',
                 'cluster') from None
         engine: Any = ray       # whatever of its types this version tells
-        try:
-            engine.init(address, log_to_driver=False, logging_level='ERROR', runtime_env={
-                'env_vars': {THREADS: '1', 'OPENBLAS_NUM_THREADS': '1'}})
-        except ImportError:     # raised where the address is first looked at
-            raise InputError(NO_CLIENT, 'cluster') from None
-        except (ConnectionError, OSError, ValueError) as error:
-            if 'ray[client]' in str(error):
+        for tried in range(1, CONNECTS + 1):
+            try:
+                engine.init(address, log_to_driver=False, logging_level='ERROR', runtime_env={
+                    'env_vars': {THREADS: '1', 'OPENBLAS_NUM_THREADS': '1'}})
+                break
+            except ImportError:     # raised where the address is first looked at
                 raise InputError(NO_CLIENT, 'cluster') from None
-            raise InputError(
-                f'no Ray cluster answers at {address}: {error}', 'cluster') from None
+            except (ConnectionError, OSError, ValueError) as error:
+                if 'ray[client]' in str(error):
+                    raise InputError(NO_CLIENT, 'cluster') from None
+                if tried == CONNECTS or NOT_YET not in str(error):
+                    why = str(error).partition('\n')[0]
+                    raise InputError(
+                        f'no Ray cluster answers at {address}: {why}', 'cluster') from None
+            time.sleep(BETWEEN_S)
         self._ray, self._address, self._modules = engine, address, modules
         self._call = engine.remote(_warm_call).options(max_retries=TRIES_AGAIN, num_cpus=1)
 
