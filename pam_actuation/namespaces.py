@@ -18,6 +18,7 @@ Namespaces and full names of nodes, however the user writes them, in the one for
 ``muscle``, ``/muscle`` and ``/muscle/`` all mean ``/muscle``. Needs no ROS.
 """
 
+from collections.abc import Iterable
 import re
 
 from pam_sim.errors import InputError
@@ -48,6 +49,18 @@ def namespace_of(text: str, where: str = 'namespace') -> str:
     if len(namespace) > LONGEST:
         raise InputError(f'has {len(namespace)} characters, allowed are {LONGEST}', where)
     return namespace
+
+
+def lies_in(namespace: str, other: str) -> bool:
+    """Return whether a namespace is another one or lies below it; all lie in the root, ''."""
+    return f'{namespace}/'.startswith(f'{other}/')
+
+
+def outermost(namespaces: Iterable[str]) -> list[str]:
+    """Return the namespaces that lie below no other of them, in order: of joints, not muscles."""
+    given = list(namespaces)
+    return [one for one in given
+            if not any(other != one and lies_in(one, other) for other in given)]
 
 
 def launch_namespace(text: str) -> str:

@@ -14,7 +14,8 @@
 """Test that a namespace means the same in every form, and that wrong ones are one sentence."""
 
 from pam_actuation.cli.main import main
-from pam_actuation.namespaces import launch_namespace, LONGEST, namespace_of, node_name_of
+from pam_actuation.namespaces import (
+    launch_namespace, lies_in, LONGEST, namespace_of, node_name_of, outermost)
 from pam_actuation.nodes.arguments import in_order
 from pam_actuation.rigging import layouts
 from pam_actuation.rigging.plan import make_plan
@@ -36,6 +37,13 @@ def test_every_form_is_the_same(text):
                for node in layouts.exo(text))
     assert in_order(['--ros-args', '-r', f'__ns:={text}', '-r', f'it:__ns:={text}']) == [
         '--ros-args', '-r', '__ns:=/leg/flexor', '-r', 'it:__ns:=/leg/flexor']
+
+
+def test_a_muscle_of_a_joint_lies_in_the_joint():
+    assert lies_in('/knee/flexor', '/knee') and lies_in('/knee', '/knee') and lies_in('/knee', '')
+    assert not lies_in('/knee', '/knee/flexor') and not lies_in('/knee_2', '/knee')
+    assert outermost(['/arm', '/knee', '/knee/flexor', '/knee_2']) == ['/arm', '/knee', '/knee_2']
+    assert outermost(['', '/muscle']) == ['']
 
 
 def test_the_recorder_that_is_awaited_is_named_as_it_is(tmp_path):

@@ -17,6 +17,7 @@
 from typing import TYPE_CHECKING
 
 from pam_actuation.messages import Marker
+from pam_actuation.namespaces import lies_in
 from pam_actuation.topics.codec import decode
 from pam_actuation.topics.table import BY_NAME, MARKER, short_name
 from pam_sim.errors import InputError
@@ -48,7 +49,7 @@ def markers_of(bag: 'Bag', namespace: str | None = None) -> list[tuple[str, Mark
     for name, topic in bag.topics.items():
         place = name.rpartition('/')[0]
         if not is_marker(name, topic.type_name, topic.encoding) or not (
-                namespace is None or f'{namespace}/'.startswith(f'{place}/')):
+                namespace is None or lies_in(namespace, place)):
             continue
         for raw in topic.payloads:
             try:

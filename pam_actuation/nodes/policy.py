@@ -25,6 +25,7 @@ stop and reset.
 from collections.abc import Iterable
 import xml.etree.ElementTree as ElementTree
 
+from pam_actuation.namespaces import outermost
 from pam_actuation.nodes.interfaces import Inspector, OF_EVERY_NODE
 from pam_actuation.rigging.client import NAME
 from pam_actuation.rigging.node_spec import NodeSpec
@@ -85,9 +86,8 @@ def policy(nodes: Iterable[NodeSpec]) -> str:
     _allow(operator, 'topic', 'subscribe', ('/diagnostics',))
     _allow(operator, 'service', 'request', offered)
     page = _profile(enclaves, '/', PAGE)
-    places = {node.namespace for node in nodes}
-    marked = [f'{place}/{MARKER}' for place in sorted(places)
-              if not any(place.startswith(f'{other}/') for other in places)]
+    marked = [f'{place}/{MARKER}'
+              for place in outermost(sorted({node.namespace for node in nodes}))]
     _allow(page, 'topic', 'publish', marked)
     _allow(page, 'topic', 'subscribe', ('/diagnostics', *drawn, *marked))
     _allow(page, 'service', 'request', [

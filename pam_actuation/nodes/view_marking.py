@@ -18,6 +18,7 @@ import time
 from typing import Any
 
 from pam_actuation.messages import Marker
+from pam_actuation.namespaces import lies_in, outermost
 from pam_actuation.nodes import qos
 from pam_actuation.nodes.ros_messages import class_of
 from pam_actuation.topics.codec import Writer
@@ -86,8 +87,5 @@ class Marking:
 
     def _rigs(self, view: str) -> list[str]:
         """Return the namespaces of joints, and of muscles alone, that belong to a view."""
-        found = self._store.namespaces()
-        rigs = [one for one in found
-                if not any(one.startswith(f'{other}/') for other in found)]
-        return [one for one in rigs if f'{one}/'.startswith(f'{view}/')
-                or f'{view}/'.startswith(f'{one}/')] if view else rigs
+        return [rig for rig in outermost(self._store.namespaces())
+                if lies_in(rig, view) or lies_in(view, rig)]

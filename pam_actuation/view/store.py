@@ -21,6 +21,7 @@ from typing import Any, Final
 
 import numpy as np
 from pam_actuation.messages import Marker, Status
+from pam_actuation.namespaces import lies_in
 from pam_actuation.view.history import History
 from pam_actuation.view.plots import DERIVED, Difference, DIFFERENCES, KEPT, Signal, SIGNALS
 from pam_sim.annotations import FloatArray, IntArray
@@ -184,7 +185,7 @@ class Store:
         """Return all signals with values in a namespace and in those below it, in order."""
         with self.lock:
             chosen = [one for one in self.namespaces()
-                      if one == view or not view or one.startswith(f'{view}/')]
+                      if lies_in(one, view)]
             return [Line(namespace, signal) for namespace in chosen for signal in SIGNALS
                     if signal.value in self._drawn.get(_key(namespace, signal), ())]
 
