@@ -47,11 +47,11 @@ def run(args: argparse.Namespace) -> int:
     from pam_sim.errors import InputError
     with operators(args) as opened:
         rows = _rows(opened, args.wait, args.name)
-        running = sorted(name for one in opened for name in one.nodes())
-    if not rows and args.name is not None and running:
-        raise InputError(f'no such node; running are {", ".join(running)}', args.name)
-    if not rows:
-        raise InputError(nobody(opened, 'node of a rig'))
+        if not rows:
+            running = sorted(name for one in opened for name in one.nodes())
+            if args.name is not None and running:
+                raise InputError(f'no such node; running are {", ".join(running)}', args.name)
+            raise InputError(nobody(opened, 'node of a rig'))
     several = len({row['domain_id'] for row in rows}) > 1
     text = []
     wide = max(len(row['node']) for row in rows)
