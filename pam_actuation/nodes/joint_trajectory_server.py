@@ -84,7 +84,7 @@ class JointTrajectoryServer(ManagedNode):
         self._lock = threading.Lock()
         self._current: _Followed | None = None
         self._held: tuple[JointGoal, int] | None = None     # and until when
-        self._counts = {'goals': 0, 'reached': 0}
+        self._counts = {'goals': 0, 'goals.reached': 0}
         self._actions = _Actions(self)
         self.add_loop(PERIOD_S)
 
@@ -123,7 +123,7 @@ class JointTrajectoryServer(ManagedNode):
                 self._current = None
                 self._held = standing, now_ns + round(hold_s * 1e9)
                 self.send('joint_trajectory', standing.ahead(now_ns))
-        self._counts['reached'] += outcome.code == SUCCESSFUL and outcome.text != CANCELLED
+        self._counts['goals.reached'] += outcome.code == SUCCESSFUL and outcome.text != CANCELLED
         self.diagnostics.update(OK, outcome.text)
         followed.finish(outcome)
 
@@ -156,9 +156,7 @@ class JointTrajectoryServer(ManagedNode):
 
     def diagnostic_values(self) -> Values:
         """Add the number of goals, and of those that were reached."""
-        counts = getattr(self, '_counts', {})
-        return (*super().diagnostic_values(), *(
-            (f'goals.{key}' if key != 'goals' else key, one) for key, one in counts.items()))
+        return (*super().diagnostic_values(), *getattr(self, '_counts', {}).items())
 
 
 class _Followed:

@@ -34,7 +34,6 @@ from rclpy.node import Node
 import yaml
 
 PLAYER: Final = 'reference_generator'
-RECORDER: Final = 'experiment_recorder'
 EXPERIMENT: Final = 'experiment'
 LONGEST_S: Final = 15.0         # for all steps, also on a busy machine
 SERVICES: Final = {'get_state': GetState, 'change_state': ChangeState,

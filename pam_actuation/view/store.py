@@ -20,7 +20,7 @@ import threading
 from typing import Any, Final
 
 import numpy as np
-from pam_actuation.messages import Marker, Status
+from pam_actuation.messages import LEVEL_STALE, Marker, Status
 from pam_actuation.namespaces import lies_in
 from pam_actuation.view.history import History
 from pam_actuation.view.plots import DERIVED, Difference, DIFFERENCES, KEPT, Signal, SIGNALS
@@ -29,7 +29,7 @@ from pam_sim.annotations import FloatArray, IntArray
 SPAN_NS: Final = 60_000_000_000         # of what is kept of a live rig
 RATE_NS: Final = 1_000_000_000          # over which a rate is counted
 MOST_MARKERS: Final = 100               # of a live rig
-STALE, SILENT_AFTER_NS = 3, 2_000_000_000     # nodes speak twice a second
+SILENT_AFTER_NS: Final = 2_000_000_000         # nodes speak twice a second
 Key = tuple[str, str]                   # namespace and short name of a topic
 
 
@@ -248,7 +248,7 @@ def _node(status: Status, now_ns: int | None) -> dict[str, Any]:
     age_ns = 0 if now_ns is None else now_ns - status.stamp_ns
     level, message = status.level, status.message
     if age_ns > SILENT_AFTER_NS:
-        level = STALE
+        level = LEVEL_STALE
         message = f'silent for {age_ns * 1e-9:.0f} s; last: {message}'
     return {'name': status.name, 'level': level, 'message': message,
             'values': dict(status.values)}
