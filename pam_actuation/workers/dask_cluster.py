@@ -17,7 +17,6 @@
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
 import contextlib
-import math
 import time
 from typing import Any
 
@@ -66,7 +65,6 @@ class DaskCluster:
                 warm_up(*modules)
 
         self._address = address
-        self._size, self._counted_s = 1, -math.inf
         with contextlib.ExitStack() as stack:
             try:
                 self._client = Client(address, timeout=WAIT_S, set_as_default=False)
@@ -87,16 +85,9 @@ class DaskCluster:
 
     @property
     def size(self) -> int:
-        """
-        Return the number of tasks that the workers do at a time, at least one.
-
-        The scheduler is asked every ``LOOKED_S`` at most. ClusterLost where it is gone.
-        """
-        if time.monotonic() - self._counted_s > LOOKED_S:
-            with self._asked():
-                self._size = max(sum(self._client.nthreads().values()), 1)
-            self._counted_s = time.monotonic()
-        return self._size
+        """Return the number of tasks that the workers of now do at a time; ClusterLost if gone."""
+        with self._asked():
+            return max(sum(self._client.nthreads().values()), 1)
 
     def share(self, shared: Any) -> tuple[str, Any]:
         """

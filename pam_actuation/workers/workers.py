@@ -17,7 +17,9 @@
 from collections.abc import Callable, Iterable, Iterator
 import contextlib
 import functools
+import math
 import os
+import time
 from typing import Any, Protocol, Self, TypeVar
 
 import joblib
@@ -28,6 +30,7 @@ from pam_actuation.workers.ray_cluster import RayCluster
 from pam_sim.errors import InputError
 
 PER_WORKER = 3          # tasks of a stream at a cluster, so that none of its workers waits
+COUNTED_S = 2.0         # a cluster is asked how large it is no more often
 Given = TypeVar('Given')
 Item = TypeVar('Item')
 Result = TypeVar('Result')
@@ -170,8 +173,12 @@ class Workers:
                 else:
                     yield item, result
 
+        room, counted_s = 0, -math.inf
         for item in items:
-            while len(under_way) >= pool.size * (PER_WORKER if self.cluster is not None else 1):
+            if time.monotonic() - counted_s > COUNTED_S:    # workers may have come
+                room = pool.size * (PER_WORKER if self.cluster is not None else 1)
+                counted_s = time.monotonic()
+            while len(under_way) >= room:
                 yield from ended()
             under_way[pool.submit(function, given, item)] = item
         while under_way:
