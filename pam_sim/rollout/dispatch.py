@@ -70,20 +70,18 @@ def _hook(hook: str) -> Iterator[str]:
     result = ', '.join(declared.returns)
     users = [name for name, effect in all_effects().items() if hook in effect.hooks]
     named = [name for name in users if name in effects()]
-    if named:
-        yield from _chain(f'_named_{hook}', hook, named)
-    if users != named:
-        yield from _chain(f'_acting_{hook}', hook, users)
-    elif users:
-        yield f'_acting_{hook} = _named_{hook}'
+    # When a chain is called, its name, and whom it calls. Without a term, one serves both levels.
+    chains = [('beyond > NOMINAL', f'_acting_{hook}', users)] if users == named else [
+        ('beyond == TERMS', f'_acting_{hook}', users),
+        ('beyond == EFFECTS', f'_named_{hook}', named)]
+    chains = [one for one in chains if one[2]]
+    for _, name, called in chains:
+        yield from _chain(name, hook, called)
     yield from ('', '', '@inlined', f'def {hook}({given}, beyond, state, par):',
                 f'    """{declared.sentence}"""')
-    passed = f'({given}, state, par)'
-    for function, acting, level in ((f'_acting_{hook}', users, 'TERMS'),
-                                    (f'_named_{hook}', named, 'EFFECTS')):
-        if acting:
-            yield f'    if beyond == {level} and par.used.{hook} > 0.0:'
-            yield f'        {"return " if result else ""}{function}{passed}'
+    for when, name, _ in chains:
+        yield f'    if {when} and par.used.{hook} > 0.0:'
+        yield f'        {"return " if result else ""}{name}({given}, state, par)'
     if result:
         yield f'    return {result}'
 

@@ -176,7 +176,7 @@ def _pack_base(rig: 'Rig', numbers: Numbers, state: FloatArray, par: FloatArray)
         'inverse_rt_kg_per_j': 1.0 / _RT_J_PER_KG,
         'law': law,
         'law_damper': type(muscle.law.law).COMPILED_DAMPER is not None,
-        'beyond_nominal': law != 0.0,
+        'beyond_nominal': layout.EFFECTS if law != 0.0 else layout.NOMINAL,
         'used': 0.0,
     })
     put_some(state, layout.STATE, {
