@@ -15,9 +15,9 @@
 """
 Run every test: the live ones that judge times in two lanes, and beside them all others.
 
-Live nodes wait more than they compute, and the others take what is left of the cores: they have
-a low priority, so that a live process that wakes gets a core at once. Live tests that failed
-while the machine stood still are run once more, with the machine to themselves.
+Live nodes wait more than they compute, and the other tests take the rest of the cores. Those
+have a low priority: a live process that wakes gets a core at once. Live tests that failed while
+the machine stood still are run once more, with the machine to themselves.
 """
 
 import contextlib

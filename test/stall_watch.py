@@ -15,9 +15,9 @@
 """
 Whether the machine stood still while a live test ran.
 
-A live rig vents within 0.1 s of silence; where a busy host takes the processors away for
-that long it vents rightly, and the test that expected it to go on fails without a fault in
-the code. A process beside the tests writes down every such moment.
+A live rig vents within 0.1 s of silence. Where a busy host takes the processors away for that
+long, it vents rightly. A test that expected it to go on then fails without a fault in the code.
+A process beside the tests writes down every such moment.
 """
 
 import os

@@ -190,9 +190,9 @@ def physics_step(signal_0: float, signal_1: float, external: float, x_target: fl
     """
     Advance valve, muscle and load by one physics step.
 
-    Dry friction is held at its level and direction during the step; where the
-    velocity changes sign, the instant is located and the mass sticks if the
-    friction can hold it there.
+    Dry friction is held at its level and direction during the step. Where the
+    velocity changes sign, the instant is located. The mass sticks there if the
+    friction can hold it.
     """
     h = par.substep_s
     g = 0.5 * h
