@@ -17,6 +17,7 @@ Campaigns: what they find, what a kill costs them, and equal bytes on every kind
     python benchmarks/campaign.py page --work lab         # 200 recordings; again to go on
     python benchmarks/campaign.py kills --work lab        # killed 20 times
     python benchmarks/campaign.py clusters --work lab     # Dask and Ray on this machine
+    python benchmarks/campaign.py losses --work lab       # a worker or the scheduler is lost
     python benchmarks/campaign.py tune                    # the costs of a generation, two ways
 
 With --write each part goes into docs/results/campaign.md. `page` records and answers what is
@@ -63,16 +64,17 @@ EXPERIMENTS = ('tuning_quarter_hz', 'tuning_half_hz', 'tuning_one_hz')
 def command_line():
     """Return the parser of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.strip().split('\n\n')[0])
-    parser.add_argument('part', choices=('page', 'kills', 'clusters', 'tune'))
+    parser.add_argument('part', choices=('page', 'kills', 'clusters', 'losses', 'tune'))
     parser.add_argument('--work', type=Path, default=Path('lab'),
                         help='recordings and results are kept here (default: lab)')
     parser.add_argument('--jobs', type=int, default=2, help='processes (default: 2)')
     parser.add_argument('--cases', type=int, default=60,
-                        help='recordings of kills and clusters (default: 60)')
+                        help='recordings of kills, clusters and losses (default: 60)')
     parser.add_argument('--ray', action='store_true', help='of clusters: Ray as well')
     parser.add_argument('--kills', type=int, default=20, help='of kills (default: 20)')
     parser.add_argument('--seed', type=int, default=1, help='of the moments of kills')
-    parser.add_argument('--rounds', type=int, default=15, help='of tune (default: 15)')
+    parser.add_argument('--rounds', type=int, default=None,
+                        help='of tune (default: 15) and losses (default: 10)')
     results_page.add_write(parser, 'campaign')
     return parser
 
@@ -80,16 +82,17 @@ def command_line():
 def main():
     """Run one part; return the exit code."""
     args = command_line().parse_args()
+    args.rounds = args.rounds or {'losses': 10}.get(args.part, 15)
     with results_page.printed(args, __file__, args.part):
         if args.part == 'kills':
             return campaign_kills.show(args)
-        if args.part == 'clusters':
-            return campaign_clusters.show(args)
-        return {'page': page, 'tune': tune}[args.part](args)
+        return {'page': page, 'tune': tune, 'clusters': campaign_clusters.show,
+                'losses': campaign_clusters.losses}[args.part](args)
 
 
 def page(args):
     """Record, work on all, compare the page with what was put in; return the exit code."""
+    load = os.getloadavg()[0]
     days = [(rig, day) for day in range(1, lab.DAYS + 1) for rig in range(1, lab.RIGS + 1)]
     with Workers(args.jobs, processes=True) as workers:
         for _, error in tqdm(workers.stream(lab.record_task, args.work / 'lab', days),
@@ -123,8 +126,9 @@ def page(args):
     wall_s, cpu_s = (sum(column) for column in zip(*times))
     print(f'\n{len(times)} recordings took {cpu_s / 60:.1f} min of processor time, '
           f'{cpu_s / len(times):.2f} s each: {cpu_s / 60 / args.jobs:.1f} min on '
-          f'{args.jobs} cores that do nothing else. This machine was shared: they took '
-          f'{wall_s / 60 / args.jobs:.1f} min with {args.jobs} processes of low priority. '
+          f'{args.jobs} cores that do nothing else. '
+          f'{"This machine was shared: they" if load > 1.0 else "They"} took '
+          f'{wall_s / 60 / args.jobs:.1f} min with {args.jobs} processes. '
           f'Comparing them and writing the page took {page_s:.1f} s.')
     return int(not right)
 

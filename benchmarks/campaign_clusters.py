@@ -12,9 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Part `clusters` of `benchmarks/campaign.py`: processes, Dask and Ray on this machine."""
+"""Parts `clusters`, `losses` of `benchmarks/campaign.py`: processes, Dask, Ray on this machine."""
 
 import contextlib
+import dataclasses
 import os
 from pathlib import Path
 import shutil
@@ -56,8 +57,7 @@ def show(args):
     for kind, size in places:
         with {'processes': contextlib.nullcontext, 'Dask': dask, 'Ray': ray_cluster}[kind](
                 *(() if kind == 'processes' else (size,))) as address:
-            out = args.work / f'on_{kind}_{size}'
-            shutil.rmtree(out, ignore_errors=True)
+            out = emptied(args, f'on_{kind}_{size}')
             overhead_s = empty(size, address)
             campaign = work_on_list(listed(args), out, size, address)
         reference = reference or content(out)
@@ -75,14 +75,47 @@ def show(args):
               f'{args.cases * WAIT_S / wall_s / size:.2f} | {1e3 * overhead_s:.2f} | '
               f'{"equal" if same else "differ"} |')
     print('\nEfficiency is the time waited in all, divided by wall clock and number of workers. '
-          f'The machine has {os.cpu_count()} cores and was shared (load average now '
-          f'{os.getloadavg()[0]:.0f}), so loading and hashing cost far more than on a free one. '
+          f'The machine has {os.cpu_count()} cores. '
           'Work that waits shows how tasks are handed to more workers than there are cores. It '
           'cannot show how work that computes shares memory, caches and the file system.')
     model(rows)
-    right &= lost_worker(args, reference)
-    right &= lost_scheduler(args, reference)
     return int(not right)
+
+
+def losses(args):
+    """Lose a worker and a scheduler, again and again; print; return the exit code."""
+    alone = args.work / 'alone'
+    shutil.rmtree(alone, ignore_errors=True)
+    work_on_list(listed(args), alone, args.jobs)
+    reference = content(alone)
+    told = []
+    for number in range(args.rounds):
+        told.append([*lost_worker(args, reference), *lost_scheduler(args, reference)])
+        print(f'{number + 1}: {told[-1]}', file=sys.stderr, flush=True)
+    print(f'{args.cases} recordings, with the stand-in. {args.rounds} rounds. The loss comes '
+          'when two cases are done.\n\n'
+          '| lost, of a Dask cluster of two | ends with | bytes equal to those of local '
+          'processes |\n|---|---|---|')
+    for what, round_ in zip(told[0], zip(*told)):
+        ends = sorted({one.ends for one in round_})
+        print(f'| {what.lost} | {" or ".join(ends)} | '
+              f'{sum(one.same for one in round_)} of {args.rounds} |')
+    return int(not all(one.right for round_ in told for one in round_))
+
+
+@dataclasses.dataclass
+class Loss:
+    """What was lost, what the campaign ended with, and whether both is right."""
+
+    lost: str
+    ends: str
+    same: bool
+    code_right: bool
+
+    @property
+    def right(self):
+        """Return whether bytes and exit code are right."""
+        return self.same and self.code_right
 
 
 def empty(size, address):
@@ -213,9 +246,8 @@ def free_port():
 
 
 def lost_worker(args, reference):
-    """Kill a worker in the middle; print; return whether the bytes are equal."""
-    out = args.work / 'lost_worker'
-    shutil.rmtree(out, ignore_errors=True)
+    """Kill a worker in the middle; return what came of it."""
+    out = emptied(args, 'lost_worker')
     with contextlib.ExitStack() as stack:
         address, _ = stack.enter_context(dask_scheduler(free_port()))
         first, _ = (stack.enter_context(dask_worker(address)) for _ in range(2))
@@ -223,16 +255,12 @@ def lost_worker(args, reference):
         _until(out, 2, process)
         os.killpg(first.pid, signal.SIGKILL)        # it does not come back
         code = process.wait(LONGEST_S)
-    same = content(out) == reference
-    print('\n### Losses\n\n| lost, of a Dask cluster of two | ends with | bytes |\n|---|---|---|\n'
-          f'| a worker | exit code {code} | {"equal" if same else "differ"} |')
-    return same and code == 0
+    return [Loss('a worker', f'exit code {code}', content(out) == reference, code == 0)]
 
 
 def lost_scheduler(args, reference):
-    """Kill the scheduler in the middle and start another one; return whether all is right."""
-    out, port = args.work / 'lost_scheduler', free_port()
-    shutil.rmtree(out, ignore_errors=True)
+    """Kill the scheduler in the middle and start another one, or none; return what came of it."""
+    out, port = emptied(args, 'lost_scheduler'), free_port()
     with contextlib.ExitStack() as stack:
         address, scheduler = stack.enter_context(dask_scheduler(port))
         for _ in range(2):
@@ -244,21 +272,25 @@ def lost_scheduler(args, reference):
         time.sleep(5.0)
         stack.enter_context(dask(2, port))
         code = process.wait(LONGEST_S)
-    ended = content(out) == reference
-    print(f'| the scheduler, started again 5 s later | exit code {code} | '
-          f'{"equal" if ended else "differ"} |')
-    out = args.work / 'no_scheduler'
-    shutil.rmtree(out, ignore_errors=True)
+    again = Loss('the scheduler, started again 5 s later', f'exit code {code}',
+                 content(out) == reference, code == 0)
+    out = emptied(args, 'no_scheduler')
     with dask_scheduler(free_port()) as (address, scheduler), dask_worker(address):
         process = started(args, out, address)
-        _until(out, 1, process)
+        _until(out, 2, process)
         os.killpg(scheduler.pid, signal.SIGKILL)
         gone = process.wait(LONGEST_S)
     resumed = started(args, out).wait(LONGEST_S)
-    same = content(out) == reference
-    print(f'| the scheduler for ever | exit code {gone}; the same command on this machine ends '
-          f'with {resumed} | {"equal" if same else "differ"} |')
-    return ended and same and gone == 1
+    return [again, Loss(
+        'the scheduler for ever',
+        f'exit code {gone}; the same command on this machine ends with {resumed}',
+        content(out) == reference, gone == 1 and resumed == 0)]
+
+
+def emptied(args, name):
+    """Return the folder of a campaign that begins anew."""
+    shutil.rmtree(args.work / name, ignore_errors=True)
+    return args.work / name
 
 
 def _until(folder, count, process):

@@ -38,7 +38,7 @@ _BLOCK = 1 << 20
 @contextlib.contextmanager
 def only_one(folder: Path, what: str, below: Iterable[Path] = ()) -> Iterator[None]:
     """
-    Keep other processes out of a folder, and remove what a killed one left half done.
+    Keep other processes out of a folder; remove what killed ones left half done, and at the end.
 
     Parameters
     ----------
@@ -60,13 +60,22 @@ def only_one(folder: Path, what: str, below: Iterable[Path] = ()) -> Iterator[No
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
             raise InputError(f'another {what} works in this folder', str(folder)) from None
-        for one in (*below, folder):
-            for left in one.glob(f'{UNFINISHED}*'):
-                if left.is_dir():
-                    shutil.rmtree(left, ignore_errors=True)
-                else:
-                    left.unlink(missing_ok=True)
+        folders = (*below, folder)
+        _remove_unfinished(folders)
         yield
+        _remove_unfinished(folders)     # of workers that were lost meanwhile
+
+
+def _remove_unfinished(folders: Iterable[Path]) -> None:
+    """Remove what was begun and not ended; whoever still works on it cannot keep it."""
+    for left in [left for one in folders for left in one.glob(f'{UNFINISHED}*')]:
+        if left.is_dir():
+            # Renamed first: a folder is there for its worker as a whole or not at all.
+            with contextlib.suppress(OSError):
+                left = left.rename(left.with_name(f'{left.name}-removed'))
+            shutil.rmtree(left, ignore_errors=True)
+        else:
+            left.unlink(missing_ok=True)
 
 
 @contextlib.contextmanager
@@ -77,12 +86,16 @@ def kept_folder(parent: Path, name: str) -> Iterator[Path]:
     Raises
     ------
     InputError
-        The system refuses to rename it.
+        The system refuses to rename it, or it was removed meanwhile (``only_one``).
 
     """
     folder = Path(tempfile.mkdtemp(prefix=UNFINISHED, dir=parent))
+    opened = os.open(folder, os.O_RDONLY)       # keeps its number from being given again
     try:
         yield folder
+        # Where it was removed, a writer of files may have made it anew without the first ones.
+        if not folder.exists() or not os.path.samestat(os.fstat(opened), os.stat(folder)):
+            raise InputError('was removed while it was filled, by another run', str(folder))
         os.chmod(folder, 0o755)
         for path in folder.rglob('*'):
             if path.is_file():
@@ -95,6 +108,7 @@ def kept_folder(parent: Path, name: str) -> Iterator[Path]:
             if not (parent / name).is_dir():
                 raise cannot_write(parent / name, error) from None
     finally:
+        os.close(opened)
         shutil.rmtree(folder, ignore_errors=True)
 
 

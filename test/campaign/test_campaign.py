@@ -31,7 +31,7 @@ from pam_actuation.experiments.offline import simulate_experiment
 from pam_actuation.kept_folders import kept_folder
 from pam_sim import load_rig
 from pam_sim.errors import InputError
-from pam_sim.files import UNFINISHED
+from pam_sim.files import UNFINISHED, write_json, write_text
 import pytest
 
 MODEL = 'dmsp_5_300_hanging_mass'
@@ -162,7 +162,21 @@ def test_what_a_kill_left_half_done_is_removed(tmp_path):
         with pytest.raises(InputError, match='cannot be written'), \
                 kept_folder(store.cases, 'gone/key') as folder:
             (folder / 'case.json').write_text('{}')
+        # As a worker of a cluster leaves it that is killed while the campaign goes on.
+        (store.cases / f'{UNFINISHED}lost').mkdir()
     assert [path.name for path in store.cases.iterdir()] == ['key']
+
+
+def test_a_slow_worker_of_a_killed_campaign_keeps_no_half_case(tmp_path):
+    store = Store(tmp_path)
+    store.cases.mkdir()
+    with pytest.raises(InputError, match='removed while it was filled'), \
+            kept_folder(store.cases, 'key') as folder:
+        write_text(folder / 'report.txt', 'early')
+        with store.locked():    # the campaign, started again
+            pass
+        write_json(folder / 'case.json', {'verdict': 'no_gap'})     # makes the folder anew
+    assert not list(store.cases.iterdir()) and store.result('key') is None
 
 
 def test_mistakes_are_told_before_any_work(lab, tmp_path, capsys):
