@@ -131,7 +131,7 @@ def model(rows):
     """Print the number of cores up to which more of them are of use, from the overheads."""
     import cloudpickle
     task = Task('0' * 20, one_case())
-    key, _ = packed((Settings('gap'), '/data/campaign/cases'))
+    key, _ = packed((Settings('gap'), '/data/campaign/cases', '0' * 64))
     bytes_of = len(cloudpickle.dumps((call, work_and_keep, key, task)))
     whole_s, rollout_s = CASE_S, ROLLOUT_S
     print('\n### A model of the ceiling\n\nThe scheduler handles tasks one after the other, each '

@@ -19,10 +19,12 @@ import contextlib
 from dataclasses import asdict, dataclass, replace
 import os
 from pathlib import Path
+import platform
 import time
 from typing import Any
 
 from pam_actuation.campaign.cases import Case
+from pam_actuation.campaign.code import code_digest
 from pam_actuation.campaign.store import CASES, key_of, RESULT, Store
 from pam_actuation.campaign.work import NEED_A_MODEL, Settings, work_on
 from pam_actuation.kept_folders import kept_folder
@@ -154,7 +156,8 @@ def _work(todo: dict[str, Task], settings: Settings, store: Store, jobs: int,
                     min(jobs if jobs > 0 else os.cpu_count() or 1, len(todo)), cluster,
                     processes=True, modules=WARM[settings.work]))
                 for task, result in workers.stream(
-                        work_and_keep, (settings, str(store.cases)), list(todo.values())):
+                        work_and_keep, (settings, str(store.cases), code_digest()),
+                        list(todo.values())):
                     done(task.key, result)
                 return
             except (ClusterLost, InputError) as error:
@@ -166,9 +169,14 @@ def _work(todo: dict[str, Task], settings: Settings, store: Store, jobs: int,
             todo.pop(key)       # done, but not told any more
 
 
-def work_and_keep(given: tuple[Settings, str], task: Task) -> tuple[float, float]:
+def work_and_keep(given: tuple[Settings, str, str], task: Task) -> tuple[float, float]:
     """Work on one case and keep it; return wall-clock and processor time [s]. Run by workers."""
-    settings, cases = given
+    settings, cases, code = given
+    if code != code_digest():
+        raise InputError(
+            f'a worker on {platform.node()} has other code than this machine; both need the same '
+            'pam_actuation, NumPy, SciPy, numba, Plotly, and the same effects and laws of your '
+            'own', 'cluster')
     began, used = time.perf_counter(), time.process_time()
     with kept_folder(Path(cases), task.key) as folder:
         try:

@@ -16,7 +16,7 @@
 What a campaign keeps: one folder for each case, there whole or not at all.
 
 A case is known by a key of all that its result depends on: the bytes of the recording, the model,
-the settings, the version. A run that was killed goes on where it stopped.
+the settings, the code. A run that was killed goes on where it stopped.
 """
 
 from collections.abc import Iterator
@@ -27,8 +27,8 @@ import os
 from pathlib import Path
 from typing import Any
 
-from pam_actuation import __version__
 from pam_actuation.campaign.cases import Case
+from pam_actuation.campaign.code import code_digest
 from pam_actuation.campaign.work import Settings
 from pam_actuation.kept_folders import add_files, only_one
 from pam_sim.files import check_folder, make_folder, StrPath
@@ -97,12 +97,17 @@ def key_of(case: Case, settings: Settings, model_text: str) -> str:
     settings : Settings
         What is asked of it.
     model_text : str
-        The model as YAML, '' without one.
+        The model as YAML or the name of a preset, '' without one.
+
+    Raises
+    ------
+    InputError
+        As ``code_digest``.
 
     """
     digest = hashlib.sha256()
     options = {name: value for name, value in vars(settings).items() if name != 'model'}
-    for part in (__version__, model_text, json.dumps(options, sort_keys=True),
+    for part in (code_digest(), model_text, json.dumps(options, sort_keys=True),
                  case.namespace or ''):
         digest.update(part.encode() + b'\0')
     add_files(digest, case.path, lambda file, error: str(error.errno).encode())

@@ -16,12 +16,17 @@
 
 import json
 import os
+from pathlib import Path
+import shutil
 import signal
 import subprocess
 import sys
 
-from pam_actuation.campaign.campaign import run_campaign
+import pam_actuation
+from pam_actuation.campaign import code, store
+from pam_actuation.campaign.campaign import run_campaign, Task, work_and_keep
 from pam_actuation.campaign.cases import Case, find_cases
+from pam_actuation.campaign.code import code_digest
 from pam_actuation.campaign.results import NO_PARQUET, table_rows, write_table
 from pam_actuation.campaign.store import key_of, Store
 from pam_actuation.campaign.work import Settings
@@ -29,6 +34,7 @@ from pam_actuation.cli.main import main
 from pam_actuation.experiments import load_experiment
 from pam_actuation.experiments.offline import simulate_experiment
 from pam_actuation.kept_folders import kept_folder
+import pam_sim
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.files import UNFINISHED, write_json, write_text
@@ -127,7 +133,7 @@ def test_a_table_has_a_row_for_each_size(done, lab, tmp_path, monkeypatch):
     assert remark == NO_PARQUET and path.read_text().count('\n') == 3
 
 
-def test_the_key_is_of_recording_model_and_settings(lab, tmp_path):
+def test_the_key_is_of_recording_model_settings_and_code(lab, tmp_path, monkeypatch):
     case, other = find_cases(lab)
     key = key_of(case, Settings('gap'), 'model')
     assert key == key_of(case, Settings('gap', model='said elsewhere'), 'model')
@@ -136,6 +142,39 @@ def test_the_key_is_of_recording_model_and_settings(lab, tmp_path):
                 key_of(case, Settings('report'), 'model'),
                 key_of(case, Settings('gap', materiality=2.0), 'model')}) == 5
     assert key_of(Case(str(tmp_path / 'gone'), 'r', 'd', 0.0), Settings('gap'), '') != key
+    (tmp_path / 'my_own.py').write_text('EFFECT = None')
+    monkeypatch.setenv('PAM_EFFECTS_PATH', str(tmp_path))
+    monkeypatch.setattr(store, 'code_digest', code_digest.__wrapped__)
+    assert key_of(case, Settings('gap'), 'model') != key
+
+
+def test_the_code_is_that_of_what_works_on_recordings(tmp_path):
+    digests = [code.digest_of([tmp_path / 'pam'], [], [])]
+    for name, text, counts in (
+            ('gap/search.py', '1', True), ('gap/search.py', '2', True), ('a.yaml', '1', True),
+            ('cli/main.py', '1', False), ('gap/__pycache__/search.pyc', '1', False)):
+        path = tmp_path / 'pam' / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+        digests.append(code.digest_of([tmp_path / 'pam'], [], []))
+        assert (digests[-1] != digests[-2]) == counts, name
+    shutil.copytree(tmp_path / 'pam', tmp_path / 'elsewhere' / 'pam')
+    assert code.digest_of([tmp_path / 'elsewhere' / 'pam'], [], []) == digests[-1]
+    assert code.digest_of([tmp_path / 'pam'], [], ['numpy 3']) != digests[-1]
+    # What is left out is imported by nothing that counts.
+    for package in (pam_actuation, pam_sim):
+        folder = Path(package.__file__).parent
+        for path in folder.rglob('*.py'):
+            if path.relative_to(folder).parts[0] not in (*code.LEFT_OUT, 'demo.py'):
+                for name in code.LEFT_OUT:
+                    assert f'pam_actuation.{name}' not in path.read_text(), path
+
+
+def test_a_worker_with_other_code_is_refused(lab, tmp_path):
+    case, _ = find_cases(lab)
+    with pytest.raises(InputError, match='has other code'):
+        work_and_keep((Settings('gap'), str(tmp_path), 'other'), Task('key', case))
+    assert not list(tmp_path.iterdir())
 
 
 def test_what_a_kill_left_half_done_is_removed(tmp_path):
