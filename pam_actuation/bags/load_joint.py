@@ -54,8 +54,7 @@ def load_recording(path: str | os.PathLike[str], namespace: str | None = None,
     """
     bag = read_bag(path, recover=recover, wanted=lambda *topic: (
         _is_of_rig(*topic) or is_marker(*topic)))
-    joints = [name.rpartition('/')[0] for name, topic in bag.topics.items()
-              if short_name(name) == MEASURED and is_joint_topic(topic)]
+    joints = joints_of(bag)
     if namespace is not None:
         joints = [joint for joint in joints if joint.strip('/') == namespace.strip('/')]
     if not joints:
@@ -74,6 +73,12 @@ def load_recording(path: str | os.PathLike[str], namespace: str | None = None,
     return RecordedRun(topics=topics, metadata=bag.experiment, namespace=joints[0],
                        path=str(path), remarks=tuple(remarks),
                        markers=tuple(one for _, one in markers_of(bag, joints[0])))
+
+
+def joints_of(bag: Bag) -> list[str]:
+    """Return the namespaces of the joints of a bag, those with a measured angle."""
+    return [name.rpartition('/')[0] for name, topic in bag.topics.items()
+            if short_name(name) == MEASURED and is_joint_topic(topic)]
 
 
 def _check_no_half_joint(bag: Bag, path: str | os.PathLike[str]) -> None:

@@ -31,6 +31,7 @@ from pam_actuation.kept_folders import kept_folder
 from pam_actuation.workers import ClusterLost, WorkerLost, Workers
 from pam_sim.errors import InputError
 from pam_sim.files import StrPath, write_json
+from pam_sim.joint.parameters import SIDES
 
 FAILED = 'failed'
 WARM = {'gap': ('pam_actuation.report.gap',), 'identify': ('pam_actuation.report.identify',),
@@ -121,9 +122,9 @@ def run_campaign(cases: Sequence[Case], settings: Settings, out: StrPath, jobs: 
     Workers(cluster=cluster)        # refuses what is no address, before anything is written
     store = Store(out)
     with store.locked():
-        keys = [key_of(case, settings, texts[case.model]) for case in cases]
-        todo = {key: Task(key, replace(case, model=texts[case.model]))
-                for key, case in zip(keys, cases) if store.result(key) is None}
+        keys = [key_of(case, settings, text) for case, text in zip(cases, texts)]
+        todo = {key: Task(key, replace(case, model=text))
+                for key, case, text in zip(keys, cases, texts) if store.result(key) is None}
         lost: dict[str, str] = {}
         count, known = len(todo), len(set(keys)) - len(todo)
         progress(known)
@@ -189,24 +190,35 @@ def work_and_keep(given: tuple[Settings, str, str], task: Task) -> tuple[float, 
     return time.perf_counter() - began, time.process_time() - used
 
 
-def _with_models(cases: Sequence[Case], settings: Settings) -> tuple[Settings, dict[str, str]]:
+def _with_models(cases: Sequence[Case], settings: Settings) -> tuple[Settings, list[str]]:
     """
-    Return the settings, and for each model that cases name what workers are given of it.
+    Return the settings, and for each case what workers are given of its model.
 
     A preset stays a name, since it takes the valve of the recording; a file becomes its text.
+    Of the model of a joint, a case is given its own muscle.
     """
-    from pam_sim import load_rig, preset_names
-    texts: dict[str, str] = {}
-    for name in {case.model for case in cases}:
-        model = name or settings.model
-        if settings.work not in NEED_A_MODEL:
-            texts[name] = ''
-            continue
-        if not model:
-            raise InputError('no model to hold the recordings against', '--model')
-        text = load_rig(model).to_yaml()
-        texts[name] = model if model in preset_names() else text
-    return replace(settings, model=''), texts
+    from pam_sim import preset_names
+    from pam_sim.joint import joint_preset_names, JointRig, load_rig_or_joint
+    kept = replace(settings, model='')
+    if settings.work not in NEED_A_MODEL:
+        return kept, [''] * len(cases)
+    named = [case.model or settings.model for case in cases]
+    if '' in named:
+        raise InputError('no model to hold the recordings against', '--model')
+    rigs = {name: load_rig_or_joint(name) for name in dict.fromkeys(named)}
+    texts = []
+    for case, name in zip(cases, named):
+        rig, side = rigs[name], (case.namespace or '').rpartition('/')[2]
+        if not isinstance(rig, JointRig):
+            texts.append(name if name in preset_names() else rig.to_yaml())
+        elif f'{side}/' not in rig.muscles:
+            raise InputError(
+                f'is a joint, and {case.namespace or "the only muscle"} in {case.path} is none of '
+                f'its muscles {" and ".join(SIDES)}; name the model of a muscle', name)
+        else:
+            texts.append(f'{name}/{side}' if name in joint_preset_names()
+                         else rig.muscles[f'{side}/'].to_yaml())
+    return kept, texts
 
 
 def plain(row: dict[str, Any]) -> dict[str, Any]:

@@ -15,7 +15,7 @@
 """
 Which recordings a campaign has: those of a folder, or of a list; on which rig and day each was.
 
-A recording of several muscles is a case for each of them.
+A recording of several muscles is a case for each of them, or for each joint.
 """
 
 from collections.abc import Iterator, Sequence
@@ -27,9 +27,11 @@ from pathlib import Path
 import re
 
 from pam_actuation.bags.load import namespaces
+from pam_actuation.bags.load_joint import joints_of
 from pam_actuation.bags.source import Bag, read_bag
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.files import StrPath
+from pam_sim.joint.parameters import SIDES
 
 COLUMNS = ('path', 'rig', 'day', 'namespace', 'model')
 BAG_FILES = ('.mcap', '.db3')
@@ -43,20 +45,20 @@ EPOCH = datetime(1970, 1, 1, tzinfo=timezone.utc)
 @dataclass(frozen=True)
 class Case:
     """
-    One muscle of one recording.
+    One muscle, or one joint, of one recording.
 
     Parameters
     ----------
     path : str
         The bag, absolute.
     rig : str
-        On which rig it was recorded, with the muscle where the bag has several.
+        On which rig it was recorded, with the muscle or joint where the bag has several.
     day : str
         ``2026-11-25`` or ``2026-11-25T09:30``; the running number where no date is known.
     time : float
         The same in days, since 1970 or as the running number.
     namespace : str or None
-        Of the muscle; None where the bag has one only.
+        Of the muscle or joint; None where the bag has one only.
     model : str
         Name or file of its model, '' for that of the campaign.
 
@@ -75,7 +77,8 @@ class Case:
         return f'{self.rig} {self.day}'
 
 
-def find_cases(source: StrPath, without: StrPath | None = None) -> list[Case]:
+def find_cases(source: StrPath, without: StrPath | None = None,
+               joints: bool = False) -> list[Case]:
     """
     Return the cases of a campaign by rig and time.
 
@@ -84,8 +87,12 @@ def find_cases(source: StrPath, without: StrPath | None = None) -> list[Case]:
     source : path
         A folder, with all bags below it; or a list: a text file with a path a line, or a CSV
         file with the columns ``path``, and if wanted ``rig``, ``day``, ``namespace``, ``model``.
+        A path of a list may be a folder as well: its row stands for all bags below it that have
+        the namespace.
     without : path, optional
         A folder that is left out, that of the results.
+    joints : bool
+        Whether a joint is one case, rather than each of its muscles.
 
     Returns
     -------
@@ -100,16 +107,12 @@ def find_cases(source: StrPath, without: StrPath | None = None) -> list[Case]:
     """
     root = Path(source)
     if root.is_dir():
-        folder = root.resolve()
-        listed: list[dict[str, str]] = [
-            {'path': str(path)} for path in _bags_below(folder, without)]
-        if not listed:
-            raise InputError('no bag in this folder or below it', root)
+        folder, listed = root.resolve(), [{'path': '.'}]
     elif root.is_file():
         folder, listed = root.resolve().parent, _listed(root)
     else:
         raise InputError('no such folder or list of recordings', root)
-    cases = [case for row in listed for case in _cases_of(row, folder)]
+    cases = [case for row in listed for case in _cases_of(row, folder, without, joints)]
     return sorted(_dated(cases), key=lambda case: (case.rig, case.time, case.path))
 
 
@@ -161,37 +164,80 @@ def _listed(path: Path) -> list[dict[str, str]]:
     return rows
 
 
-def _cases_of(row: dict[str, str], folder: Path) -> list[Case]:
-    """Return the cases of one recording; those without a date have the time of their stamps."""
+def _cases_of(row: dict[str, str], folder: Path, without: StrPath | None,
+              joints: bool) -> list[Case]:
+    """Return the cases of one row, of a recording or of a folder of recordings."""
     path = folder / row['path']
-    inside = os.path.relpath(path.absolute(), folder)
+    wanted = row.get('namespace', '').strip('/')
+    if not path.is_dir() or row['path'] != '.' and _is_bag(path):
+        bag = _read(path)
+        parts = _parts(bag, joints, wanted)
+        if wanted and not parts:        # told again, as the result of the case
+            parts = [f'/{wanted}']
+        return _cases_of_bag(row, folder, path, bag, parts)
+    paths = list(_bags_below(path.resolve(), without))
+    if not paths:
+        raise InputError('no bag in this folder or below it', path)
+    cases: list[Case] = []
+    for one in paths:
+        bag = _read(one)
+        parts = _parts(bag, joints, wanted)
+        if parts or not wanted:
+            cases += _cases_of_bag(row, folder, one, bag, parts)
+    if not cases:
+        raise InputError(f'no bag in this folder has the namespace /{wanted}', path)
+    return cases
+
+
+def _is_bag(folder: Path) -> bool:
+    return any(one.name == 'metadata.yaml' or one.name.endswith(BAG_FILES)
+               for one in folder.iterdir())
+
+
+def _read(path: Path) -> Bag | None:
+    """Return which topics a bag has; None where it cannot be read, which its case tells."""
     try:
-        bag: Bag | None = read_bag(path, wanted=lambda *of: False)
-    except InputError:      # told again, as the result of the case
-        bag = None
+        return read_bag(path, wanted=lambda *of: False)
+    except InputError:
+        return None
+
+
+def _cases_of_bag(row: dict[str, str], folder: Path, path: Path, bag: Bag | None,
+                  parts: list[str]) -> list[Case]:
+    """Return the cases of one recording; without a date they have the time of its stamps."""
+    inside = os.path.relpath(path.absolute(), folder)
     day = _date(row.get('day') or '') or _date(inside)
     if day is None:
         stamps = [] if bag is None else [
             int(topic.log_time_ns[0]) for topic in bag.topics.values() if len(topic.log_time_ns)]
         day = EPOCH + timedelta(microseconds=min(stamps, default=0) // 1000)
     rig = row.get('rig') or _rig_of(inside)
-    several = [row['namespace']] if row.get('namespace') else _muscles(bag)
     model = row.get('model', '')
     if model and (folder / model).is_file():
         model = str(folder / model)
     time = (day - EPOCH) / timedelta(days=1)
     case = Case(str(path.absolute()), rig, _text(day), time, model=model)
-    return [replace(case, namespace=muscle, rig=f'{rig}{muscle}') for muscle in several] or [case]
+    return [replace(case, namespace=part, rig=f'{rig}{part}') for part in parts] or [case]
 
 
-def _muscles(bag: Bag | None) -> list[str]:
-    """Return the namespaces of a bag with several muscles, else none."""
+def _parts(bag: Bag | None, joints: bool, wanted: str) -> list[str]:
+    """
+    Return the namespaces of the muscles or joints of a bag that are cases by themselves.
+
+    They are those in the namespace ``wanted``; where none is, all if there are several, else none.
+    """
     present = namespaces(bag) if bag is not None else {}
+    found: list[str] = []
     for needed in ({'pressure', 'contraction'}, {'pressure'}, {'contraction'}):
-        found = sorted(name for name, topics in present.items() if needed <= topics)
-        if found:
-            return found if len(found) > 1 else []
-    return []
+        found = found or sorted(name for name, topics in present.items() if needed <= topics)
+    parts = found
+    if joints and bag is not None:
+        whole = {f'{joint}/{side}': joint for joint in joints_of(bag) for side in SIDES}
+        parts = list(dict.fromkeys(whole.get(name, name) for name in found))
+    if wanted:
+        return [one for one in parts if f'{one}/'.startswith(f'/{wanted}/')] or [
+            one for one in found if one == f'/{wanted}']
+    return parts if len(parts) > 1 else []
 
 
 def _rig_of(inside: str) -> str:

@@ -43,7 +43,7 @@ def add_arguments(parser: Parser) -> None:
                         help='what is done with every recording (default: %(default)s)')
     parser.add_argument('--model', '--rig', dest='model', type=source, default=None,
                         metavar='NAME|FILE', help='model of gap and identify, where the list '
-                        'names no other')
+                        'names no other; that of a joint gives each muscle its own')
     parser.add_argument('--effects', type=source, default=None, metavar='A,B',
                         help='names that gap tries (default: all)')
     parser.add_argument('--seconds', type=number(1.0, None, 's'), default=3600.0, metavar='N',
@@ -70,9 +70,10 @@ def run(args: argparse.Namespace) -> int:
     from pam_actuation.campaign.findings import find
     from pam_actuation.campaign.page import campaign_page
     from pam_actuation.campaign.results import PAGE, seen_before, write_results
+    from pam_actuation.campaign.work import NEED_A_MODEL
     from pam_actuation.workers import ClusterLost
     effects = tuple(effect_names(args))
-    cases = find_cases(args.recordings, without=args.out)
+    cases = find_cases(args.recordings, args.out, joints=args.work not in NEED_A_MODEL)
     settings = Settings(args.work, args.model or '', effects, args.seconds, args.materiality,
                         tuple(args.unknown), args.seed)
     try:

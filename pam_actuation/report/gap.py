@@ -51,6 +51,8 @@ from pam_sim.gap.propose.proposal import EFFECT_FILE, MODEL_FILE
 from pam_sim.gap.select.memory import memories
 from pam_sim.gap.subsystems.simulation import free_run
 from pam_sim.identify.before_gap import numbers_block, numbers_first, numbers_text
+from pam_sim.joint import joint_preset_names, load_rig_or_side
+from pam_sim.joint.parameters import SIDES
 from pam_sim.located_yaml import dump_yaml
 from pam_sim.rig import Rig
 
@@ -148,11 +150,18 @@ def may_have_cell(rig: Rig) -> bool:
 
 
 def model_for(run: 'Run', model: 'StrPath | Rig') -> Rig:
-    """Return the rig of a model, with the recorded valve if the model is a preset."""
+    """
+    Return the rig of a model, with the recorded valve if the model is a preset.
+
+    ``JOINT/flexor`` is the one muscle of the preset of a joint.
+    """
     if isinstance(model, Rig):
         return model
-    named = str(model) in preset_names()
-    return load_rig(model, valve=(recorded_valve(run) or None) if named else None)
+    joint, _, side = str(model).rpartition('/')
+    of_joint = side in SIDES and joint in joint_preset_names()
+    named = of_joint or str(model) in preset_names()
+    return (load_rig_or_side if of_joint else load_rig)(
+        model, valve=(recorded_valve(run) or None) if named else None)
 
 
 def save_gap(result: 'GapResult', run: 'Run', out_dir: StrPath, of: str = '') -> None:

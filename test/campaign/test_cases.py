@@ -17,12 +17,18 @@
 from pathlib import Path
 import sys
 
+from pam_actuation.bags.writer import BagWriter
+from pam_actuation.campaign.campaign import _with_models
 from pam_actuation.campaign.cases import find_cases
+from pam_actuation.campaign.work import Settings
+from pam_actuation.topics.codec import encode
+from pam_actuation.topics.table import BY_NAME
+from pam_sim import load_rig
 from pam_sim.errors import InputError
 import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'bags'))
-from sample_bag import write_bag  # noqa: E402, I100
+from sample_bag import plain_numbers, START_NS, write_bag  # noqa: E402, I100
 
 
 @pytest.fixture(scope='module')
@@ -65,6 +71,63 @@ def test_recordings_of_one_time_are_numbered(tmp_path):
         write_bag(tmp_path / name, 20)
     assert [(Path(case.path).name, case.day, case.rig) for case in find_cases(tmp_path)] == [
         ('a', '1', 'rig'), ('b', '2', 'rig')]
+
+
+@pytest.fixture(scope='module')
+def exo(tmp_path_factory):
+    """Return a folder with one bag of two knees, and one of a muscle."""
+    folder = tmp_path_factory.mktemp('exo')
+    with BagWriter(folder / 'runs' / '2026-03-01' / 'walk', {}) as writer:
+        for knee in ('/left_knee', '/right_knee'):
+            for short in ('joint_state', 'flexor/pressure', 'flexor/contraction',
+                          'extensor/pressure', 'extensor/contraction'):
+                place, _, name = f'{knee}/{short}'.rpartition('/')
+                topic = BY_NAME[name]
+                writer.add_topic(topic.full_name(place), topic.type_name)
+                writer.write(topic.full_name(place), encode(name, plain_numbers(topic)),
+                             START_NS, START_NS)
+    write_bag(folder / 'runs' / '2026-03-02' / 'run', 2)
+    return folder
+
+
+MUSCLES = [f'/{knee}/{side}' for knee in ('left_knee', 'right_knee')
+           for side in ('extensor', 'flexor')]
+
+
+def test_a_bag_of_an_exoskeleton_has_four_muscles_or_two_joints(exo):
+    walk = exo / 'runs' / '2026-03-01'
+    assert [case.namespace for case in find_cases(walk)] == MUSCLES
+    # The bag itself is a campaign as well.
+    assert [case.namespace for case in find_cases(walk / 'walk')] == MUSCLES
+    assert [(case.rig, case.namespace) for case in find_cases(walk, joints=True)] == [
+        ('rig/left_knee', '/left_knee'), ('rig/right_knee', '/right_knee')]
+
+
+def test_each_muscle_has_its_model(exo):
+    cases = find_cases(exo / 'runs' / '2026-03-01')
+    knee = 'knee_dmsp_20_300'
+    _, texts = _with_models(cases, Settings('gap', knee))
+    assert texts == [f'{knee}/extensor', f'{knee}/flexor'] * 2
+    own = exo / 'knee.yaml'
+    own.write_text(f'joint: {knee}\nflexor: {{muscle: dmsp_20_300, load: driven, '
+                   'parameters: {damping_n_s_per_m: 250.0}}\n')
+    _, texts = _with_models(cases, Settings('gap', str(own)))
+    assert [load_rig(text).parameters['damping_n_s_per_m'] for text in texts] == [
+        300.0, 250.0, 300.0, 250.0]
+    with pytest.raises(InputError, match='is a joint, and the only muscle in .*run'):
+        _with_models(find_cases(exo / 'runs' / '2026-03-02'), Settings('gap', knee))
+    # Or a list gives each its own, for all bags of a folder that have the muscle.
+    table = exo / 'models.csv'
+    (exo / 'flexor.yaml').write_text('rig: dmsp_20_300_hanging_mass\nname: mine\n')
+    table.write_text('path,namespace,model\nruns,/left_knee/flexor,flexor.yaml\n'
+                     f'runs,right_knee,{knee}\nruns/2026-03-02/run,,dmsp_5_300_realistic\n')
+    single, left, *right = find_cases(table)
+    assert single.model == 'dmsp_5_300_realistic' and single.namespace is None
+    assert left.namespace == MUSCLES[1] and Path(left.model).name == 'flexor.yaml'
+    assert [case.namespace for case in right] == MUSCLES[2:]
+    table.write_text('path,namespace\nruns,/left_hip\n')
+    with pytest.raises(InputError, match='no bag in this folder has the namespace /left_hip'):
+        find_cases(table)
 
 
 @pytest.mark.parametrize('text, says', [
