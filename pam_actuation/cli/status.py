@@ -55,10 +55,12 @@ def run(args: argparse.Namespace) -> int:
     several = len({row['domain_id'] for row in rows}) > 1
     text = []
     wide = max(len(row['node']) for row in rows)
+    levels = max(map(len, LEVELS))
     for row in rows:
         domain = f'domain {row["domain_id"]:<4}' if several else ''
         lost = f'; {row["lost"]} messages lost' if row['lost'] else ''
-        text.append(f'{domain}{row["node"]:{wide}}  {row["level"]:6}{row["message"]}{lost}')
+        text.append(f'{domain}{row["node"]:{wide}}  {row["level"]:{levels}}  '
+                    f'{row["message"]}{lost}')
         if args.name is not None:
             text += [f'  {key}: {value}' for key, value in row['values'].items()]
     emit(args, {'schema': 1, 'nodes': rows}, '\n'.join(text))

@@ -154,6 +154,10 @@ class PolledSubscription:
         self._sequence: int | None = None
         self.newest: Any = None     # the message taken or collected last
 
+    def resume(self) -> None:
+        """Count losses from the next message on: nobody took those of a pause."""
+        self._sequence = None
+
     def take(self, limit: int = 2000) -> list[Taken]:
         """
         Return a list of (message, info) in order of arrival, at most ``limit``.

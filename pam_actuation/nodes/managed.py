@@ -413,6 +413,8 @@ class ManagedNode(LifecycleNode):
         if self.simulated_time is not None:
             self._await_participants()
             self.simulated_time.begin()
+        for subscription in self.subscriptions_polled:
+            subscription.resume()
         self.start()
         self.diagnostics.silent = False
         # Also while a simulated time stands still.

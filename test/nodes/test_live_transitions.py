@@ -119,6 +119,16 @@ def test_a_wish_from_before_the_activation_is_not_followed(rig):
         muscle.wish(0.012, 20.0)
         wait_for(lambda: commands[-1].plain.pressure_pa > P_ATM_PA + 50e3, 5.0,
                  'a command that follows the new wish')
+        # What nobody took while it was deactivated is not lost.
+        change(rig, Transition.TRANSITION_DEACTIVATE)
+        for k in range(3000):
+            muscle.send('contraction', Contraction(time.time_ns(), 0.0, 0.0))
+        change(rig, Transition.TRANSITION_ACTIVATE)
+        since = len(rig.health['pid_controller'])
+        wait_for(lambda: len(rig.health['pid_controller']) > since + 1, 20.0, 'its status')
+        values = rig.health['pid_controller'][-1].values
+        lost = {key: value for key, value in dict(values).items() if key.startswith('lost.')}
+        assert lost and set(lost.values()) == {'0'}
     finally:
         muscle.end()
 
