@@ -176,16 +176,16 @@ class SelfOrganizingFuzzyController(CompiledController):
 
     def _rule_output_pa(self) -> float:
         """Return the contribution [Pa] of all rule tables where the last tick was."""
-        out = fields(self._outputs, OUTPUT)
+        out, st = fields(self._outputs, OUTPUT), fields(self._state, STATE)
         share = out.contracting_share
         return (
             self.settings['feedback_gain_pa'] * infer_feedback(
                 self.rules.feedback, share, int(out.error_set), out.error_degree,
                 int(out.change_set), out.change_degree)
-            + infer_feedforward(
+            + st.rules_share * infer_feedforward(
                 self.rules.feedforward, share, int(out.reference_knot),
                 out.reference_knot_degree)
-            + infer_motion(
+            + st.rules_share * infer_motion(
                 self.rules.motion, int(out.motion_knot), out.motion_knot_degree,
                 int(out.motion_rate_knot), out.motion_rate_knot_degree)
             + self._model_output_pa())

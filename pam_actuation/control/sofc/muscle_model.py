@@ -88,6 +88,22 @@ def go(par: np.record, path: FloatArray, way_m: float) -> None:
 
 
 @compiled
+def settle(par: np.record, st: np.record, to_go_m: float, lead_rate_m_per_s: float) -> None:
+    """
+    Let the path of a reference at rest go over to the one on which the muscle will reach it.
+
+    The muscle seldom arrives as the reference did: it went too far, or swings. The way that
+    is left, from where it is predicted to be, is what decides on the pressure.
+    """
+    if not par.path_settling_s > 0.0 or lead_rate_m_per_s != 0.0:
+        return
+    part = par.period_s / (par.path_settling_s + par.period_s)
+    for q in range(1, int(par.path_sets)):
+        degree = st.predicted_path[q] + to_go_m / par.path_width_m[q]
+        st.lead_path[q] = _low_pass(st.lead_path[q], min(max(degree, -1.0), 1.0), part)
+
+
+@compiled
 def rules_pa(par: np.record, rules: FloatArray, path: FloatArray, contraction_m: float) -> float:
     """Return what the path rules add at a contraction [Pa]."""
     if par.path_sets < 1.0:

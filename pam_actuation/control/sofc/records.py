@@ -78,6 +78,7 @@ STATE = record(
     ('move', MOVE),                   # of the reference
     ('lead_move', MOVE),              # of the lead reference
     'jumped',                         # 1 from a jump until the reference moves by itself
+    'rules_share',                    # of feed-forward and motion rules that acts
     'settling_left_s',
     'freeze_left_s',
     ('model', MODEL),                 # of the muscle

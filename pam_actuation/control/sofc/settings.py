@@ -127,6 +127,8 @@ SETTINGS = (
             'share of what standing still counts that goes to the motion rules as well'),
     setting('jump_motion_learning', '-', 1.0, 0.0, 2.0,
             'factor of motion_learning from a jump until the reference moves by itself'),
+    setting('jump_rules', '-', 1.0, 0.0, 1.0,
+            'share of feed-forward and motion rules that acts and learns for that long'),
     setting('path_sets', '-', 0.0, 0.0, float(MOST_SETS),
             'path rules: sets of the path, the first for any path; 0 = none'),
     setting('path_shortest_m', 'm', 1.4e-4, 1e-6, 0.1, 'shortest path they tell apart'),
@@ -134,6 +136,9 @@ SETTINGS = (
     setting('path_learning', '-', 0.02, 0.0, 1.0,
             'share of the residual the path rules mend per tick of a motion'),
     setting('path_learning_floor', '-', 0.0, 0.0, 1.0, 'least part of that left'),
+    setting('path_settling_s', 's', 0.0, 0.0, 100.0,
+            'time in which the path of a reference at rest goes over to that of the muscle; '
+            '0 = never'),
     setting('lag_share', '-', 1.0, 0.0, 1.0,
             'share of the lag of the valve made up for in what rules of the path and numbers add'),
     setting('model_noise_pa', 'Pa', 0.0, 0.0, 1e6,

@@ -55,6 +55,7 @@ def _start(par: np.record, inverse: FloatArray, values: Tables, kept: Tables, st
     x = inp.contraction_m
     st.started = 1.0
     st.integral_pa = 0.0      # where rules were exchanged before the first tick
+    st.rules_share = 1.0
     st.rate_factor = 1.0
     st.rate_ceiling = 1.0
     st.contracting_share = 0.5
@@ -151,7 +152,7 @@ def _learn(par: np.record, values: Tables, initial: Tables, ring: Ring,
         rate * index * par.period_s * par.feedback_learning_per_m_s,
         leak * par.feedback_leak_per_m_s, par.feedback_step_limit)
     # What the index asks for in pressure, for one pass.
-    wanted_pa = rate * (
+    wanted_pa = st.rules_share * rate * (
         index * entry.correction_pa_per_m
         + par.takeover * entry.integral_deviation_pa)
     ff_squares = learning.modify_feedforward(
@@ -240,7 +241,7 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
         st.history_ticks > 0.0)
     st.change_m_per_s = change
     st.contraction_m = inp.contraction_m
-    dynamics.note_jump(st, inp.reference_rate_m_per_s)
+    dynamics.note_jump(par, st, inp.reference_rate_m_per_s)
     lags = _valve_lags(par, ring, st, inp)
     held_back = inp.held_back
     stays_behind = lags or held_back != 0.0
@@ -303,9 +304,10 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
             par, inverse, path_rules, ring, int(st.tick), model, inp.contraction_m, pressure)
         predicted = predictor.predicted_feedback_pa(
             par, model, lead - ahead_m, lead_rate - ahead_rate)
+        muscle_model.settle(par, model, lead - ahead_m, lead_rate)
     feedback = par.feedback_gain_pa * infer_feedback(feedback_rules, share, i, wi, j, wj)
-    feedforward = infer_feedforward(feedforward_rules, share, k, wk)
-    motion = infer_motion(motion_rules, m, wm, n, wn)
+    feedforward = st.rules_share * infer_feedforward(feedforward_rules, share, k, wk)
+    motion = st.rules_share * infer_motion(motion_rules, m, wm, n, wn)
     proportional = par.proportional_pa_per_m * error
     derivative = par.derivative_pa_s_per_m * change
     integral = st.integral_pa
@@ -432,9 +434,9 @@ def _guard(par: np.record, values: Tables, kept: Tables, st: np.record, inp: np.
             par.feedback_gain_pa * infer_feedback(
                 feedback, share, int(out.error_set), out.error_degree,
                 int(out.change_set), out.change_degree)
-            + infer_feedforward(
+            + st.rules_share * infer_feedforward(
                 feedforward, share, int(out.reference_knot), out.reference_knot_degree)
-            + infer_motion(
+            + st.rules_share * infer_motion(
                 motion, int(out.motion_knot), out.motion_knot_degree,
                 int(out.motion_rate_knot), out.motion_rate_knot_degree)
             + muscle_model.rules_pa(par, path, st.model.lead_path, st.lead_m)

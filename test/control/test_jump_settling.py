@@ -1,0 +1,98 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What happens after a jump nobody announced: whose rules act, and on which path it ends."""
+
+import numpy as np
+from pam_actuation.control.config import load_controller
+from pam_actuation.control.sofc import muscle_model
+from pam_actuation.control.sofc.controller import SelfOrganizingFuzzyController
+from pam_actuation.control.sofc.muscle_model import MODEL
+from pam_actuation.control.sofc.records import OUTPUT
+from pam_actuation.control.sofc.settings import PARAMETERS
+from pam_actuation.control.static_inverse import tabulate_static_inverse
+from pam_actuation.drivers.for_rig import driver_config
+from pam_actuation.experiments import load_experiment
+from pam_actuation.tuning.closed_loop import ClosedLoop
+from pam_actuation.tuning.random_rigs import random_rigs
+from pam_sim import load_rig
+from pam_sim.records import fields, zeros
+import pytest
+
+MOVE_S = 0.4
+STEPS_FROM_S, HOLD_S = 33.0, 2.0
+STEPS = f"""
+name: steps
+segments:
+  - rest: {{duration_s: 1.0}}
+  - ramp: {{to_m: 0.014, duration_s: 2.0}}
+  - multisine: {{center_m: 0.014, amplitude_m: 0.008, min_hz: 0.02, max_hz: 1.0, lines: 40,
+                duration_s: {STEPS_FROM_S - 4.0}, seed: 78}}
+  - ramp: {{to_m: 0.008, duration_s: 1.0}}
+  - step: {{to_m: 0.018, duration_s: {HOLD_S}}}
+  - step: {{to_m: 0.008, duration_s: {HOLD_S}}}
+"""
+
+
+@pytest.fixture(scope='module')
+def inverse():
+    return tabulate_static_inverse(load_rig('dmsp_5_300_hanging_mass'))
+
+
+def test_rules_of_the_index_stand_back_from_a_jump_until_the_reference_moves(inverse):
+    controller = SelfOrganizingFuzzyController(
+        inverse, {'jump_rules': 0.25, 'jump_time_s': MOVE_S}, rig_name='a/ppr')
+    controller.rules.feedforward[:], controller.rules.motion[:] = 8e3, 4e3
+    out, told = fields(controller._outputs, OUTPUT), []
+
+    def stepped(count, reference_m, rate_m_per_s=0.0):
+        for _ in range(count):
+            controller.step(0.010, reference_m, rate_m_per_s, reference_m, rate_m_per_s, False)
+            told.append((out.feedforward_rules_pa, out.motion_rules_pa))
+
+    stepped(20, 0.010)
+    assert told[-1] == (8e3, 4e3)
+    stepped(int(MOVE_S / 2 * 200), 0.014)
+    assert 2e3 < told[-1][0] < 8e3
+    stepped(100, 0.014)
+    assert told[-1] == (2e3, 1e3)
+    stepped(200, 0.014, 1e-4)
+    assert told[-1] == (8e3, 4e3)
+    assert np.abs(np.diff(np.array(told)[:, 0])).max() < 1.1 * 8e3 * 0.005 / MOVE_S
+
+
+def test_the_path_of_a_reference_at_rest_goes_over_to_that_of_the_muscle(inverse):
+    controller = SelfOrganizingFuzzyController(
+        inverse, {'path_sets': 3, 'path_shortest_m': 2e-4, 'path_longest_m': 2e-3,
+                  'path_settling_s': 0.05}, rig_name='a/ppr')
+    par, st = fields(controller.parameters, PARAMETERS), fields(zeros(MODEL), MODEL)
+    st.lead_path[:3], st.predicted_path[:3] = (1.0, 1.0, 1.0), (1.0, 1.0, 0.5)
+    muscle_model.settle(par, st, -1e-4, 1e-3)
+    assert np.array_equal(st.lead_path[:3], (1.0, 1.0, 1.0))      # it moves
+    for _ in range(400):
+        muscle_model.settle(par, st, -1e-4, 0.0)
+    assert st.lead_path[:3] == pytest.approx(
+        [1.0, 1.0 - 1e-4 / par.path_width_m[1], 0.5 - 1e-4 / par.path_width_m[2]], abs=1e-3)
+
+
+@pytest.mark.parametrize('valve, seconds', [('ppr', 0.8), ('hsv', 1.1)])
+def test_steps_nobody_announced_settle_at_first_sight(valve, seconds):
+    nominal = load_rig('dmsp_5_300_realistic', valve=valve)
+    for seed, rig in enumerate(random_rigs(nominal, 4, seed=41)):
+        loop = ClosedLoop(rig, load_experiment(STEPS), seed=seed, preview_s=0.0,
+                          driver=driver_config(nominal))
+        run = loop.run(load_controller(f'sofc_model_{valve}', nominal))
+        for start_s in (STEPS_FROM_S, STEPS_FROM_S + HOLD_S):
+            inside = (run.time_s >= start_s + seconds) & (run.time_s < start_s + HOLD_S)
+            assert np.abs(run.error_m[inside]).max() < 2e-4
