@@ -19,7 +19,7 @@ from pam_actuation.control.config import load_controller
 from pam_actuation.control.sofc import muscle_model
 from pam_actuation.control.sofc.controller import SelfOrganizingFuzzyController
 from pam_actuation.control.sofc.muscle_model import MODEL
-from pam_actuation.control.sofc.records import OUTPUT
+from pam_actuation.control.sofc.records import OUTPUT, STATE
 from pam_actuation.control.sofc.settings import PARAMETERS
 from pam_actuation.control.static_inverse import tabulate_static_inverse
 from pam_actuation.drivers.for_rig import driver_config
@@ -96,3 +96,26 @@ def test_steps_nobody_announced_settle_at_first_sight(valve, seconds):
         for start_s in (STEPS_FROM_S, STEPS_FROM_S + HOLD_S):
             inside = (run.time_s >= start_s + seconds) & (run.time_s < start_s + HOLD_S)
             assert np.abs(run.error_m[inside]).max() < 2e-4
+
+
+@pytest.mark.parametrize('lag_s, dead_s, found_s', [(0.045, 0.04, 0.045), (0.08, 0.04, 0.08)])
+def test_the_lag_of_the_valve_is_found_in_motion(inverse, lag_s, dead_s, found_s):
+    controller = SelfOrganizingFuzzyController(
+        inverse, {'lead_s': dead_s, 'valve_lag_s': 0.06, 'lag_memory_s': 10.0,
+                  'valve_gap_pa': 1e6}, rig_name='a/ppr')
+    random, period_s = np.random.default_rng(3), 0.005
+    under_way, pressure_pa = [3e5] * round(dead_s / period_s), 3e5
+    for tick in range(4000):
+        now_s = tick * period_s
+        wanted_m = 0.014 + 0.005 * np.sin(4.0 * now_s) + 0.002 * np.sin(9.1 * now_s)
+        rate_m_per_s = 0.020 * np.cos(4.0 * now_s) + 0.0182 * np.cos(9.1 * now_s)
+        seen_pa = pressure_pa + 8e3 + 300.0 * random.standard_normal()      # a zero error
+        under_way.append(controller.step(
+            wanted_m, wanted_m, rate_m_per_s, wanted_m, rate_m_per_s, False,
+            pressure_pa=seen_pa))
+        pressure_pa += period_s / (lag_s + period_s) * (under_way.pop(0) - pressure_pa)
+    state = fields(controller._state, STATE)
+    assert state.lag.lag_s == pytest.approx(found_s, abs=0.005)
+    controller.pause()
+    controller.step(0.014, 0.014, 0.0, 0.014, 0.0)
+    assert state.lag.lag_s == 0.06

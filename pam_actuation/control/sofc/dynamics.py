@@ -182,6 +182,6 @@ def dynamic_pressure_pa(par: np.record, st: np.record, static_pa: float, rate_m_
     quasi_static = static_pa + moving
     if rate_jumped:
         st.quasi_static_pa = quasi_static
-    lag = par.valve_lag_s * (quasi_static - st.quasi_static_pa) / period
+    lag = st.lag.lag_s * (quasi_static - st.quasi_static_pa) / period
     st.quasi_static_pa = quasi_static
     return moving + lag

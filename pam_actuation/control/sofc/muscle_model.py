@@ -71,6 +71,7 @@ MODEL = record(
     ('predicted_path', MOST_SETS),
     'innovation_pa',                  # residual less the path rules
     'disturbance_pa',
+    'held',                           # part of its change that is held back, 0 = none
     'fast_contraction_m',             # for the rate the prediction begins with
     'feedback_pa',                    # on the predicted error, filtered
     'squared_error_m2',               # of the reference, mean
@@ -237,7 +238,7 @@ def observe(par: np.record, inverse: FloatArray, rules: FloatArray, st: np.recor
     if not par.disturbance_time_s > 0.0 or x < _LIFTED_M:
         st.disturbance_pa *= _FADE
         return
-    share = st.strength * period / (par.disturbance_time_s + period)
+    share = (1.0 - st.held) * st.strength * period / (par.disturbance_time_s + period)
     limit = par.integral_limit_pa
     disturbance = _low_pass(st.disturbance_pa, innovation, share)
     st.disturbance_pa = min(max(disturbance, -limit), limit)

@@ -50,8 +50,8 @@ def engage(par: np.record, st: np.record, error_m: float) -> None:
 
 @compiled
 def predict(par: np.record, inverse: FloatArray, rules: FloatArray, ring: Ring, tick: int,
-            st: np.record, contraction_m: float,
-            pressure_pa: float) -> tuple[float, float]:
+            st: np.record, contraction_m: float, pressure_pa: float,
+            lag_s: float) -> tuple[float, float]:
     """
     Return contraction [m] and rate [m/s] for the moment at which a command of now arrives.
 
@@ -64,7 +64,7 @@ def predict(par: np.record, inverse: FloatArray, rules: FloatArray, ring: Ring, 
     x, rate, p = contraction_m, moved / period, pressure_pa
     for q in range(int(par.path_sets)):
         st.predicted_path[q] = st.path[q]
-    lag = period / (par.valve_lag_s + period)
+    lag = period / (lag_s + period)
     damping, inertia = damping_pa_s_per_m(par, st), inertia_pa_s2_per_m(par, st)
     ticks = int(par.answer_ticks)
     for ago in range(ticks, 0, -1):
@@ -80,12 +80,12 @@ def predict(par: np.record, inverse: FloatArray, rules: FloatArray, ring: Ring, 
 
 
 @compiled
-def predicted_feedback_pa(par: np.record, st: np.record, error_m: float,
-                          change_m_per_s: float) -> float:
+def predicted_feedback_pa(par: np.record, st: np.record, error_m: float, change_m_per_s: float,
+                          lag_s: float) -> float:
     """Return the feedback on the predicted error and its change [Pa], ahead of the valve's lag."""
     raw = st.strength * (
         par.predicted_proportional_pa_per_m * error_m
         + par.predicted_derivative_pa_s_per_m * change_m_per_s)
     step = par.period_s / (par.predicted_filter_s + par.period_s) * (raw - st.feedback_pa)
     st.feedback_pa += step
-    return st.feedback_pa + par.valve_lag_s * step / par.period_s
+    return st.feedback_pa + lag_s * step / par.period_s

@@ -15,6 +15,7 @@
 """State and outputs of the compiled controller, and what it remembers of one tick."""
 
 from pam_actuation.control.sofc.muscle_model import MODEL
+from pam_actuation.control.sofc.valve_lag import LAG
 from pam_sim.records import record
 
 # Which rules are active: of two neighbouring sets or knots the lower one, and the degree
@@ -70,6 +71,7 @@ STATE = record(
     'acceleration_m_per_s2',          # of the lead reference
     'quasi_static_pa',                # pressure without the lag of the valve
     'expected_pa',                    # pressure to be measured
+    ('lag', LAG),                     # of the valve
     'integral_pa',
     'integral_mean_pa',
     'integral_shape',                 # part of the integral that counts at this contraction

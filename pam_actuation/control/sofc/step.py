@@ -28,7 +28,7 @@ from pam_actuation.control.inputs import INPUT
 from pam_actuation.control.law_parts import (
     faded_offset, filtered_change, first_command_pa, held_offset, integral_growth, limited)
 from pam_actuation.control.sofc import (
-    credit, dynamics, guard, learning, muscle_model, predictor)
+    credit, dynamics, guard, learning, muscle_model, predictor, valve_lag)
 from pam_actuation.control.sofc.credit import Ring
 from pam_actuation.control.sofc.membership import (
     gaussian_degree, locate, locate_signed_logarithmic, SET_COUNT)
@@ -58,6 +58,7 @@ def _start(par: np.record, inverse: FloatArray, values: Tables, kept: Tables, st
     st.rules_share = 1.0
     st.rate_factor = 1.0
     st.rate_ceiling = 1.0
+    st.lag.lag_s = par.valve_lag_s
     st.contracting_share = 0.5
     st.offset_m = inp.reference_m - x
     st.contraction_m = x
@@ -72,26 +73,6 @@ def _start(par: np.record, inverse: FloatArray, values: Tables, kept: Tables, st
         trim = (pressure - inverse_pressure_pa(inverse, x)) / dynamics.load_shape(par, x)
         st.integral_pa = min(max(trim, -_START_TRIM_PA), _START_TRIM_PA)
         st.integral_mean_pa = st.integral_pa
-
-
-@compiled
-def _valve_lags(par: np.record, ring: Ring, st: np.record, inp: np.record) -> bool:
-    """
-    Tell whether the measured pressure is far from what the commands should have made of it.
-
-    Expected is the command of one preview ago behind the lag of the valve.
-    """
-    if st.history_ticks < par.answer_ticks:
-        st.expected_pa = inp.pressure_pa
-        return False
-    then = credit.row_of(ring, int(st.tick), int(par.answer_ticks))
-    arrived = ring[then].command_pa
-    if not math.isfinite(st.expected_pa):
-        st.expected_pa = arrived
-    part = par.period_s / (par.valve_lag_s + par.period_s)
-    st.expected_pa += part * (arrived - st.expected_pa)
-    gap = abs(st.expected_pa - inp.pressure_pa)
-    return gap > par.valve_gap_pa          # False for NaN: pressure is optional
 
 
 @compiled
@@ -242,7 +223,7 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
     st.change_m_per_s = change
     st.contraction_m = inp.contraction_m
     dynamics.note_jump(par, st, inp.reference_rate_m_per_s)
-    lags = _valve_lags(par, ring, st, inp)
+    lags = valve_lag.falls_behind(par, ring, st, inp)
     held_back = inp.held_back
     stays_behind = lags or held_back != 0.0
     if stays_behind or (par.jump_time_s <= 0.0 and (jump != 0.0 or lead_jump != 0.0)):
@@ -288,6 +269,7 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
     inertia = par.acceleration_feedforward_pa_s2_per_m
     if par.has_model > 0.5:
         predictor.engage(par, model, error)
+        model.held = 1.0 - par.jump_disturbance if st.move.left_s > 0.0 else 0.0
         muscle_model.observe(par, inverse, path_rules, model, inp.contraction_m, measured)
         muscle_model.go(par, model.lead_path, way)
         path = (muscle_model.rules_pa(par, path_rules, model.lead_path, lead)
@@ -301,9 +283,10 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
     acts = par.predicted_proportional_pa_per_m > 0.0 or par.predicted_derivative_pa_s_per_m > 0.0
     if acts and st.history_ticks >= par.answer_ticks:
         ahead_m, ahead_rate = predictor.predict(
-            par, inverse, path_rules, ring, int(st.tick), model, inp.contraction_m, pressure)
+            par, inverse, path_rules, ring, int(st.tick), model, inp.contraction_m, pressure,
+            st.lag.lag_s)
         predicted = predictor.predicted_feedback_pa(
-            par, model, lead - ahead_m, lead_rate - ahead_rate)
+            par, model, lead - ahead_m, lead_rate - ahead_rate, st.lag.lag_s)
         muscle_model.settle(par, model, lead - ahead_m, lead_rate)
     feedback = par.feedback_gain_pa * infer_feedback(feedback_rules, share, i, wi, j, wj)
     feedforward = st.rules_share * infer_feedforward(feedforward_rules, share, k, wk)

@@ -1,0 +1,96 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The lag of the valve, found in motion.
+
+The commands of one preview ago, behind a low pass of first order, are the pressure to be
+expected. What the measured one differs from it, correlated with what another lag would change,
+gives the lag: recursive least squares with forgetting, on the model's own output (an output
+error method, Ljung 1999). A zero error of the sensor or of the valve is behind a slow mean. An
+error of the dead time goes into the lag, which makes up for it.
+"""
+
+import math
+
+import numpy as np
+from pam_actuation.control.sofc import credit
+from pam_actuation.control.sofc.credit import Ring
+from pam_sim.compiled import compiled
+from pam_sim.records import record
+
+_MEAN_TIME_S = 2.0        # the slow mean of what the pressure differs
+_PRIOR_PA2_PER_S2 = 5e11  # what the setting counts: a second of slow motion
+_RANGE = 2.0              # the lag stays within the setting over and times this
+
+LAG = record(
+    'lag_s',
+    'sensitivity_pa_per_s',           # of the expected pressure to the lag
+    'information_pa2_per_s2',         # sum of its squares, with forgetting
+    'mean_pa',                        # of measured less expected pressure
+)
+
+
+@compiled
+def _find(par: np.record, st: np.record, arrived_pa: float, expected_pa: float,
+          measured_pa: float) -> None:
+    """
+    Correct the lag by one measurement; ``st`` is a ``LAG``.
+
+    The command of one preview ago has arrived and is expected behind the lag. A pressure that is
+    not finite, or far from the expected one, tells nothing.
+    """
+    if not (par.lag_memory_s > 0.0 and st.lag_s > 0.0):
+        return
+    period: float = par.period_s
+    setting_s: float = par.valve_lag_s
+    lag_s: float = st.lag_s
+    sensitivity: float = st.sensitivity_pa_per_s
+    mean_pa: float = st.mean_pa
+    information: float = st.information_pa2_per_s2
+    slope = (arrived_pa - expected_pa) / lag_s
+    sensitivity -= period / (lag_s + period) * (slope + sensitivity)
+    st.sensitivity_pa_per_s = sensitivity
+    difference = measured_pa - expected_pa
+    if not abs(difference) <= par.valve_gap_pa:
+        return
+    mean_pa += period / (_MEAN_TIME_S + period) * (difference - mean_pa)
+    information += sensitivity * sensitivity - period / par.lag_memory_s * information
+    lag_s += sensitivity * (difference - mean_pa) / (information + _PRIOR_PA2_PER_S2)
+    st.mean_pa = mean_pa
+    st.information_pa2_per_s2 = information
+    st.lag_s = min(max(lag_s, setting_s / _RANGE), setting_s * _RANGE)
+
+
+@compiled
+def falls_behind(par: np.record, ring: Ring, st: np.record, inp: np.record) -> bool:
+    """
+    Tell whether the measured pressure is far from what the commands should have made of it.
+
+    Expected is the command of one preview ago behind the lag of the valve; ``st`` is a ``STATE``.
+    """
+    if st.history_ticks < par.answer_ticks:
+        st.expected_pa = inp.pressure_pa
+        return False
+    then = credit.row_of(ring, int(st.tick), int(par.answer_ticks))
+    arrived: float = ring[then].command_pa
+    expected: float = st.expected_pa
+    measured: float = inp.pressure_pa
+    if not math.isfinite(expected):
+        expected = arrived
+    expected += par.period_s / (st.lag.lag_s + par.period_s) * (arrived - expected)
+    st.expected_pa = expected
+    _find(par, st.lag, arrived, expected, measured)
+    gap = abs(expected - measured)
+    return gap > par.valve_gap_pa          # False for NaN: pressure is optional
