@@ -18,6 +18,7 @@ Campaigns: what they find, what a kill costs them, and equal bytes on every kind
     python benchmarks/campaign.py kills --work lab        # killed 20 times
     python benchmarks/campaign.py clusters --work lab     # Dask and Ray on this machine
     python benchmarks/campaign.py losses --work lab       # a worker or the scheduler is lost
+    python benchmarks/campaign.py places --work lab       # all that takes a cluster
     python benchmarks/campaign.py tune                    # the costs of a generation, two ways
 
 With --write each part goes into docs/results/campaign.md. `page` records and answers what is
@@ -41,6 +42,7 @@ os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
 import campaign_clusters  # noqa: E402, I100
 import campaign_kills  # noqa: E402
+import campaign_places  # noqa: E402
 import campaign_records as lab  # noqa: E402
 from pam_actuation.campaign import find_cases, run_campaign, Settings  # noqa: E402
 from pam_actuation.campaign.findings import began, find  # noqa: E402
@@ -64,13 +66,13 @@ EXPERIMENTS = ('tuning_quarter_hz', 'tuning_half_hz', 'tuning_one_hz')
 def command_line():
     """Return the parser of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.strip().split('\n\n')[0])
-    parser.add_argument('part', choices=('page', 'kills', 'clusters', 'losses', 'tune'))
+    parser.add_argument('part', choices=('page', 'kills', 'clusters', 'losses', 'places', 'tune'))
     parser.add_argument('--work', type=Path, default=Path('lab'),
                         help='recordings and results are kept here (default: lab)')
     parser.add_argument('--jobs', type=int, default=2, help='processes (default: 2)')
     parser.add_argument('--cases', type=int, default=60,
                         help='recordings of kills, clusters and losses (default: 60)')
-    parser.add_argument('--ray', action='store_true', help='of clusters: Ray as well')
+    parser.add_argument('--ray', action='store_true', help='of clusters and places: Ray as well')
     parser.add_argument('--kills', type=int, default=20, help='of kills (default: 20)')
     parser.add_argument('--seed', type=int, default=1, help='of the moments of kills')
     parser.add_argument('--rounds', type=int, default=None,
@@ -87,7 +89,8 @@ def main():
         if args.part == 'kills':
             return campaign_kills.show(args)
         return {'page': page, 'tune': tune, 'clusters': campaign_clusters.show,
-                'losses': campaign_clusters.losses}[args.part](args)
+                'losses': campaign_clusters.losses,
+                'places': campaign_places.show}[args.part](args)
 
 
 def page(args):

@@ -37,6 +37,7 @@ from pam_sim.errors import InputError
 from pam_sim.files import UNFINISHED
 
 ROOT = Path(__file__).resolve().parent.parent
+PATHS = os.pathsep.join(map(str, (ROOT, ROOT / 'benchmarks', ROOT / 'test' / 'hidden')))
 SIZES = (1, 2, 4, 8)
 EMPTY = 200
 CASE_S = 2.35      # processor time of a case of the part `page`
@@ -188,7 +189,7 @@ def program(module, *arguments):
     process = subprocess.Popen(
         [sys.executable, '-m', module, *arguments], start_new_session=True,
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-        env={**os.environ, 'PYTHONPATH': f'{ROOT}:{ROOT / "benchmarks"}'})
+        env={**os.environ, 'PYTHONPATH': PATHS})
     try:
         yield process
     finally:
@@ -213,7 +214,7 @@ def ray_cluster(size):
              '--include-dashboard=false', '--disable-usage-stats',
              f'--port={port}', f'--ray-client-server-port={client}', f'--temp-dir={folder}'],
             start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-            env={**os.environ, 'PYTHONPATH': f'{ROOT}:{ROOT / "benchmarks"}'})
+            env={**os.environ, 'PYTHONPATH': PATHS})
         try:
             _until_it_answers(f'ray://127.0.0.1:{client}')
             yield f'ray://127.0.0.1:{client}'

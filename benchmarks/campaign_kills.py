@@ -33,13 +33,14 @@ ROOT = Path(__file__).resolve().parent.parent
 LONGEST_S = 600.0
 
 
-def listed(args):
+def listed(args, cases=None):
     """Write the list of the first recordings of each rig; return its path."""
+    cases = cases or args.cases
     bags = sorted(args.work.glob('lab/rig_*/*/check'), key=lambda path: path.parts[-2::-1])
-    if len(bags) < args.cases:
+    if len(bags) < cases:
         raise SystemExit(f'{args.work} has {len(bags)} recordings: run the part page first')
-    path = args.work / f'first_{args.cases}.txt'
-    path.write_text('\n'.join(os.path.relpath(bag, args.work) for bag in bags[:args.cases]),
+    path = args.work / f'first_{cases}.txt'
+    path.write_text('\n'.join(os.path.relpath(bag, args.work) for bag in bags[:cases]),
                     encoding='utf-8')
     return path
 
