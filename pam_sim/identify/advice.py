@@ -26,8 +26,9 @@ from pam_sim.gap.data.signals import FIELD, UNIT
 from pam_sim.gap.subsystems.simulation import pressure_driven
 from pam_sim.gap.verify.uncertainty import NORMAL_95
 from pam_sim.identify.fit import NOWHERE, Weighted
-from pam_sim.identify.judgement import is_narrow
+from pam_sim.identify.judgement import is_narrow, UNDETERMINED
 from pam_sim.identify.numbers import known_numbers_of, Number
+from pam_sim.identify.profile import Interval
 from pam_sim.identify.records import Offer, offer_of, problems_of
 from pam_sim.rig import Rig
 from pam_sim.run import Run, Series
@@ -93,6 +94,40 @@ def proposals(rig: Rig, has_force: bool) -> list[Proposal]:
                 'stairs_with_more_mass_and_force', f'the same steps with {more:g} kg more on the '
                 'load (then: --added-kg) and a load cell', stairs, True, more))
     return found
+
+
+def where_open(numbers: Sequence[Number], intervals: Sequence[Interval], statuses: Sequence[str],
+               x: FloatArray, information: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """
+    Return coordinates and information from which an experiment can be predicted.
+
+    The likeliest value may lie where the recording begins to depend on a number: a load that is
+    just about to lift. There the curvature claims to know a number whose interval is wide. Such a
+    number is put where it began, or at the end of its interval, and nothing is known of it.
+
+    Parameters
+    ----------
+    numbers : list of Number
+        The unknown ones.
+    intervals : list of Interval
+        Theirs.
+    statuses : list of str
+        Theirs, as of ``judge``.
+    x : numpy.ndarray
+        Coordinates of the solution, these numbers first.
+    information : numpy.ndarray, shape (K, K)
+        Of the unknown numbers, at the solution.
+
+    """
+    x, information = x.copy(), information.copy()
+    covariance = np.linalg.inv(information + NOWHERE * np.eye(len(numbers)))
+    for j, (n, interval) in enumerate(zip(numbers, intervals)):
+        half = NORMAL_95 * math.sqrt(float(covariance[j, j]))
+        if statuses[j] == UNDETERMINED and is_narrow(
+                n, n.value(float(x[j]) - half), n.value(float(x[j]) + half)):
+            x[j] = n.coordinate(min(max(n.value(0.0), interval.low), interval.high))
+            information[j] = information[:, j] = 0.0
+    return x, information
 
 
 def next_experiment(rig: Rig, wanted: Sequence[Number], acting: Sequence[Number],

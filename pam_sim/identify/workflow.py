@@ -24,7 +24,7 @@ from pam_sim.errors import InputError
 from pam_sim.gap.data.signals import UNIT
 from pam_sim.gap.subsystems.effects import subsystem_of_number
 from pam_sim.gap.verify.uncertainty import NORMAL_95
-from pam_sim.identify.advice import next_experiment
+from pam_sim.identify.advice import next_experiment, where_open
 from pam_sim.identify.fit import fit, NOWHERE, Weighted
 from pam_sim.identify.judgement import DETERMINED, judge
 from pam_sim.identify.numbers import (
@@ -133,6 +133,7 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
         for n in wanted if n not in acting]
     if advise and (result.open_names or len(acting) < len(wanted)):
         with_force = any('force' in one.recording.signals for one in offers)
+        x, information = where_open(acting, intervals, statuses, x, information)
         result.next_experiment = next_experiment(
             with_values(rig, numbers, weighted.values(x)), wanted, acting, information,
             offers, with_force)

@@ -1,0 +1,44 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""From where the next experiment is predicted."""
+
+from made_records import RIG
+import numpy as np
+from pam_sim.identify.advice import where_open
+from pam_sim.identify.judgement import DETERMINED, TOGETHER, UNDETERMINED
+from pam_sim.identify.numbers import unknown_numbers
+from pam_sim.identify.profile import Interval
+import pytest
+
+MASS, MAP = unknown_numbers(RIG, ['mass_kg', 'force_map_gain'])
+LIFTS, GAIN = 0.3, 1.1
+
+
+@pytest.mark.parametrize('status', [DETERMINED, TOGETHER, UNDETERMINED])
+@pytest.mark.parametrize('low, high', [(0.2, 30.0), (2.0 * MASS.start, 4.0 * MASS.start)])
+def test_a_load_that_is_about_to_lift_tells_nothing_of_its_mass(status, low, high):
+    """Where it lifts the curvature is large, though the interval is wide."""
+    x = np.array([MASS.coordinate(LIFTS), MAP.coordinate(GAIN)])
+    information = np.array([[1e6, 10.0], [10.0, 4.0]])
+    at, seen = where_open(
+        [MASS, MAP], [Interval(*ends, False, False, ()) for ends in ((low, high), (0.9, 1.3))],
+        [status, UNDETERMINED], x, information)
+    kept = status != UNDETERMINED
+    assert MASS.value(at[0]) == pytest.approx(
+        LIFTS if kept else min(max(MASS.start, low), high))
+    assert (seen[0, 0], seen[0, 1], seen[1, 0]) == ((1e6, 10.0, 10.0) if kept else (0.0,) * 3)
+    # The other one is as little known as its curvature says: it stays.
+    assert MAP.value(at[1]) == pytest.approx(GAIN) and seen[1, 1] == 4.0
+    assert x[0] == MASS.coordinate(LIFTS) and information[0, 0] == 1e6
