@@ -32,8 +32,6 @@ from pam_sim.gap.fit.solver import REFUSED, simulated_errors, tempering
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.identify.numbers import Number, with_values
 from pam_sim.rig import Rig
-from scipy.optimize import least_squares, lsq_linear
-from scipy.stats import qmc
 
 STARTS = 64                  # of the first look, each simulated once
 FOLLOWED = 3                 # of them fitted
@@ -139,6 +137,8 @@ class Weighted:
 
         The cost is the sum of the squared residuals.
         """
+        from scipy.optimize import least_squares       # slow to import
+
         free = np.ones(x.size, bool) if held is None else ~held
         if not free.any():
             return x, float(np.sum(self.residuals(x) ** 2))
@@ -165,6 +165,8 @@ class Weighted:
 
         Each iteration costs one simulation: the slopes are those given.
         """
+        from scipy.optimize import lsq_linear       # slow to import
+
         free = np.flatnonzero(~held)
         best, residuals = x, self.residuals(x)
         cost = float(residuals @ residuals)
@@ -235,6 +237,8 @@ def fit(weighted: Weighted, seed: int = 0) -> FloatArray:
     unknown = [j for j, n in enumerate(weighted.numbers) if n.unknown]
     starts = [np.zeros(len(weighted.numbers))]
     if unknown:
+        from scipy.stats import qmc       # slow to import
+
         spread = qmc.Sobol(len(unknown), seed=seed).random(STARTS)
         for row in spread:
             x = np.zeros(len(weighted.numbers))

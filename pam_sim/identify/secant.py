@@ -23,7 +23,6 @@ simulation. They are calculated again where a step with corrected slopes fails.
 import numpy as np
 from pam_sim.annotations import BoolArray, FloatArray
 from pam_sim.identify.fit import ROUNDS, TIGHT, Weighted
-from scipy.optimize import lsq_linear
 
 STEPS = 12
 GAIN = 0.05                  # of the cost, which ends the steps
@@ -105,6 +104,8 @@ def settle(weighted: Weighted, x: FloatArray) -> FloatArray:
 def _step(slopes: FloatArray, residuals: FloatArray, damping: float, low: FloatArray,
           high: FloatArray) -> FloatArray:
     """Return the damped step within its limits, from the normal equations."""
+    from scipy.optimize import lsq_linear       # slow to import
+
     scale = np.sqrt(np.maximum(np.sum(slopes ** 2, axis=0), TINY))
     scaled = slopes / scale
     square = scaled.T @ scaled + damping * np.eye(scale.size)

@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pam_sim.records import fields
 from pam_sim.rollout.layout import PARAMETERS, STATE
-from scipy.optimize import brentq
 
 if TYPE_CHECKING:
     from pam_sim.joint.rig import JointRig
@@ -63,6 +62,8 @@ def largest_torque_n_m(joint: 'JointRig', pressure_pa: float) -> float:
 def static_angle(joint: 'JointRig', pressures_pa: tuple[float, float], external_n_m: float = 0.0,
                  near_rad: float | None = None) -> float:
     """Return the angle [rad] of rest; see ``JointRig.static_angle_rad``."""
+    from scipy.optimize import brentq       # slow to import
+
     lower, upper = joint.range_rad
     if near_rad is None:
         near_rad = joint.parameters['hanging_angle_rad']

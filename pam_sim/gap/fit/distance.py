@@ -18,7 +18,6 @@ import math
 
 import numpy as np
 from pam_sim.annotations import BoolArray, FloatArray
-from scipy.optimize import lsq_linear
 
 FLAT = 1e-12                 # of the largest variance; less is none
 
@@ -44,6 +43,8 @@ def distance_to_none(covariance: FloatArray, x: FloatArray, none: BoolArray, low
     float
 
     """
+    from scipy.optimize import lsq_linear       # slow to import
+
     variance, axes = np.linalg.eigh(covariance)
     whitened = axes.T / np.sqrt(np.maximum(variance, FLAT * variance.max()))[:, np.newaxis]
     away = whitened[:, none] @ x[none]

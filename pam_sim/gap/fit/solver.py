@@ -31,7 +31,6 @@ from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
 from pam_sim.gap.subsystems.effects import shows
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.rig import Rig
-from scipy.optimize import least_squares
 
 FREE_BOX = 60.0
 HELD_BOX = 1e-3
@@ -168,6 +167,8 @@ class Solver:
 
     def run(self, x: FloatArray) -> FloatArray:
         """Return the solution from a start."""
+        from scipy.optimize import least_squares       # slow to import
+
         low, high = self.bounds
         if not x.size:
             return x
