@@ -61,7 +61,7 @@ def run(*words, address=None, done=(0,)):
     words = [sys.executable, *map(str, words), *(('--cluster', address) if address else ())]
     ended = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False, env={
         **os.environ, 'PYTHONPATH': f'{ROOT}:{ROOT / "benchmarks"}:{ROOT / "test/hidden"}'})
-    if ended.returncode not in done:
+    if ended.returncode not in done or 'Traceback' in ended.stderr:
         raise SystemExit(f'{" ".join(words)}\n{ended.stderr[-2000:]}')
 
 
@@ -101,7 +101,7 @@ def examination(args, out, address):
 def ablation(args, out, address):
     """Return the answers of a small ablation of criteria."""
     run('benchmarks/criteria_ablation.py', '--recorded', 2, '--number', 1, '--work', out,
-        '--jobs', 1, address=address, done=(0, 1))
+        '--jobs', 1, address=address)
     return answers(out)
 
 
