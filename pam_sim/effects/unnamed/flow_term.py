@@ -41,7 +41,7 @@ EFFECT = Effect(
     name='flow_term', family='unnamed', subsystem='valve',
     sentence='A change of the flows found from data.', source='', equation='',
     parameters=terms.parameters_of(INPUTS), amplitude=terms.AMPLITUDES, valves=('hsv',),
-    states=record('filling', 'venting', ('memory', terms.SLOTS)), packed=terms.PACKED, pack=_pack,
+    states=record('filling', 'venting', *terms.OF_SLOTS), packed=terms.PACKED, pack=_pack,
     initial=_initial, order=90)
 
 

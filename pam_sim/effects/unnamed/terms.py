@@ -46,7 +46,9 @@ _FIELDS = ('channel', 'first', 'second', 'input_1', 'kind_1', 'shape_1', 'input_
 SLOT = record(*_FIELDS)
 PACKED = record('used', 'step_s', ('low', INPUTS), ('high', INPUTS), ('scale', INPUTS),
                 ('slots', (SLOT, SLOTS)))
-STATES = record(('memory', SLOTS))
+# By slot its memory; of a wave where it was evaluated last, and what it was there.
+OF_SLOTS = ('memory', SLOTS), ('seen', SLOTS), ('wave', SLOTS)
+STATES = record(*OF_SLOTS)
 LARGE = 1e9
 
 
@@ -104,7 +106,8 @@ def memory_of(values: Mapping[str, float], start: Sequence[float]) -> dict[str, 
     """Return the memories at the start, where the inputs have the values ``start``."""
     inputs = [int(values[f'input_1_of_{k}']) for k in range(1, SLOTS + 1)]
     return {'memory': np.array([
-        min(max(start[i], values[f'low_of_{i}']), values[f'high_of_{i}']) for i in inputs])}
+        min(max(start[i], values[f'low_of_{i}']), values[f'high_of_{i}']) for i in inputs]),
+            'seen': np.full(SLOTS, 2.0 * LARGE), 'wave': np.zeros(SLOTS)}   # nowhere so far
 
 
 @compiled
@@ -195,10 +198,15 @@ def term_sum(channel: float, a: float, b: float, c: float, d: float, e: float, e
             continue
         i = int(slot.input_1)
         value = held(chosen(slot.input_1, a, b, c, d, e), par.low[i], par.high[i])
-        one = slot.first * factor(slot.kind_1, value, par.scale[i], slot.shape_1,
-                                  state.memory[k], elapsed_s)
-        if slot.second != 0.0:
-            one += slot.second * math.cos(2.0 * math.pi * value / slot.shape_1)
+        if slot.kind_1 == SINE and value == state.seen[k]:
+            one = state.wave[k]         # time stands still within a step
+        else:
+            one = slot.first * factor(slot.kind_1, value, par.scale[i], slot.shape_1,
+                                      state.memory[k], elapsed_s)
+            if slot.second != 0.0:
+                one += slot.second * math.cos(2.0 * math.pi * value / slot.shape_1)
+            if slot.kind_1 == SINE:
+                state.seen[k], state.wave[k] = value, one
         if slot.kind_2 != ONE:
             j = int(slot.input_2)
             value = held(chosen(slot.input_2, a, b, c, d, e), par.low[j], par.high[j])

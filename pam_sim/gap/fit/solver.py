@@ -20,7 +20,7 @@ are lowered by misfit and memory until they agree with the errors.
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from pam_sim.annotations import FloatArray, IntArray
@@ -42,6 +42,7 @@ SETTLED = 0.3                # relative change of the weights that ends the roun
 EVALUATIONS = 12
 FTOL, XTOL = 1e-3, 1e-2      # slopes of known numbers are from elsewhere; polishing does the rest
 SCORE_BLOCKS = 4             # test blocks whose scores are summed
+KEPT = 4                     # errors at the last points; the best one may be asked for again
 REFUSED = 1e3                # error of a model that cannot be simulated, in floors
 
 
@@ -97,7 +98,8 @@ class Solver:
                 prior.append(FREE_SD if free else 1.0)
         self.bounds = (np.array(low, float), np.array(high, float))
         self.prior: FloatArray = np.array(prior)
-        self._last: dict[str, Any] = {}
+        self._errors: dict[bytes, dict[str, FloatArray]] = {}
+        self._moved: tuple[bytes, list[tuple[float, dict[str, FloatArray]]]] = (b'', [])
 
     def join(self, theta: FloatArray, known_z: Mapping[str, FloatArray]) -> FloatArray:
         """Return what ``split`` takes apart."""
@@ -114,9 +116,11 @@ class Solver:
     def errors(self, x: FloatArray) -> dict[str, FloatArray]:
         """Return the errors of every touched subsystem, by subsystem."""
         key = x.tobytes()
-        if self._last.get('key') != key:
-            self._last = {'key': key, 'errors': self._simulated(x)}
-        return self._last['errors']
+        if key not in self._errors:
+            while len(self._errors) >= KEPT:
+                del self._errors[next(iter(self._errors))]
+            self._errors[key] = self._simulated(x)
+        return self._errors[key]
 
     def _simulated(self, x: FloatArray, effect: str | None = None) -> dict[str, FloatArray]:
         """Return the errors of the subsystems, or of those alone in which an effect shows."""
@@ -139,14 +143,9 @@ class Solver:
         columns = np.zeros((self.residuals(x).size, x.size))
         rows = columns.shape[0] - self.prior.size
         columns[rows:] = np.diag(1.0 / self.prior)
-        for j in range(count):
-            step = EFFECT_STEP * max(abs(x[j]), 0.3)
-            if x[j] + step > self.bounds[1][j]:
-                step = -step
-            moved = np.array(x)
-            moved[j] += step
+        for j, (step, simulated) in enumerate(self._moved_from(x)):
             # An effect of one subsystem leaves the other one as it is.
-            errors = {**base, **self._simulated(moved, self.owner[j])}
+            errors = {**base, **simulated}
             columns[:rows, j] = np.concatenate([
                 self._weighted(c, errors[c.subsystem] - base[c.subsystem])
                 for c in self.problems]) / step
@@ -156,6 +155,21 @@ class Solver:
             columns[row:row + len(slope), column:column + len(problem.known)] = slope
             row, column = row + len(slope), column + len(problem.known)
         return columns
+
+    def _moved_from(self, x: FloatArray) -> list[tuple[float, dict[str, FloatArray]]]:
+        """Return (step, errors after it) for each parameter of the effects."""
+        key = x.tobytes()
+        if self._moved[0] != key:       # other weights ask again at the same point
+            found = []
+            for j in range(len(self.free)):
+                step = EFFECT_STEP * max(abs(x[j]), 0.3)
+                if x[j] + step > self.bounds[1][j]:
+                    step = -step
+                moved = np.array(x)
+                moved[j] += step
+                found.append((step, self._simulated(moved, self.owner[j])))
+            self._moved = (key, found)
+        return self._moved[1]
 
     def blocks(self) -> IntArray:
         """Return the number of the block of every weighted error, rising."""
