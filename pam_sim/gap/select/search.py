@@ -111,11 +111,12 @@ def _grouped(context: SearchContext, selected: Selected) -> Selected:
     """
     Return the same with the effects of a group that explains a subsystem, if several stay.
 
-    Only where nothing is named in a subsystem with a gap.
+    Only where nothing is named in a subsystem with a gap that is more than the error of the floor.
     """
+    least = max(context.seen_gap, context.criteria.near_floor)
     for problem in context.problems:
         s = problem.subsystem
-        if (context.first_gap[s] <= context.seen_gap or selected.mistaken
+        if (context.first_gap[s] <= least or selected.mistaken
                 or any(w.subsystem == s for w in selected.named) or context.out_of_time()):
             continue
         estimator = context.estimator
