@@ -39,7 +39,8 @@ def show(args):
     """Run each on one local process and on a cluster; print; return the exit code."""
     kinds = {'Dask': dask, 'Ray': ray_cluster} if args.ray else {'Dask': dask}
     rows, right = [], True
-    here = {name: what(args, emptied(args, f'here_{name}')) for name, what in PLACES.items()}
+    here = {name: what(args, emptied(args, f'here_{name}'), None)
+            for name, what in PLACES.items()}
     for kind, cluster in kinds.items():
         with cluster(2) as address:
             for name, what in PLACES.items():
