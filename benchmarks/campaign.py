@@ -20,6 +20,7 @@ Campaigns: what they find, what a kill costs them, and equal bytes on every kind
     python benchmarks/campaign.py losses --work lab       # a worker or the scheduler is lost
     python benchmarks/campaign.py places --work lab       # all that takes a cluster
     python benchmarks/campaign.py tune                    # the costs of a generation, two ways
+    python benchmarks/campaign.py waits                   # what a search without generations gains
 
 With --write each part goes into docs/results/campaign.md. `page` records and answers what is
 missing in --work; the other parts take its first recordings. Exit code 1 when a bar is missed.
@@ -44,6 +45,7 @@ import campaign_clusters  # noqa: E402, I100
 import campaign_kills  # noqa: E402
 import campaign_places  # noqa: E402
 import campaign_records as lab  # noqa: E402
+import campaign_waits  # noqa: E402
 from pam_actuation.campaign import find_cases, run_campaign, Settings  # noqa: E402
 from pam_actuation.campaign.findings import began, find  # noqa: E402
 from pam_actuation.campaign.page import campaign_page  # noqa: E402
@@ -66,7 +68,8 @@ EXPERIMENTS = ('tuning_quarter_hz', 'tuning_half_hz', 'tuning_one_hz')
 def command_line():
     """Return the parser of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.strip().split('\n\n')[0])
-    parser.add_argument('part', choices=('page', 'kills', 'clusters', 'losses', 'places', 'tune'))
+    parser.add_argument('part', choices=(
+        'page', 'kills', 'clusters', 'losses', 'places', 'tune', 'waits'))
     parser.add_argument('--work', type=Path, default=Path('lab'),
                         help='recordings and results are kept here (default: lab)')
     parser.add_argument('--jobs', type=int, default=2, help='processes (default: 2)')
@@ -75,6 +78,7 @@ def command_line():
     parser.add_argument('--ray', action='store_true', help='of clusters and places: Ray as well')
     parser.add_argument('--kills', type=int, default=20, help='of kills (default: 20)')
     parser.add_argument('--seed', type=int, default=1, help='of the moments of kills')
+    parser.add_argument('--seeds', type=int, default=4, help='of waits (default: 4)')
     parser.add_argument('--rounds', type=int, default=None,
                         help='of tune (default: 15) and losses (default: 10)')
     results_page.add_write(parser, 'campaign')
@@ -90,7 +94,7 @@ def main():
             return campaign_kills.show(args)
         return {'page': page, 'tune': tune, 'clusters': campaign_clusters.show,
                 'losses': campaign_clusters.losses,
-                'places': campaign_places.show}[args.part](args)
+                'places': campaign_places.show, 'waits': campaign_waits.show}[args.part](args)
 
 
 def page(args):

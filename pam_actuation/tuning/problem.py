@@ -112,10 +112,15 @@ def costs_of(workers: 'Workers', problem: Problem,
     """
     if not workers.spread and 2 * workers.size <= len(points):
         return workers.map(cost_of, problem, points)
-    count = len(problem.loops)
-    flat = workers.map(cost_on, problem, [(point, i) for point in points for i in range(count)])
-    return [float(np.mean(np.array(flat[k * count:(k + 1) * count])))
-            for k in range(len(points))]
+    # Long ones first, so that at the end nobody waits for one of them.
+    order = sorted(
+        ((k, i) for k in range(len(points)) for i in range(len(problem.loops))),
+        key=lambda task: -problem.loops[task[1]].experiment.duration_s)
+    costs = np.empty((len(points), len(problem.loops)))
+    for task, cost in zip(order, workers.map(
+            cost_on, problem, [(points[k], i) for k, i in order])):
+        costs[task] = cost
+    return [float(np.mean(of_point)) for of_point in costs]
 
 
 def rebuild(controller: Law, settings: dict[str, float],
