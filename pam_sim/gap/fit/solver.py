@@ -28,6 +28,7 @@ from pam_sim.errors import InputError
 from pam_sim.gap.data.noise import autocorrelation_time
 from pam_sim.gap.fit.candidate import Setting
 from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
+from pam_sim.gap.fit.parallel import parallel_map
 from pam_sim.gap.subsystems.effects import shows
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.rig import Rig
@@ -127,9 +128,10 @@ class Solver:
         theta, known = self.split(x)
         rig = self.estimator.with_effects(Fit(
             self.hypothesis, theta, {}, {}, {}).settings())
-        return {s: simulated_errors(problem, rig, z)
-                for problem, (s, z) in zip(self.problems, known)
-                if effect is None or shows(effect, problem)}
+        asked = [(problem, s, z) for problem, (s, z) in zip(self.problems, known)
+                 if effect is None or shows(effect, problem)]
+        return {s: found for (_, s, _), found in zip(asked, parallel_map(
+            lambda one: simulated_errors(one[0], rig, one[2]), asked))}
 
     def residuals(self, x: FloatArray) -> FloatArray:
         """Return weighted errors, then the priors."""
@@ -160,16 +162,17 @@ class Solver:
         """Return (step, errors after it) for each parameter of the effects."""
         key = x.tobytes()
         if self._moved[0] != key:       # other weights ask again at the same point
-            found = []
-            for j in range(len(self.free)):
-                step = EFFECT_STEP * max(abs(x[j]), 0.3)
-                if x[j] + step > self.bounds[1][j]:
-                    step = -step
-                moved = np.array(x)
-                moved[j] += step
-                found.append((step, self._simulated(moved, self.owner[j])))
-            self._moved = (key, found)
+            self._moved = (key, parallel_map(
+                lambda j: self._moved_at(x, j), range(len(self.free))))
         return self._moved[1]
+
+    def _moved_at(self, x: FloatArray, j: int) -> tuple[float, dict[str, FloatArray]]:
+        step = EFFECT_STEP * max(abs(x[j]), 0.3)
+        if x[j] + step > self.bounds[1][j]:
+            step = -step
+        moved = np.array(x)
+        moved[j] += step
+        return step, self._simulated(moved, self.owner[j])
 
     def blocks(self) -> IntArray:
         """Return the number of the block of every weighted error, rising."""
