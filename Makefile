@@ -52,6 +52,7 @@ env: $(STAMP)
 clean:
 	rm -rf $(VENV) build install log *.egg-info .pytest_cache
 
+# pip compiles one file after the other, tests of all packages as well; here all cores compile.
 # A name on the PATH proves nothing (version managers put stubs there), so each candidate is run.
 # One within the environment would be deleted with it, so the interpreter behind it is used.
 $(STAMP): setup.py pyproject.toml
@@ -70,9 +71,11 @@ $(STAMP): setup.py pyproject.toml
 	found="$$("$$found" -c 'import sys; print(sys._base_executable)')"; \
 	echo "Creating the environment $(VENV) with $$("$$found" --version) (once; needs a network or a pip cache)"; \
 	rm -rf '$(VENV)' && "$$found" -m venv '$(VENV)' \
-	&& '$(BIN)/python' -m pip install --quiet --disable-pip-version-check --editable '.[ros,test]' \
+	&& '$(BIN)/python' -m pip install --quiet --disable-pip-version-check --no-compile \
+	     --editable '.[ros,test]' \
 	|| { echo 'The installation failed. Without a network, point pip at a folder of wheels:' >&2; \
 	     echo '  PIP_NO_INDEX=1 PIP_FIND_LINKS=/path/to/wheels make env' >&2; exit 1; }; \
+	'$(BIN)/python' -m compileall -q -j 0 -x 'site-packages/.*/tests/' '$(VENV)/lib' >/dev/null 2>&1; \
 	'$(BIN)/python' -m pam_actuation.warm_up \
 	|| echo 'Not compiled ahead: the first run takes longer.' >&2; \
 	touch '$@'
