@@ -17,9 +17,11 @@
 import os
 from pathlib import Path
 import re
+import shlex
 import subprocess
 import sys
 
+from pam_actuation.cli.main import main
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -55,16 +57,41 @@ def test_every_file_has_a_recipe_of_at_most_three_commands():
     assert max(map(len, recipes())) <= 3
 
 
+def first_of_verbs():
+    """Return the first command of the page with each verb: it runs as a reader types it."""
+    found = {}
+    for block in recipes():
+        for command in block:
+            found.setdefault(command.split()[1], command)
+    return set(found.values())
+
+
+def typed(command, capfd):
+    """Run a command in a shell; return exit code and standard error."""
+    path = f'{Path(sys.executable).parent}{os.pathsep}{os.environ["PATH"]}'
+    capfd.readouterr()
+    done = subprocess.run(['sh', '-c', command], env={**os.environ, 'PATH': path})
+    return done.returncode, capfd.readouterr().err
+
+
+def called(command, capfd):
+    """Run a command in this process, which has imported its verb; return the same."""
+    name, *arguments = shlex.split(os.path.expandvars(command))
+    assert name == 'pam'
+    capfd.readouterr()
+    return main(arguments), capfd.readouterr().err
+
+
 @pytest.mark.skipif(not DATA.is_dir(), reason=f'needs the measurements by others in {DATA}')
 @pytest.mark.parametrize('block', recipes(), ids=file_of)
-def test_a_file_becomes_a_report(block, tmp_path):
-    scripts = Path(sys.executable).parent
+def test_a_file_becomes_a_report(block, tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv('DATA', str(DATA))
+    monkeypatch.setenv('OPENBLAS_NUM_THREADS', '1')
     for command in block:
-        done = subprocess.run(
-            ['sh', '-c', command], cwd=tmp_path, capture_output=True, text=True,
-            env={**os.environ, 'DATA': str(DATA), 'OPENBLAS_NUM_THREADS': '1',
-                 'PATH': f'{scripts}{os.pathsep}{os.environ["PATH"]}'})
+        run = typed if command in first_of_verbs() else called
+        code, errors = run(command, capfd)
         # 1: done, with remarks on the measurement.
-        assert done.returncode in (0, 1), f'{command}\n{done.stdout}{done.stderr}'
-        assert 'Traceback' not in done.stderr
+        assert code in (0, 1), f'{command}\n{errors}'
+        assert 'Traceback' not in errors
     assert (tmp_path / REPORTS[file_of(block)]).stat().st_size > 1000
