@@ -76,6 +76,8 @@ def command_line():
     parser.add_argument('--cases', type=int, default=60,
                         help='recordings of kills, clusters and losses (default: 60)')
     parser.add_argument('--ray', action='store_true', help='of clusters and places: Ray as well')
+    parser.add_argument('--kept', action='store_true',
+                        help='of places: compare what an earlier run left in --work, run the rest')
     parser.add_argument('--kills', type=int, default=20, help='of kills (default: 20)')
     parser.add_argument('--seed', type=int, default=1, help='of the moments of kills')
     parser.add_argument('--seeds', type=int, default=4, help='of waits (default: 4)')
