@@ -26,7 +26,7 @@ nodes with it, as those they had been started by.
 """
 
 import atexit
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 import contextlib
 import gc
 import importlib
@@ -107,7 +107,8 @@ class Children:
         if 'compile' not in request:
             return self._fork(request)
         try:
-            compile_ahead(*request['compile'])
+            with told_of_compilation(lambda: self._tell({'compiles': True})):
+                compile_ahead(*request['compile'])
         except Exception as error:      # the nodes will say so, each of its part
             self._tell({'compiled': str(error)})
         else:
@@ -162,6 +163,30 @@ class Children:
             self._channel.sendall(json.dumps(answer).encode() + b'\n')
         except OSError:
             pass
+
+
+@contextlib.contextmanager
+def told_of_compilation(tell: Callable[[], object]) -> Iterator[None]:
+    """Call ``tell`` once if something is compiled meanwhile, and not read from the cache."""
+    from numba.core import event
+
+    class Told(event.Listener):     # type: ignore[misc]  # numba has no annotations
+        first = True
+
+        def on_start(self, event: object) -> None:
+            if self.first:
+                self.first = False
+                tell()
+
+        def on_end(self, event: object) -> None:
+            pass
+
+    told = Told()
+    event.register('numba:compile', told)
+    try:
+        yield
+    finally:
+        event.unregister('numba:compile', told)
 
 
 def _become(request: dict[str, Any]) -> None:

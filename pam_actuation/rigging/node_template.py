@@ -73,7 +73,8 @@ class NodeTemplate:
                 stderr=subprocess.DEVNULL, start_new_session=True, pass_fds=(theirs.fileno(),),
                 preexec_fn=partial(end_with_parent, os.getpid()))
         self._unread = b''
-        self._ready = self._spoiled = self._compiling = False
+        self._ready = self._spoiled = False
+        self._asked = self._compiles = False
         self._not_compiled = ''
         self._ended: dict[int, int] = {}
         self._lock = threading.RLock()
@@ -105,7 +106,7 @@ class NodeTemplate:
         """
         with self._lock, contextlib.suppress(OSError):      # it has ended: nodes compile
             self._channel.sendall(json.dumps({'compile': list(files)}).encode() + b'\n')
-            self._compiling = True
+            self._asked, self._compiles = True, False
 
     def wait_until_compiled(self, tell: Callable[[str], object] = lambda text: None,
                             after_s: float = TELL_AFTER_S) -> str:
@@ -115,7 +116,7 @@ class NodeTemplate:
         Parameters
         ----------
         tell : callable
-            Gets a sentence, once, if it takes long.
+            Gets a sentence, once, if it takes long because it is not read from the cache.
         after_s : float
             How long [s].
 
@@ -126,10 +127,10 @@ class NodeTemplate:
 
         """
         tell_at_s = time.monotonic() + after_s
-        while self._compiling and self.usable:
+        while self._asked and self.usable:
             with self._lock:
                 self._read(0.1)
-            if self._compiling and time.monotonic() > tell_at_s:
+            if self._asked and self._compiles and time.monotonic() > tell_at_s:
                 tell_at_s = math.inf
                 tell(COMPILES)
         return self._not_compiled
@@ -190,8 +191,9 @@ class NodeTemplate:
             (answer['ended'], answer['exit_code']) for answer in answers if 'ended' in answer)
         self._ready = self._ready or any('ready' in answer for answer in answers)
         for answer in answers:
+            self._compiles = self._compiles or 'compiles' in answer
             if 'compiled' in answer:
-                self._compiling, self._not_compiled = False, answer['compiled']
+                self._asked, self._not_compiled = False, answer['compiled']
         self._spoiled = spoiled or not data
         return answers
 

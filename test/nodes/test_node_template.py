@@ -119,7 +119,7 @@ def test_a_run_is_compiled_before_its_nodes_are_forked(template):
     assert template.usable
 
 
-def test_a_long_compilation_is_told_once(template, environment, tmp_path):
+def test_a_long_wait_without_compilation_is_not_called_one(template, environment, tmp_path):
     node = NodeProcess('valve_watchdog', '/held', {}, environment, tmp_path, template=template)
     held, said = parent_of(node.pid), []
     os.kill(held, signal.SIGSTOP)
@@ -132,7 +132,23 @@ def test_a_long_compilation_is_told_once(template, environment, tmp_path):
     finally:
         os.kill(held, signal.SIGCONT)
         end_all([node], END_S)
-    assert said == [COMPILES]
+    assert said == []
+
+
+def test_a_compilation_is_told(environment, tmp_path):
+    class Told(Exception):
+        pass
+
+    def tell(text):
+        raise Told(text)
+
+    template = NodeTemplate([], {**environment, 'NUMBA_CACHE_DIR': str(tmp_path)})
+    try:
+        template.compile_ahead(['dmsp_5_300_realistic'])
+        with pytest.raises(Told, match=COMPILES):
+            template.wait_until_compiled(tell, 0.1)
+    finally:
+        template.close()
 
 
 def test_a_folder_and_variables_may_change_between_nodes(
