@@ -78,6 +78,9 @@ def show(args):
         # As long as it takes to load, and then any moment of some cases.
         _until_it_works(killed, process, left)
         time.sleep(moments.uniform(0.0, 8.0 * WAIT_S))
+        if process.poll() is not None:
+            raise SystemExit(f'all cases were done after {number} of {args.kills} kills; '
+                             'give more --cases')
         if number % 2:
             os.killpg(process.pid, signal.SIGKILL)      # as when the power fails
         else:
