@@ -13,6 +13,8 @@ VENV ?= .venv
 ARGS ?=
 BIN := $(VENV)/bin
 STAMP := $(VENV)/installed
+COMPILED := $(VENV)/compiled
+SOURCES := $(shell find pam_actuation pam_sim -name '*.py')
 
 # Nothing of a run leaves this machine, and one thread per process is fastest here.
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
@@ -33,10 +35,10 @@ endif
 help:
 	@sed -n '/^#/!q; s/^# \{0,1\}//p' Makefile
 
-demo: $(STAMP)
+demo: $(COMPILED)
 	@$(BIN)/pam demo $(ARGS)
 
-test: $(STAMP)
+test: $(COMPILED)
 ifeq ($(strip $(ARGS)),)
 	@$(BIN)/python test/run_all.py
 else
@@ -47,7 +49,7 @@ docs: $(STAMP)
 	@$(BIN)/python -m sphinx -W --keep-going -q -b html docs build/docs $(ARGS)
 	@echo 'documentation: build/docs/index.html'
 
-env: $(STAMP)
+env: $(COMPILED)
 
 clean:
 	rm -rf $(VENV) build install log *.egg-info .pytest_cache
@@ -76,6 +78,10 @@ $(STAMP): setup.py pyproject.toml
 	|| { echo 'The installation failed. Without a network, point pip at a folder of wheels:' >&2; \
 	     echo '  PIP_NO_INDEX=1 PIP_FIND_LINKS=/path/to/wheels make env' >&2; exit 1; }; \
 	'$(BIN)/python' -m compileall -q -j 0 -x 'site-packages/.*/tests/' '$(VENV)/lib' >/dev/null 2>&1; \
-	'$(BIN)/python' -m pam_actuation.warm_up \
-	|| echo 'Not compiled ahead: the first run takes longer.' >&2; \
 	touch '$@'
+
+# Machine code is kept by source file: after a change, or a pull, only what changed is compiled.
+$(COMPILED): $(STAMP) $(SOURCES)
+	@'$(BIN)/python' -m pam_actuation.warm_up \
+	|| echo 'Not compiled ahead: the first run takes longer.' >&2
+	@touch '$@'
