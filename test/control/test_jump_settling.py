@@ -116,6 +116,13 @@ def test_the_lag_of_the_valve_is_found_in_motion(inverse, lag_s, dead_s, found_s
         pressure_pa += period_s / (lag_s + period_s) * (under_way.pop(0) - pressure_pa)
     state = fields(controller._state, STATE)
     assert state.lag.lag_s == pytest.approx(found_s, abs=0.005)
+    # Neither a driver that holds the pressure back nor what comes right after it tells the lag.
+    before_s = float(state.lag.lag_s)
+    for tick in range(300):
+        wanted_m = 0.014 + 0.005 * np.sin(4.0 * tick * period_s)
+        controller.step(wanted_m, wanted_m, 0.0, wanted_m, 0.0, False, pressure_pa=3e5,
+                        held_back=1.0 if tick < 200 else 0.0)
+    assert state.lag.lag_s == before_s
     controller.pause()
     controller.step(0.014, 0.014, 0.0, 0.014, 0.0)
     assert state.lag.lag_s == 0.06

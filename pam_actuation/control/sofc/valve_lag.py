@@ -32,6 +32,7 @@ from pam_sim.records import record
 
 _MEAN_TIME_S = 2.0        # the slow mean of what the pressure differs
 _PRIOR_PA2_PER_S2 = 5e11  # what the setting counts: a second of slow motion
+_REST_S = 1.0             # after a valve or driver that did not follow nothing is learned
 _RANGE = 2.0              # the lag stays within the setting over and times this
 
 LAG = record(
@@ -39,6 +40,7 @@ LAG = record(
     'sensitivity_pa_per_s',           # of the expected pressure to the lag
     'information_pa2_per_s2',         # sum of its squares, with forgetting
     'mean_pa',                        # of measured less expected pressure
+    'rest_s',                         # for how long nothing is learned yet
 )
 
 
@@ -63,7 +65,7 @@ def _find(par: np.record, st: np.record, arrived_pa: float, expected_pa: float,
     sensitivity -= period / (lag_s + period) * (slope + sensitivity)
     st.sensitivity_pa_per_s = sensitivity
     difference = measured_pa - expected_pa
-    if not abs(difference) <= par.valve_gap_pa:
+    if st.rest_s > 0.0 or not abs(difference) <= par.valve_gap_pa:
         return
     mean_pa += period / (_MEAN_TIME_S + period) * (difference - mean_pa)
     information += sensitivity * sensitivity - period / par.lag_memory_s * information
@@ -82,6 +84,7 @@ def falls_behind(par: np.record, ring: Ring, st: np.record, inp: np.record) -> b
     """
     if st.history_ticks < par.answer_ticks:
         st.expected_pa = inp.pressure_pa
+        st.lag.rest_s = _REST_S
         return False
     then = credit.row_of(ring, int(st.tick), int(par.answer_ticks))
     arrived: float = ring[then].command_pa
@@ -91,6 +94,10 @@ def falls_behind(par: np.record, ring: Ring, st: np.record, inp: np.record) -> b
         expected = arrived
     expected += par.period_s / (st.lag.lag_s + par.period_s) * (arrived - expected)
     st.expected_pa = expected
-    _find(par, st.lag, arrived, expected, measured)
     gap = abs(expected - measured)
+    if gap > par.valve_gap_pa or inp.held_back != 0.0:
+        st.lag.rest_s = _REST_S
+    else:
+        st.lag.rest_s = max(st.lag.rest_s - par.period_s, 0.0)
+    _find(par, st.lag, arrived, expected, measured)
     return gap > par.valve_gap_pa          # False for NaN: pressure is optional
