@@ -122,9 +122,7 @@ def where_open(numbers: Sequence[Number], intervals: Sequence[Interval], statuse
     x, information = x.copy(), information.copy()
     covariance = np.linalg.inv(information + NOWHERE * np.eye(len(numbers)))
     for j, (n, interval) in enumerate(zip(numbers, intervals)):
-        half = NORMAL_95 * math.sqrt(float(covariance[j, j]))
-        if statuses[j] == UNDETERMINED and is_narrow(
-                n, n.value(float(x[j]) - half), n.value(float(x[j]) + half)):
+        if statuses[j] == UNDETERMINED and _is_narrow_about(n, float(x[j]), covariance[j, j]):
             x[j] = n.coordinate(min(max(n.value(0.0), interval.low), interval.high))
             information[j] = information[:, j] = 0.0
     return x, information
@@ -182,11 +180,16 @@ def _narrow(rig: Rig, numbers: Sequence[Number], information: FloatArray) -> lis
     found = []
     for j, n in enumerate(numbers):
         at = _value(rig, n)
-        half = NORMAL_95 * math.sqrt(float(covariance[j, j]))
         centre = n.coordinate(max(at, n.lower)) if not n.is_scale or at > 0.0 else 0.0
-        if is_narrow(n, n.value(centre - half), n.value(centre + half)):
+        if _is_narrow_about(n, centre, covariance[j, j]):
             found.append(n.name)
     return found
+
+
+def _is_narrow_about(number: Number, centre: float, variance: float) -> bool:
+    """Tell whether the interval that a variance of the coordinate predicts is short."""
+    half = NORMAL_95 * math.sqrt(float(variance))
+    return is_narrow(number, number.value(centre - half), number.value(centre + half))
 
 
 def _value(rig: Rig, number: Number) -> float:

@@ -16,10 +16,11 @@
 The lag of the valve, found in motion.
 
 The commands of one preview ago, behind a low pass of first order, are the pressure to be
-expected. What the measured one differs from it, correlated with what another lag would change,
-gives the lag: recursive least squares with forgetting, on the model's own output (an output
-error method, Ljung 1999). A zero error of the sensor or of the valve is behind a slow mean. An
-error of the dead time goes into the lag, which makes up for it.
+expected. The measured pressure differs from it. This difference is correlated with what another
+lag would change, which gives the lag. The method is recursive least squares with forgetting, on
+the output of the model itself (an output error method, Ljung 1999). A zero error of the sensor or
+of the valve is behind a slow mean. An error of the dead time goes into the lag, which makes up
+for it.
 """
 
 import math
