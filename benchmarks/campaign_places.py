@@ -51,10 +51,10 @@ def show(args):
                 right &= same
                 rows.append(f'| {name} | {WORDS[name]} | {kind} | {"yes" if same else "no"} |')
                 print(rows[-1], file=sys.stderr, flush=True)
-    print('Each ran on one process of this machine, and on a cluster of two workers. What is '
-          'compared: all files of a campaign; controller and rules of a tuning; all bytes of '
-          f'{RUNS} simulations; all answers of the examination and of the ablation, without '
-          'times and the random salt of its keys.\n')
+    print('Each ran on one process of this machine, and on a cluster of two workers. Compared are '
+          'all files of a campaign, controller and rules of a tuning, and all bytes of '
+          f'{RUNS} simulations. Of the examination and of the ablation all answers are compared, '
+          'without times and the random salt of the keys.\n')
     print('| | what runs | engine | equal |\n|---|---|---|---|')
     print('\n'.join(rows))
     return int(not right)
