@@ -68,6 +68,8 @@ html_theme_options = {'navigation_with_keys': True}
 pygments_style = 'friendly'
 pygments_dark_style = 'native'
 toc_object_entries = False
+# Quotes and hyphens are shown as they are written.
+smartquotes = False
 python_use_unqualified_type_names = True
 maximum_signature_line_length = 80
 

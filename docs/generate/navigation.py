@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Quicker navigation: what every page shows beside it is made of the titles of the pages only."""
+"""Quicker navigation: a page shows the titles beside it and of the folders above it only."""
 
 from sphinx import addnodes
 
@@ -35,7 +35,7 @@ def add_quick_navigation(app):
     Hand the theme a tree of titles that copies no heading within a page.
 
     Sphinx copies the whole contents of all pages for each of them, and then drops what is no
-    title. The result is the same.
+    title. Here the tree is open along the branch of the page only; the others are a click away.
     """
     titles = {}
 
@@ -51,7 +51,7 @@ def add_quick_navigation(app):
                 titles.update((name, _with_titles(toc)) for name, toc in env.tocs.items())
             whole, env.tocs = env.tocs, titles
             try:
-                return tree(**options)
+                return tree(**options | {'collapse': True})
             finally:
                 env.tocs = whole
 

@@ -69,9 +69,19 @@ def test_two_gigabytes_are_answered_at_once(tmp_path, monkeypatch, capsys):
     assert case.remark in capsys.readouterr().err
 
 
-@pytest.mark.parametrize('label, draft', list(spoiled_judge.drafts(
-    len(spoiled_judge.KINDS[::3]), 11, spoiled_judge.KINDS[::3])), ids=lambda one: str(one)[:40])
-def test_spoiled_at_random_none_is_silently_wrong(label, draft, tmp_path):
+RANDOM_KINDS = spoiled_judge.KINDS[::3]
+
+
+@pytest.fixture(scope='module')
+def drafts():
+    """Return (label, draft) of every third kind."""
+    return list(spoiled_judge.drafts(len(RANDOM_KINDS), 11, RANDOM_KINDS))
+
+
+@pytest.mark.parametrize(
+    'count', range(len(RANDOM_KINDS)), ids=[kind.__name__ for kind in RANDOM_KINDS])
+def test_spoiled_at_random_none_is_silently_wrong(count, drafts, tmp_path):
+    label, draft = drafts[count]
     verdict, said = spoiled_judge.judged(draft, tmp_path / 'one')
     assert verdict in (*spoiled_judge.GOOD, spoiled_judge.SAID), f'{label}: {verdict}: {said}'
 
