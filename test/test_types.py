@@ -58,7 +58,7 @@ def bare_parts(path):
 
 
 def test_mypy_finds_nothing():
-    """Both packages, strictly; where `mypy` left a cache, seconds. To write one costs a quarter."""
+    """Both packages, strictly; seconds where `mypy` left a cache. To write one takes longer."""
     pytest.importorskip('mypy')
     if tuple(map(int, np.__version__.split('.')[:2])) < (2, 2):
         pytest.skip('the annotations of numpy before 2.2 say less')

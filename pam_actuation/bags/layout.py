@@ -32,7 +32,9 @@ METADATA_VERSION = 9
 STORAGE_IDENTIFIER = 'mcap'
 ROS_DISTRO = 'jazzy'
 METADATA_FILE = 'metadata.yaml'
-_LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)     # in C: ten times as fast
+# In C, where the library has it: ten times as fast.
+_LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
+_DUMPER: Any = getattr(yaml, 'CSafeDumper', yaml.SafeDumper)
 _DEEPEST = 50
 METADATA_ROOT = 'rosbag2_bagfile_information'
 NO_START_TIME_NS = 2**63 - 1           # what rosbag2 writes for a bag without messages
@@ -66,7 +68,7 @@ def qos_profile(depth: int = 10, reliability: str = 'reliable', durability: str 
     }
 
 
-class _PlainDumper(yaml.SafeDumper):
+class _PlainDumper(_DUMPER):  # type: ignore[misc]  # one of two classes
     """Writes repeated values out in full, as rosbag2 does (no anchors)."""
 
     def ignore_aliases(self, data: object) -> bool:
@@ -77,7 +79,7 @@ def to_yaml(data: object) -> str:
     """Return ``data`` as block-style YAML text in the given key order, without folding."""
     return yaml.dump(
         data, Dumper=_PlainDumper, sort_keys=False, default_flow_style=False,
-        allow_unicode=True, width=2**31)
+        allow_unicode=True, width=2**31 - 1)
 
 
 def from_yaml(text: str) -> Any:
