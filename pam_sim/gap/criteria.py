@@ -83,9 +83,13 @@ class Criteria:
         'Time that all signals must cover.',
         'Twice the blocks of one part; design choice.')
     min_rate_hz: float = _criterion(
-        90.0, 'Hz', 'health',
+        9.0, 'Hz', 'health',
         'Rate below which a topic is refused.',
-        'The wire asks for 100 Hz; live rates scatter a little.')
+        'Logs of 10 Hz still show a muscle; rates scatter a little.')
+    min_pulse_rate_hz: float = _criterion(
+        90.0, 'Hz', 'health',
+        'The same for the signal of on/off valves.',
+        'A pulse every 10 ms, and one that is missing is air that is missing.')
     max_hole_s: float = _criterion(
         0.05, 's', 'health',
         'Time without a message from which on it is a dropout.',

@@ -36,6 +36,7 @@ from pam_sim.gap.select.context import context_of
 from pam_sim.gap.select.memory import as_sets, memories
 from pam_sim.gap.select.search import search
 from pam_sim.gap.subsystems.problems import subsystem_problems
+from pam_sim.gap.subsystems.pulses_seen import shows_pulses
 from pam_sim.gap.verdict import fill, judge
 from pam_sim.gap.verify.harm import without_harm
 from pam_sim.gap.verify.materiality import is_material, moved
@@ -93,7 +94,8 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     runs = [runs] if isinstance(runs, Run) else list(runs)
     if certify is not None:
         check_apart(runs, certify, criteria)
-    health = [check_health(run, rig.valve, criteria)
+    driven = rig.load != 'hanging_mass'
+    health = [check_health(run, rig.valve, criteria, driven)
               for run in [*runs, *([certify] if certify else [])]]
     refusals = list(dict.fromkeys(p for h in health for p in h.problems))
     remarks = list(dict.fromkeys(r for h in health for r in h.remarks))
@@ -101,8 +103,12 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
         text = '; '.join(refusals)
         return GapResult('refused', text[:1].upper() + text[1:] + '.', remarks=remarks,
                          runtime_s=time.perf_counter() - started, model_yaml=rig.to_yaml())
-    driven = rig.load != 'hanging_mass'
     recordings = [Recording(without_dead(run), rig.valve, driven) for run in runs]
+    if (rig.valve == 'hsv' and rig.fidelity == 'averaged'
+            and shows_pulses(rig, recordings, criteria)):
+        rig = rig.with_(fidelity='switching')
+        remarks.append('The pressure shows single pulses of the valves, so the model follows '
+                       'every pulse.')
     estimator = Estimator(rig, subsystem_problems(
         rig, recordings, certify is None, seed, criteria), criteria=criteria)
     progress(0.1)

@@ -21,6 +21,7 @@ from pam_sim.gap.criteria import CRITERIA, Criteria
 from pam_sim.gap.data.signals import FIELD, READABLE, SIGNALS, VALVE_FIELDS
 from pam_sim.run import Run
 
+HOLE_PERIODS = 3.0           # of a slow log, from which on messages are missing
 OPTIONAL = ('force',)        # signals without which a comparison is possible
 
 
@@ -46,7 +47,8 @@ class Health:
         return not self.problems
 
 
-def check_health(run: Run, valve: str, criteria: Criteria = CRITERIA) -> Health:
+def check_health(run: Run, valve: str, criteria: Criteria = CRITERIA,
+                 driven: bool = False) -> Health:
     """
     Check a recording before anything is computed from it.
 
@@ -58,6 +60,8 @@ def check_health(run: Run, valve: str, criteria: Criteria = CRITERIA) -> Health:
         Valve of the model it shall be compared with.
     criteria : Criteria
         Decision thresholds.
+    driven : bool
+        Whether the contraction is given, as in an isometric rig or a joint.
 
     Returns
     -------
@@ -89,6 +93,8 @@ def check_health(run: Run, valve: str, criteria: Criteria = CRITERIA) -> Health:
             health.problems.append(f'the recording has no {needed}')
     if 'force' not in health.signals:
         health.remarks.append(
+            'without a load cell, nothing tells of a muscle whose contraction is given: only its '
+            'valve is compared' if driven else
             'without a load cell, errors of the force map and of the load look alike')
     if health.usable:
         _check_duration(run, health, criteria)
@@ -155,10 +161,15 @@ def _check_stamps(run: Run, topic: str, health: Health, criteria: Criteria) -> N
         health.problems.append(f'{topic} has {stamps.size} messages, too few')
         return
     health.rate_hz[topic] = 1.0 / float(np.median(periods))
-    if health.rate_hz[topic] < criteria.min_rate_hz:
+    rate_hz = health.rate_hz[topic]
+    if rate_hz < criteria.min_rate_hz:
+        health.problems.append(f'{topic} comes at {rate_hz:.3g} Hz; at least 10 Hz are needed')
+    elif topic == 'valve_signal' and health.valve == 'hsv' and (
+            rate_hz < criteria.min_pulse_rate_hz):
         health.problems.append(
-            f'{topic} comes at {health.rate_hz[topic]:.0f} Hz; at least 100 Hz are needed')
-    holes = periods[periods > criteria.max_hole_s]
+            f'{topic} comes at {rate_hz:.0f} Hz; of on/off valves every pulse counts, so at least '
+            '100 Hz are needed')
+    holes = periods[periods > max(criteria.max_hole_s, HOLE_PERIODS / rate_hz)]
     lost = float(holes.sum() / periods.sum())
     if lost > criteria.max_lost_share:
         health.problems.append(

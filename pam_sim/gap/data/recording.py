@@ -15,16 +15,23 @@
 """A run on the physics grid: inputs held between their stamps, outputs at theirs."""
 
 from collections.abc import Mapping
+from functools import cached_property
+import math
 from typing import Protocol
 
 import numpy as np
-from pam_sim.annotations import FloatArray, IntArray
+from pam_sim.annotations import BoolArray, FloatArray, IntArray
+from pam_sim.gap.data.given_motion import given_motion
+from pam_sim.gap.data.pulses import openings, Pulses
 from pam_sim.gap.data.signals import FIELD, SIGNALS, VALVE_FIELDS
 from pam_sim.response import Response
 from pam_sim.run import Run, Series
 
 GRID_S = 0.001
 START_S = 0.05               # the state at the start is read from this stretch
+SMOOTH_STEPS = 21            # of a measured signal whose rate is needed
+START_SAMPLES = 3            # or from so many samples of a slow log
+SLOW_S = 1.0 / 90.0          # a valve signal that comes less often may have changed unseen
 
 
 class Measured(Protocol):
@@ -70,6 +77,9 @@ class Recording:
         Physics steps of a free run.
     supply : tuple of numpy.ndarray or None
         Seconds since the start and supply pressure [Pa], where it was recorded.
+    unseen_s : float
+        How long the valve signal may have had its value before the message that tells it: the
+        time between messages of a slow log, else 0.
 
     """
 
@@ -100,6 +110,8 @@ class Recording:
         stamped = [] if command is None else [
             _ordered(command, name) for name in VALVE_FIELDS[valve]]
         self._valve = [((s - self.start_ns) * 1e-9, v) for s, v in stamped]
+        period_s = float(np.median(np.diff(self._valve[0][0]))) if self.messages > 1 else 0.0
+        self.unseen_s = period_s if period_s > SLOW_S else 0.0
         self.supply: tuple[FloatArray, FloatArray] | None = None
         if 'supply_pressure' in run and 'pressure_pa' in run.topics['supply_pressure'].values:
             stamp, value = _ordered(run.topics['supply_pressure'], 'pressure_pa')
@@ -112,20 +124,21 @@ class Recording:
             self.external_force_n = held_mean(
                 (stamp - self.start_ns) * 1e-9, value, self.grid_s, before=0.0)
 
-    def valve_signal(self, delay_s: float = 0.0, stamp_shift_s: FloatArray | None = None
-                     ) -> FloatArray:
+    def valve_signal(self, delay_s: float = 0.0, stamp_shift_s: FloatArray | None = None,
+                     pulses: Pulses | None = None) -> FloatArray:
         """
         Return the valve signal of each physics step, shape (N,) or (N, 2).
 
         ``delay_s`` shifts all of it, ``stamp_shift_s`` (one number per message) each
-        message by itself.
+        message by itself. With ``pulses`` it is how far the on/off valves are open.
         """
         columns = []
         for seconds, value in self._valve:
             moved = seconds + delay_s
             if stamp_shift_s is not None:
                 moved = np.maximum.accumulate(moved + stamp_shift_s[:moved.size])
-            columns.append(held_mean(moved, value, self.grid_s))
+            columns.append(held_mean(moved, value, self.grid_s) if pulses is None else
+                           openings(moved, value, pulses, self.grid_s))
         return columns[0] if len(columns) == 1 else np.column_stack(columns)
 
     @property
@@ -136,7 +149,28 @@ class Recording:
     @property
     def messages(self) -> int:
         """Return the number of valve messages."""
-        return self._valve[0][0].size
+        return self._valve[0][0].size if self._valve else 0
+
+    @cached_property
+    def _given(self) -> tuple[FloatArray, BoolArray]:
+        return given_motion(
+            self.time_s['contraction'], self.measured['contraction'], self.grid_s)
+
+    @property
+    def given_contraction_m(self) -> FloatArray:
+        """Return the contraction that a driven load prescribes [m], on the grid, without noise."""
+        return self._given[0]
+
+    def tells(self, signal: str, time_s: FloatArray) -> BoolArray:
+        """Return at which instants a signal tells of the model: a driven force, in motion."""
+        if not self.driven or signal != 'force':
+            return np.ones(time_s.size, dtype=bool)
+        place = np.clip((time_s / GRID_S).astype(int), 0, self.grid_s.size - 1)
+        return ~self._given[1][place]
+
+    def stamp_sd_s(self, own_s: float) -> float:
+        """Return how far the instants of the valve signal scatter [s], given their stamps."""
+        return math.hypot(own_s, self.unseen_s / math.sqrt(12.0))
 
     def start(self, signal: str) -> float:
         """
@@ -146,6 +180,7 @@ class Recording:
         the signal is already moving.
         """
         early = self.time_s[signal] <= START_S
+        early[:START_SAMPLES] = True
         seconds, value = self.time_s[signal][early], self.measured[signal][early]
         if value.size > 4:
             slope, level = np.polyfit(seconds, value, 1)
@@ -160,6 +195,13 @@ class Recording:
         late_s = late_s or {}
         return {s: np.interp(self.time_s[s] - late_s.get(s, 0.0), response.time_s,
                              getattr(response, FIELD[s])) for s in self.signals}
+
+
+def smoothed(recording: Recording, signal: str) -> tuple[FloatArray, FloatArray]:
+    """Return (value, rate) of a measured signal on the grid, smoothed over some steps."""
+    from scipy.signal import savgol_filter       # slow to import
+    y = np.interp(recording.grid_s, recording.time_s[signal], recording.measured[signal])
+    return tuple(savgol_filter(y, SMOOTH_STEPS, 2, deriv=k, delta=GRID_S) for k in range(2))
 
 
 def held_mean(time_s: FloatArray, value: FloatArray, grid_s: FloatArray,

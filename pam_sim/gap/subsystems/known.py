@@ -15,13 +15,16 @@
 """Numbers with a prior: of the rig, and of the measurement of a recording."""
 
 from dataclasses import dataclass
+import math
 
+from pam_sim.gap.data.recording import GRID_S
 from pam_sim.rig import Rig
 from pam_sim.tolerance import UNKNOWN
 from pam_sim.valve import hsv, ppr
 
 LATENCY_PRIOR_S, LATENCY_SD_S, LATENCY_MAX_S = 1e-3, 1e-3, 3e-3
 SKEW_SD_S, SKEW_MAX_S = 0.5e-3, 1.5e-3
+UNSEEN_MEAN, UNSEEN_SD = 0.25, 0.3       # of the time in which a valve signal changed unseen
 STEP_SD = 0.05               # of slopes, in deviations of the prior
 STEP_OF_UNKNOWN = 0.01       # of the value; where that is 0, its square of the deviation
 
@@ -59,6 +62,18 @@ def known_numbers(rig: Rig) -> list[Known]:
             step = STEP_OF_UNKNOWN * (abs(value) / sd or STEP_OF_UNKNOWN) if unknown else STEP_SD
             found.append(Known(p.name, p.unit, value, sd, p.lower, p.upper, True, step, unknown))
     return found
+
+
+def latency(index: int, unseen_s: float) -> Known:
+    """
+    Return the latency of a valve signal in a recording as Known.
+
+    Of a slow log it may be negative: the signal changed at any time since the message before, or,
+    where a slow loop sends it, with the message.
+    """
+    sd = math.hypot(LATENCY_SD_S, UNSEEN_SD * unseen_s)
+    return Known(of_run('latency', index), 's', LATENCY_PRIOR_S - UNSEEN_MEAN * unseen_s, sd,
+                 -unseen_s, LATENCY_MAX_S, False, GRID_S / sd)
 
 
 def of_run(name: str, index: int) -> str:

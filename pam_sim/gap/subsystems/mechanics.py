@@ -21,10 +21,10 @@ import numpy as np
 from pam_sim.annotations import FloatArray
 from pam_sim.gap.criteria import CRITERIA, Criteria
 from pam_sim.gap.data.noise import noise_of
-from pam_sim.gap.data.recording import GRID_S, Recording
+from pam_sim.gap.data.recording import GRID_S, Recording, smoothed
 from pam_sim.gap.subsystems.effects import sensor_changes, SensorChanges, true_value, undone
 from pam_sim.gap.subsystems.known import Known, known_numbers, of_run, SKEW_MAX_S, SKEW_SD_S
-from pam_sim.gap.subsystems.problem import KEPT, smoothed, SubsystemProblem
+from pam_sim.gap.subsystems.problem import KEPT, SubsystemProblem
 from pam_sim.gap.subsystems.simulation import (
     FAST_GAIN_PA_PER_V, FAST_T_S, pressure_driven, simulate_driven)
 from pam_sim.response import Response
@@ -92,9 +92,7 @@ class MechanicsProblem(SubsystemProblem):
                                 sensor_changes('pressure', rig))
         start = max(true_value('pressure', rig, self._start[index]['pressure'], 0.0), P_ATM_PA)
         if recording.driven:
-            x = np.interp(recording.grid_s, recording.time_s['contraction'],
-                          recording.measured['contraction'])
-            return simulate_driven(rig, recording, x, command, start)
+            return simulate_driven(rig, recording, recording.given_contraction_m, command, start)
         x = true_value('contraction', rig, self._start[index]['contraction'], 0.0)
         return rig.simulate(
             command, external_force_n=recording.external_force_n, initial_pressure_pa=start,

@@ -24,7 +24,7 @@ from pam_sim.gap.criteria import CRITERIA, Criteria
 from pam_sim.gap.data.noise import sensor_floor, STAMP_SD_S
 from pam_sim.gap.data.recording import GRID_S, Recording
 from pam_sim.gap.data.signals import FIELD, SIGNALS
-from pam_sim.gap.data.split import part_of
+from pam_sim.gap.data.split import part_of, UNUSED
 from pam_sim.gap.subsystems.known import Known, of_run
 from pam_sim.response import Response
 from pam_sim.rig import Rig
@@ -33,7 +33,6 @@ RATE_HZ = 200.0              # of the samples that are compared
 TEST_BLOCK_S = 0.5           # of the paired tests between rivals
 INPUT_DRAWS = 3
 COARSE_GAIN = 4.0            # error of linear interpolation over twice the period
-SMOOTH_STEPS = 21            # of a measured signal whose rate is needed
 KEPT = 16                    # inputs and instants that many simulations in a row share
 
 
@@ -96,7 +95,9 @@ class SubsystemProblem:
                 time_s = recording.time_s[name]
                 every = max(int(round(1.0 / (np.median(np.diff(time_s)) * RATE_HZ))), 1)
                 chosen[name] = at = time_s[::every]
-                parts.append(part_of(at, recording.grid_s[-1], holds_certify))
+                parts.append(np.where(
+                    recording.tells(name, at),
+                    part_of(at, recording.grid_s[-1], holds_certify), UNUSED))
                 blocks.append(first + (at // TEST_BLOCK_S).astype(int))
                 signals.append(np.full(at.size, s))
                 times.append(at)
@@ -207,10 +208,3 @@ class SubsystemProblem:
     def _coarse(self, rig: Rig) -> FloatArray:
         """Return the values with every second sample of the measured input left out."""
         return self.values(rig, np.zeros(len(self.known)))
-
-
-def smoothed(recording: Recording, signal: str) -> tuple[FloatArray, FloatArray]:
-    """Return (value, rate) of a measured signal on the grid, smoothed over some steps."""
-    from scipy.signal import savgol_filter       # slow to import
-    y = np.interp(recording.grid_s, recording.time_s[signal], recording.measured[signal])
-    return tuple(savgol_filter(y, SMOOTH_STEPS, 2, deriv=k, delta=GRID_S) for k in range(2))

@@ -26,6 +26,7 @@ from pam_sim.annotations import FloatArray
 from pam_sim.effects.registry import get_effect
 from pam_sim.gap.data.recording import GRID_S, Recording
 from pam_sim.gap.subsystems.effects import true_value
+from pam_sim.gap.subsystems.pulses import on_openings, pulses_of
 from pam_sim.response import Response
 from pam_sim.rig import Rig
 from pam_sim.units import P_ATM_PA
@@ -59,8 +60,9 @@ def free_run(rig: Rig, recording: Recording, delay_s: float = 0.0,
         By how much the stamps of a signal are late.
 
     """
-    return recording.at_stamps(simulate(
-        rig, recording, recording.valve_signal(delay_s, stamp_shift_s), start_error_pa), late_s)
+    signal = recording.valve_signal(delay_s, stamp_shift_s, pulses_of(rig))
+    return recording.at_stamps(
+        simulate(on_openings(rig), recording, signal, start_error_pa), late_s)
 
 
 def run_from_pressure(rig: Rig, recording: Recording) -> dict[str, FloatArray]:
@@ -114,9 +116,7 @@ def simulate(rig: Rig, recording: Recording, valve_signal: FloatArray, start_err
     # What the sensors add is not in the muscle: a closed volume would keep it.
     p = true_value('pressure', rig, recording.start('pressure') + start_error_pa, 0.0)
     if recording.driven:
-        x = np.interp(recording.grid_s, recording.time_s['contraction'],
-                      recording.measured['contraction'])
-        return simulate_driven(rig, recording, x, valve_signal, p)
+        return simulate_driven(rig, recording, recording.given_contraction_m, valve_signal, p)
     x = true_value('contraction', rig, recording.start('contraction'), 0.0)
     return rig.simulate(
         valve_signal, external_force_n=recording.external_force_n,

@@ -21,11 +21,11 @@ import numpy as np
 from pam_sim.annotations import FloatArray
 from pam_sim.gap.criteria import CRITERIA, Criteria
 from pam_sim.gap.data.noise import noise_sd, SMALLEST
-from pam_sim.gap.data.recording import GRID_S, Recording
+from pam_sim.gap.data.recording import Recording, smoothed
 from pam_sim.gap.subsystems.effects import acts_on, true_value
-from pam_sim.gap.subsystems.known import (
-    Known, known_numbers, LATENCY_MAX_S, LATENCY_PRIOR_S, LATENCY_SD_S, of_run)
-from pam_sim.gap.subsystems.problem import KEPT, smoothed, SubsystemProblem
+from pam_sim.gap.subsystems.known import Known, known_numbers, latency, of_run
+from pam_sim.gap.subsystems.problem import KEPT, SubsystemProblem
+from pam_sim.gap.subsystems.pulses import on_openings, pulses_of
 from pam_sim.gap.subsystems.simulation import simulate_driven
 from pam_sim.response import Response
 from pam_sim.rig import Rig
@@ -43,7 +43,7 @@ class ValveProblem(SubsystemProblem):
                  seed: int = 0, criteria: Criteria = CRITERIA) -> None:
         self._shift_s: list[FloatArray] | None = None
         self._signal = lru_cache(maxsize=KEPT)(
-            lambda index, late_s: recordings[index].valve_signal(late_s))
+            lambda index, late_s, pulses: recordings[index].valve_signal(late_s, None, pulses))
         self._motion = [smoothed(r, 'contraction') for r in recordings]
         super().__init__(rig, recordings, holds_certify, seed, criteria)
 
@@ -61,8 +61,7 @@ class ValveProblem(SubsystemProblem):
     def _nuisances(recordings: Sequence[Recording]) -> list[Known]:
         found = []
         for index, recording in enumerate(recordings):
-            found.append(Known(of_run('latency', index), 's', LATENCY_PRIOR_S, LATENCY_SD_S, 0.0,
-                               LATENCY_MAX_S, False, GRID_S / LATENCY_SD_S))
+            found.append(latency(index, recording.unseen_s))
             if recording.valve == 'hsv':    # a closed volume keeps the error of its start
                 sd = max(noise_sd(recording.measured['pressure']), SMALLEST['pressure'])
                 found.append(Known(of_run('start_error', index), 'Pa', 0.0, sd,
@@ -71,16 +70,18 @@ class ValveProblem(SubsystemProblem):
 
     def _disturb(self, random: np.random.Generator | None) -> None:
         self._shift_s = None if random is None else [
-            self._stamp_sd_s * random.standard_normal(r.messages) for r in self.recordings]
+            r.stamp_sd_s(self._stamp_sd_s) * random.standard_normal(r.messages)
+            for r in self.recordings]
 
     def _simulate(self, rig: Rig, index: int, numbers: Mapping[str, float]) -> Response:
         recording = self.recordings[index]
         shift = None if self._shift_s is None else self._shift_s[index]
         x = true_value('contraction', rig, *self._motion[index])
         kept = [e for e in rig.effects if acts_on(e.name, 'valve')]
+        late_s, pulses = numbers[of_run('latency', index)], pulses_of(rig)
         p = self._start[index]['pressure'] + numbers.get(of_run('start_error', index), 0.0)
         return simulate_driven(
-            rig.with_(effects=kept), recording, x,
-            self._signal(index, numbers[of_run('latency', index)]) if shift is None else
-            recording.valve_signal(numbers[of_run('latency', index)], shift),
+            on_openings(rig.with_(effects=kept)), recording, x,
+            self._signal(index, late_s, pulses) if shift is None else
+            recording.valve_signal(late_s, shift, pulses),
             true_value('pressure', rig, p, 0.0))

@@ -112,7 +112,8 @@ class OwnRuns:
     def chosen(self, p: SubsystemProblem, signal: str) -> BoolArray:
         """Return which samples are those of a signal on the certify data."""
         part = (p.run == 0) & (p.time_s > SETTLE_S if self._whole else p.part == CERTIFY)
-        return part & (p.signal == p.signals.index(signal))
+        return part & (p.signal == p.signals.index(signal)) & p.recordings[0].tells(
+            signal, p.time_s)
 
     def _cut(self, p: SubsystemProblem, errors: FloatArray
              ) -> dict[tuple[str, str], FloatArray]:

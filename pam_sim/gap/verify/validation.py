@@ -86,9 +86,10 @@ class Validation:
     def __init__(self, recording: Recording, whole: bool, estimator: Estimator, base: Fit,
                  final: Fit, seed: int = 0) -> None:
         self.recording, self.estimator = recording, estimator
-        self.part = {s: recording.time_s[s] > SETTLE_S if whole else
-                     part_of(recording.time_s[s], recording.grid_s[-1]) == CERTIFY
-                     for s in recording.signals}
+        self.part = {s: recording.tells(s, recording.time_s[s]) & (
+            recording.time_s[s] > SETTLE_S if whole else
+            part_of(recording.time_s[s], recording.grid_s[-1]) == CERTIFY)
+            for s in recording.signals}
         self.before = free_run(estimator.rig, recording)
         self.refit, self.after = self.run(base, whole), self.run(final, whole)
         self.simulations = 3
@@ -225,7 +226,7 @@ class Validation:
         found: list[dict[str, FloatArray]] = []
         start_sd = start_error_sd(r)
         for _ in range(INPUT_DRAWS):
-            shift = STAMP_SD_S * random.standard_normal(r.messages)
+            shift = r.stamp_sd_s(STAMP_SD_S) * random.standard_normal(r.messages)
             moved = self.run(final, whole, shift, start_sd * random.standard_normal())
             self.simulations += 1
             found.append({s: moved[s] - self.after[s] for s in r.signals})

@@ -1,0 +1,64 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The contraction that a load prescribes, without what the noise of its sensor would make of it.
+
+The model takes the motion as it is given: its speed becomes damping, and its direction that of dry
+friction. Noise at rest would turn that direction hundreds of times a second.
+"""
+
+import numpy as np
+from pam_sim.annotations import BoolArray, FloatArray
+from pam_sim.gap.data.noise import noise_of
+
+WINDOW_S = 0.061             # of the parabolas that smooth; passes what is slower than 15 Hz
+PARABOLA_GAIN = 2.25         # variance of the middle of a parabola through N values, times N
+MOSTLY = 0.5                 # share of the time
+STILL_SD = 3.0               # a move within so many deviations of the noise left is none
+
+
+def given_motion(time_s: FloatArray, values: FloatArray, grid_s: FloatArray
+                 ) -> tuple[FloatArray, BoolArray]:
+    """
+    Return a measured contraction [m] on an even grid, smoothed, and still where it rests.
+
+    And where it rests, or moves by less than its noise: the direction of dry friction is not
+    known there. Nowhere where that is the greater part, as in a muscle that is held.
+
+    Parameters
+    ----------
+    time_s, values : numpy.ndarray, shape (M,)
+        What was measured.
+    grid_s : numpy.ndarray, shape (N,)
+        Evenly spaced instants.
+
+    """
+    from scipy.signal import savgol_filter       # slow to import
+    steps = 2 * int(0.5 * WINDOW_S / (grid_s[1] - grid_s[0])) + 1
+    y = savgol_filter(np.interp(grid_s, time_s, values), steps, 2)
+    within = max(WINDOW_S / float(np.median(np.diff(time_s))), PARABOLA_GAIN)
+    noise = noise_of(time_s, values).sd * float(np.sqrt(PARABOLA_GAIN / within))
+    found = followed(y, STILL_SD * noise)
+    hidden = np.append((np.diff(found) == 0.0) & (np.diff(y) != 0.0), False)
+    return found, hidden & (np.mean(hidden) < MOSTLY)
+
+
+def followed(values: FloatArray, play: float) -> FloatArray:
+    """Return what follows values with a play to either side, set in its middle at the start."""
+    place, found = float(values[0]), []
+    for value in values.tolist():
+        place = min(max(place, value - play), value + play)
+        found.append(place)
+    return np.array(found)
