@@ -25,6 +25,7 @@ from pam_actuation.cli.common import (
 from pam_actuation.cli.options import number, out_path, Parser, source
 
 if TYPE_CHECKING:
+    from pam_actuation.report.joint_gap import Question
     from pam_sim.gap.result import GapResult
 
 HELP = 'Find what a model misses in recorded runs, name it, add it and prove that the gap shrank.'
@@ -37,8 +38,8 @@ def add_arguments(parser: Parser) -> None:
     """Declare the options of the verb."""
     parser.add_argument('run', type=source, nargs='*', help='recorded bags')
     parser.add_argument('--model', type=source, default=MODEL, metavar='NAME|FILE',
-                        help='model YAML or rig preset to hold against the recording '
-                        '(default: %(default)s)')
+                        help='model YAML or preset of a rig or a joint to hold against the '
+                        'recording (default: %(default)s)')
     parser.add_argument('--out', type=out_path, default=None, metavar='DIR',
                         help='folder for the results; those of the same bags and model are '
                         'made again')
@@ -55,7 +56,8 @@ def add_arguments(parser: Parser) -> None:
                         help='plan for a rig without a load cell')
     parser.add_argument('--certify', type=source, default=None, metavar='RUN',
                         help='bag for the proof (default: every fifth block of the first bag)')
-    parser.add_argument('--namespace', default=None, help='namespace of the muscle in the bags')
+    parser.add_argument('--namespace', default=None,
+                        help='namespace of the muscle or the joint in the bags')
     parser.add_argument('--effects', type=source, default=None, metavar='A,B',
                         help='names to try (default: all)')
     parser.add_argument('--seconds', type=number(1.0, None, 's'), default=SECONDS, metavar='N',
@@ -68,31 +70,45 @@ def add_arguments(parser: Parser) -> None:
 
 def run(args: argparse.Namespace) -> int | None:
     """Find the gap; exit code 1 only where the data cannot be used or cannot be right."""
-    from pam_actuation.bags.load import load_run
-    from pam_actuation.report.gap import FILES, write_gap
-    from pam_actuation.report.origin import is_of, origin
+    from pam_actuation.report.joint_gap import questions
     from pam_sim.errors import InputError
-    from pam_sim.files import check_folder
     if args.explain is not None:
         return _explain(args)
     if args.plan:
         return _plan(args)
     if not args.run or args.out is None:
         raise InputError('needs at least one recorded bag and --out DIR')
+    found: dict[str, GapResult] = {}
+    lines: list[str] = []
+    for question in questions(args.model, args.run[0], args.namespace):
+        out = os.path.join(args.out, question.side) if question.side else args.out
+        found[question.side] = result = _ask(args, question, out)
+        lines += [f'{question.side}:'] if question.side else []
+        lines += [result.text(), f'results: {out}', *_next_lines(result, out)]
+    alone = found.get('')
+    emit(args, alone.to_dict() if alone is not None else {
+        'schema': 1, **{side: result.to_dict() for side, result in found.items()}},
+        '\n'.join(lines))
+    refused = any(result.verdict == 'refused' for result in found.values())
+    return EXIT_FINDING if refused else EXIT_DONE
+
+
+def _ask(args: argparse.Namespace, question: 'Question', out: str) -> 'GapResult':
+    """Return the result for one muscle, written into its folder."""
+    from pam_actuation.report.gap import FILES, write_gap
+    from pam_actuation.report.origin import is_of, origin
+    from pam_sim.files import check_folder
     names = effect_names(args) or None
-    page = os.path.join(args.out, 'report.html')
+    page = os.path.join(out, 'report.html')
     of = origin(args.run, page, 'gap', args.model, args.certify)
-    check_folder(args.out, FILES, args.overwrite or is_of(page, of))
-    runs = [load_run(path, namespace=args.namespace) for path in args.run]
-    certify = load_run(args.certify, namespace=args.namespace) if args.certify else None
+    check_folder(out, FILES, args.overwrite or is_of(page, of))
+    runs = [question.load(path) for path in args.run]
+    certify = question.load(args.certify) if args.certify else None
     note_implausible(args, [*runs, *([certify] if certify else [])])
-    with progress(args, 1.0, '', 'gap') as bar:
-        result = write_gap(
-            runs, args.model, args.out, certify, of, effects=names, seconds=args.seconds,
+    with progress(args, 1.0, '', question.side or 'gap') as bar:
+        return write_gap(
+            runs, question.model, out, certify, of, effects=names, seconds=args.seconds,
             materiality=args.materiality, progress=lambda done: bar.update(done - bar.n))
-    emit(args, result.to_dict(), '\n'.join(
-        [result.text(), f'results: {args.out}', *_next_lines(result, args.out)]))
-    return EXIT_FINDING if result.verdict == 'refused' else EXIT_DONE
 
 
 def _next_lines(result: 'GapResult', out: str) -> list[str]:

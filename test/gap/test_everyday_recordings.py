@@ -1,0 +1,100 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Recordings as people have them: pulses of valves, slow logs, the muscles of a joint."""
+
+from gap_runs import NOMINAL, nominal, recorded, voltages
+import numpy as np
+from pam_actuation.report.joint_gap import contraction_of, questions
+from pam_sim.effects.valve_dead_zone_gradual import mean_opening_with_lift
+from pam_sim.gap import find_gap
+from pam_sim.gap.data.given_motion import given_motion
+from pam_sim.gap.data.health import check_health
+from pam_sim.gap.data.pulses import openings, Pulses
+from pam_sim.gap.data.recording import Recording
+from pam_sim.gap.subsystems.pulses_seen import shows_pulses
+from pam_sim.model_file import load_rig
+from pam_sim.run import Series
+import pytest
+
+DUTIES = (0.0, 0.05, 0.2, 0.5, 0.95, 1.0)
+EDGES = {'plain': (0.0, 0.0, 0.0, 0.0), 'late': (1.7e-3, 2.0e-3, 0.0, 0.0),
+         'ramps': (1.7e-3, 2.0e-3, 1.0e-3, 0.8e-3)}
+
+
+@pytest.mark.parametrize('edges', EDGES.values(), ids=EDGES)
+def test_pulses_have_the_mean_opening_of_the_averaged_valves(edges):
+    stamps, grid = np.arange(40) * 0.010 + 0.0004, np.arange(401) * 1e-3
+    for duty in DUTIES:
+        found = openings(stamps, np.full(40, duty), Pulses(0.010, *edges), grid)
+        assert found[100:300].mean() == pytest.approx(
+            mean_opening_with_lift.py_func(duty, 0.010, *edges), abs=1e-9)
+
+
+def test_what_is_held_longer_than_a_period_is_repeated_and_scattered_stamps_leave_no_break():
+    grid = np.arange(61) * 1e-3
+    held = openings(np.array([0.0, 0.030]), np.array([0.3, 0.0]), Pulses(0.010), grid)
+    assert np.flatnonzero(held > 0.5).tolist() == [0, 1, 2, 10, 11, 12, 20, 21, 22]
+    late = np.array([0.0, 0.0103, 0.0199, 0.0302])
+    assert openings(late, np.array([1.0, 1.0, 1.0, 0.0]), Pulses(0.010), grid)[:30].min() == 1.0
+
+
+@pytest.mark.parametrize('fidelity', ['averaged', 'switching'])
+def test_the_pressure_tells_whether_the_valves_switch(fidelity):
+    rig = load_rig(NOMINAL, valve='hsv')
+    wave = 0.25 * np.cos(2.0 * np.pi * 0.3e-3 * np.arange(6000))
+    duty = np.column_stack([np.clip(wave, 0.0, 1.0), np.clip(-1.1 * wave, 0.0, 1.0)])
+    run = recorded(rig.with_(fidelity=fidelity), np.repeat(duty[::10], 10, axis=0), 500)
+    signal = run.topics['valve_signal']
+    signal.stamp_ns = signal.stamp_ns[::5]
+    signal.values = {name: values[::5] for name, values in signal.values.items()}
+    assert shows_pulses(rig, [Recording(run, 'hsv')]) == (fidelity == 'switching')
+
+
+def test_a_slow_log_names_an_effect():
+    rig = nominal().with_(effects=[
+        {'name': 'bladder_stiffness', 'parameters': {'stiffness_n_per_m': 200.0}}])
+    result = find_gap(recorded(rig, voltages(12.0), rate_hz=50), nominal(),
+                      effects=['bladder_stiffness', 'parallel_spring', 'coulomb_friction'])
+    assert [effect['name'] for effect in result.effects] == ['bladder_stiffness'], result.reason
+
+
+def test_of_on_off_valves_every_pulse_is_needed():
+    rig = load_rig(NOMINAL, valve='hsv')
+    run = recorded(rig, np.zeros((8000, 2)), rate_hz=50, initial_pressure_pa=401_325.0)
+    assert any('every pulse counts' in problem for problem in check_health(run, 'hsv').problems)
+
+
+def test_noise_at_rest_is_no_motion_and_a_motion_keeps_its_way():
+    random, grid = np.random.default_rng(1), np.arange(6001) * 1e-3
+    times = np.arange(0.0, 6.0, 0.002)
+    true = 0.010 + 0.004 * np.clip(times - 1.0, 0.0, 4.0)
+    read = true + 1e-5 * random.standard_normal(times.size)
+    motion, hidden = given_motion(times, read, grid)
+    assert np.abs(motion - np.interp(grid, times, true)).max() < 3e-5
+    assert not hidden[1100:4900].any()
+    assert hidden[:900].mean() > 0.9 < hidden[5200:5900].mean()
+    # A muscle that is held tells by its force at rest.
+    assert not given_motion(times, read - true + 0.010, grid)[1].any()
+
+
+def test_a_muscle_of_a_joint_has_a_model_of_its_own_and_its_contraction_by_the_angle():
+    one, = questions('joint_dmsp_5_300', 'unread', '/knee/extensor')
+    assert (one.side, one.model, one.namespace) == (
+        '', 'joint_dmsp_5_300/extensor', '/knee/extensor')
+    angle = Series(np.array([0, 1]), {'angle_rad': np.array([0.0, 0.1])})
+    for side, expected in (('flexor', (0.015, 0.0162)), ('extensor', (0.015, 0.0138))):
+        found = contraction_of(angle, one.joint, side)
+        assert found.values['contraction_m'] == pytest.approx(expected)
+    assert questions(NOMINAL, 'unread')[0].joint is None
