@@ -35,10 +35,15 @@ def pam_gap(folder, runs, out, materiality=1.0, seconds=None):
         As of the options.
 
     """
+    options = ['--certify', str(folder / 'certify'), '--materiality', str(materiality)]
+    return ask(runs, folder / 'model.yaml', options, out, seconds)
+
+
+def ask(runs, model, options, out, seconds=None):
+    """Return as ``pam_gap`` the answer about bags, a model, and further options of the verb."""
     from pam_actuation.cli.main import main
     said = io.StringIO()
-    arguments = ['gap', *map(str, runs), '--model', str(folder / 'model.yaml'), '--certify',
-                 str(folder / 'certify'), '--out', str(out), '--materiality', str(materiality)]
+    arguments = ['gap', *map(str, runs), '--model', str(model), *options, '--out', str(out)]
     arguments += [] if seconds is None else ['--seconds', str(seconds)]
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):

@@ -24,11 +24,12 @@ _PRESSURE = 'sensor_msgs/msg/FluidPressure'
 _JOINTS = 'sensor_msgs/msg/JointState'
 _WRENCH = 'geometry_msgs/msg/WrenchStamped'
 TYPES = {'pressure': _PRESSURE, 'supply_pressure': _PRESSURE, 'pressure_command': _PRESSURE,
-         'contraction': _JOINTS, 'valve_signal': _JOINTS, 'force': _WRENCH}
+         'contraction': _JOINTS, 'valve_signal': _JOINTS, 'force': _WRENCH,
+         'joint_state': _JOINTS}
 _MARK = 1.2345678901234567e-300      # finds the place of a value in a serialised message
 
 
-def write_bag(path, signals, signal_names):
+def write_bag(path, signals, signal_names, namespace=NAMESPACE):
     """
     Write a bag.
 
@@ -37,17 +38,20 @@ def write_bag(path, signals, signal_names):
     path : pathlib.Path
         Must not exist.
     signals : dict of str -> (numpy.ndarray, numpy.ndarray)
-        By topic: stamps [s] from the start, and values, one row per message.
+        By topic, below the namespace: stamps [s] from the start, and values, one row per message.
     signal_names : tuple of str
         Names in ``valve_signal``.
+    namespace : str
+        Of the muscle, or of the joint.
 
     """
     store = get_typestore(Stores.ROS2_JAZZY)
     messages = []
     with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        for topic, (stamps, values) in signals.items():
+        for place, (stamps, values) in signals.items():
+            topic = place.rpartition('/')[2]
             connection = writer.add_connection(
-                f'{NAMESPACE}/{topic}', TYPES[topic], typestore=store)
+                f'{namespace}/{place}', TYPES[topic], typestore=store)
             rows = np.asarray(values, dtype=float).reshape(len(stamps), -1)
             stamps_ns = START_NS + np.round(np.asarray(stamps) * 1e9).astype(np.int64)
             messages += [(int(t), connection, raw) for t, raw in zip(

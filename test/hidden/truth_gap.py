@@ -36,7 +36,8 @@ EVERY = 25                    # rows of 0.2 ms: compared at 200 Hz
 ROUNDS = {'plain': 1, 'tempered': 5}         # the first is at full weight
 
 
-def gap_in_sigma(numbers, without, chain, fit, certify, valve, start=None):
+def gap_in_sigma(numbers, without, chain, fit, certify, valve, start=None, replay=runs.replay,
+                 latency_sd_s=LATENCY_SD_S):
     """
     Return {refit: {signal: gap in sigma}} of the certify run.
 
@@ -54,6 +55,10 @@ def gap_in_sigma(numbers, without, chain, fit, certify, valve, start=None):
         Valve.
     start : dict, optional
         Numbers as the data sheet has them, the centre of the prior; nominal by default.
+    replay : callable
+        As of ``truth_run.replay``.
+    latency_sd_s : float
+        Prior deviation of the latency.
 
     """
     names = [effects.PARAMETERS[p][0] for p in effects.PARAMETERS_OF[valve]]
@@ -72,7 +77,7 @@ def gap_in_sigma(numbers, without, chain, fit, certify, valve, start=None):
         changed = without | {
             n: nominal[n] + s * z for n, s, z in zip(names, sd, theta)}
         first_pa = float(sensors.readings(run.rows[:1], plain)['pressure'][0])
-        return _scaled(runs.replay(changed, valve, run, first_pa), neutral, signals)
+        return _scaled(replay(changed, valve, run, first_pa), neutral, signals)
 
     # The prior is about the data sheet; the fit starts at the true numbers.
     theta = np.array([(without.get(n, nominal[n]) - nominal[n]) / s
@@ -85,27 +90,27 @@ def gap_in_sigma(numbers, without, chain, fit, certify, valve, start=None):
         for s, values in model(moved, fit).items():
             slopes[s][:, k] = (values - base[s]) / 0.3
     for s in signals:
-        slopes[s][:, -1] = -np.gradient(base[s], EVERY * sensors.ROW_S) * LATENCY_SD_S
+        slopes[s][:, -1] = -np.gradient(base[s], EVERY * sensors.ROW_S) * latency_sd_s
     prior = np.concatenate([theta, [0.0]])
     left = {s: target[s] - base[s] for s in signals}
     found = {}
     for refit, rounds in ROUNDS.items():
         step = _fitted(left, slopes, prior, rounds)
         if rounds == 1:
-            step = _corrected(step, model, theta, fit, target, slopes, prior)
+            step = _corrected(step, model, theta, fit, target, slopes, prior, latency_sd_s)
         end = model(theta + step[:-1], certify)
         truth = _scaled(certify.rows, chain, signals)
-        found[refit] = {s: float(np.sqrt(np.mean((truth[s] - _late(end[s], step)) ** 2)))
-                        for s in signals}
+        found[refit] = {s: float(np.sqrt(np.mean(
+            (truth[s] - _late(end[s], step, latency_sd_s)) ** 2))) for s in signals}
     return found
 
 
-def _late(values, step):
+def _late(values, step, latency_sd_s):
     """Return a signal later by the latency of a step."""
-    return values - np.gradient(values, EVERY * sensors.ROW_S) * step[-1] * LATENCY_SD_S
+    return values - np.gradient(values, EVERY * sensors.ROW_S) * step[-1] * latency_sd_s
 
 
-def _corrected(step, model, theta, fit, target, slopes, prior):
+def _corrected(step, model, theta, fit, target, slopes, prior, latency_sd_s):
     """
     Return a step of full weight, corrected once where it leads, if that lowers the squares.
 
@@ -114,7 +119,7 @@ def _corrected(step, model, theta, fit, target, slopes, prior):
     def reached(at):
         values = model(theta + at[:-1], fit)
         with np.errstate(all='ignore'):
-            off = {s: target[s] - _late(values[s], at) for s in target}
+            off = {s: target[s] - _late(values[s], at, latency_sd_s) for s in target}
             squares = sum(float(np.sum(v**2)) for v in off.values())
         return off, squares + float(np.sum((prior + at) ** 2))
 

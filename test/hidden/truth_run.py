@@ -91,6 +91,11 @@ def replay(numbers, valve, truth, start_pa=None):
 
 def record(path, truth, valve, chain, rng):
     """Measure a Truth and write the bag."""
+    bags.write_bag(path, signals_of(truth, valve, chain, rng), SIGNALS[valve])
+
+
+def signals_of(truth, valve, chain, rng):
+    """Return {topic: (stamps [s], values)} of what sensors and stamps make of a Truth."""
     signals = sensors.measured(truth.rows, chain, rng, reservoir=valve == 'hsv')
     skew = chain.skew_s.get('valve_signal', 0.0)
     stamps = truth.sent_s + 1e-3 + skew + sensors.stamp_errors(truth.sent_s.size, chain, rng)
@@ -100,4 +105,4 @@ def record(path, truth, valve, chain, rng):
     signals['valve_signal'] = (stamps[order], truth.sent[order])
     every = 2
     signals['pressure_command'] = (truth.wanted_s[::every] + 1e-3, truth.wanted[::every])
-    bags.write_bag(path, signals, SIGNALS[valve])
+    return signals
