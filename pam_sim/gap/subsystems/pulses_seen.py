@@ -17,7 +17,7 @@
 from collections.abc import Sequence
 
 import numpy as np
-from pam_sim.gap.criteria import Criteria, CRITERIA
+from pam_sim.gap.criteria import CRITERIA, Criteria
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.subsystems.simulation import free_run
 from pam_sim.rig import Rig
