@@ -142,7 +142,8 @@ def generate_launch_description():
         'hardware_sensors', LaunchConfiguration(HARDWARE_FILE),
         condition=IfCondition(NotEqualsSubstitution(hardware, 'sim')))
     driver = _node(
-        'valve_driver', valve, {'rig': _text('rig'), 'accept_valve_command': ParameterValue(
+        'valve_driver', valve, {'rig': _text('rig'), 'controller': _text(CONTROLLER_NAME)},
+        {'accept_valve_command': ParameterValue(
             LaunchConfiguration(RAW), value_type=bool)}, LaunchConfiguration(HARDWARE_FILE))
     watchdog = _node(
         'valve_watchdog', valve, condition=IfCondition(EqualsSubstitution(hardware, 'sim')))

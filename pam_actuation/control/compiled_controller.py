@@ -53,6 +53,7 @@ class CompiledController:
     static_inverse: FloatArray
     rules: 'RuleBase | None' = None
     made_for: dict[str, Any] | None = None  # facts of the rig, see ``made_for``
+    driver: dict[str, float] | None = None  # numbers of the driver's law it asks for, by name
     other_rig = ''          # how the rig it runs on differs, if that was accepted
 
     _step: Callable[..., float]

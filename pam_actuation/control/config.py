@@ -24,6 +24,7 @@ Controllers from YAML: a preset name, a file, or the text a recording carries.
     mode: contraction             # or force, joint: what is tracked (``control/modes``)
     force: {stiffness_n_per_m: 1800}             # of mode force, all keys optional
     joint: {co_contraction_gauge_pa: 300000}     # of mode joint, all keys optional
+    driver: {hsv.gain: 0.4}       # optional: numbers of the driver's law, ``drivers/asked.py``
     rules: learned.json           # optional: rules to start from, path relative to this file
 
 Written by ``to_yaml`` for recordings, which must not depend on anything else: ``rig`` (identity),
@@ -49,6 +50,7 @@ from pam_actuation.control.sofc.controller import SelfOrganizingFuzzyController
 from pam_actuation.control.sofc.persistence import load_rules, rules_from_mapping
 from pam_actuation.control.static_inverse import (
     static_inverse, tabulate_static_inverse)
+from pam_actuation.drivers.asked import asked_in
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.joint.rig import JointRig
@@ -71,6 +73,8 @@ KEYS = (
         otherwise='fits any rig'),
     Key('settings', dict, 'Numbers of the control law that differ from the defaults.',
         otherwise='the defaults'),
+    Key('driver', dict, 'Numbers of the law of the valve driver that it asks for, by name.',
+        otherwise='what the rig tells'),
     *MODE_KEYS)
 _INVERSE = Key('static_inverse', dict, 'Pressure over contraction at rest, as a recording '
                'keeps it.', otherwise='from the rig')
@@ -161,6 +165,7 @@ def controller_from_tree(tree: Located, rig: 'JointRig | Rig | None' = None, fol
         facts, other_rig = check_made_for(tree, rig, accept_other_rig)
     controller = _built(tree, rig, folder)
     controller.made_for, controller.other_rig = facts, other_rig
+    controller.driver = asked_in(tree)
     return controller
 
 

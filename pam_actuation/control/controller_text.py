@@ -44,6 +44,10 @@ class Written(Protocol):
         """Return facts of the rig, see ``made_for``."""
 
     @property
+    def driver(self) -> Mapping[str, float] | None:
+        """Return the numbers of the driver's law it asks for, by name."""
+
+    @property
     def settings(self) -> Mapping[str, float]:
         """Return the settings by name."""
 
@@ -69,6 +73,7 @@ def controller_to_yaml(controller: Written,
     data = {
         'controller': controller.kind, 'rig': controller.rig_name,
         **({'made_for': dict(controller.made_for)} if controller.made_for else {}),
+        **({'driver': dict(controller.driver)} if controller.driver else {}),
         'settings': settings, **controller.file_entries()}
     if controller.rules is not None and rules_file is not None:
         data['rules'] = os.path.basename(rules_file)

@@ -30,7 +30,6 @@ from pam_sim.errors import InputError
 from pam_sim.parameters import check_given
 
 VALVE_TYPES = ('ppr', 'hsv')
-_WAIT = 'command_wait_s'
 
 
 def check_valve_type(valve_type: str, where: str = 'valve_type') -> str:
@@ -92,41 +91,6 @@ class DriverConfig:
             '': self.safety, 'ppr.': self.ppr, 'hsv.': self.hsv}
         return {group + item.name: getattr(part, item.name)
                 for group, part in groups.items() for item in fields(part)}
-
-
-def driver_facts(changes: Mapping[str, object] | None = None) -> dict[str, str]:
-    """
-    Return what a bag says of how its drivers act, for the record ``pam_experiment``.
-
-    ``changes``: their parameters that differ from the defaults, by name.
-    """
-    return {_WAIT: str((changes or {}).get(_WAIT, SafetyLimits.command_wait_s))}
-
-
-def as_recorded(metadata: Mapping[str, str], where: str) -> dict[str, object]:
-    """
-    Return the changes with which a driver acts as it did in a recording.
-
-    In recordings that do not say how long commands waited, none did.
-
-    Parameters
-    ----------
-    metadata : mapping
-        Texts of the record ``pam_experiment``.
-    where : str
-        Name of the recording, for the error text.
-
-    Raises
-    ------
-    InputError
-        The recording says something that is no number.
-
-    """
-    text = metadata.get(_WAIT, '0')
-    try:
-        return {_WAIT: float(text)}
-    except ValueError:
-        raise InputError(f'{_WAIT} is {text!r}, a number is needed', where) from None
 
 
 DRIVER_PARAMETERS = (

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 _UNKNOWN_SWING_HZ = 5.9
 _DEAD_TIME_MARGIN_S = 0.003      # the way of a reading to the signal
 _GAIN, _GAIN_AT_ONCE = HsvConfig.gain, 0.7
+_SLOPE_OVER_M = 1e-3
 _GAUGES_PA = np.arange(10e3, 601e3, 10e3)
 
 
@@ -106,7 +107,7 @@ def _load(rig: 'Rig') -> dict[str, float]:
         # The contraction is prescribed: nothing swings with the pressure.
         volume_m3 = float(rig.volume_m3(rig.parameters.get('contraction_m', 0.0)))
         return {'hsv.volume_m3': volume_m3, 'hsv.volume_at_600kpa_m3': volume_m3,
-                'hsv.volume_slope_m3_per_pa': 0.0}
+                'hsv.volume_slope_m3_per_pa': 0.0, 'hsv.volume_slope_m3_per_m': 0.0}
     lifted = rig.static_contraction_m(P_ATM_PA + _GAUGES_PA) > 0.0
     lift_off = (float(_GAUGES_PA[lifted][0]) if lifted.any() else 550e3) - 10e3
     lift_off = min(max(lift_off, 0.0), 550_000.0)
@@ -118,7 +119,11 @@ def _load(rig: 'Rig') -> dict[str, float]:
     # The frequency falls fast, then stays: take the bend for the end of the fall.
     lowest_at = next(gauge for hz, gauge in swings if hz <= 1.05 * lowest_hz)
     slope = (_volume(rig, lift_off + 30e3) - _volume(rig, lift_off + 10e3)) / 20e3
+    full_m = float(rig.static_contraction_m(P_ATM_PA + 600e3))
     return {
+        'hsv.volume_slope_m3_per_m': float(
+            rig.volume_m3(_SLOPE_OVER_M) - rig.volume_m3(0.0)) / _SLOPE_OVER_M,
+        'hsv.contraction_at_600kpa_m': max(full_m, _SLOPE_OVER_M),
         'hsv.volume_m3': _volume(rig, 0.0),
         'hsv.volume_at_600kpa_m3': _volume(rig, 600e3),
         'hsv.volume_slope_m3_per_pa': max(slope, 0.0),

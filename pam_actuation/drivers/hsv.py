@@ -38,6 +38,7 @@ def initial_state() -> FloatArray:
     start.fill_gain = 1.0
     start.vent_gain = 1.0
     start.command_pa = math.nan
+    start.contraction_m = math.nan
     return state
 
 
@@ -60,28 +61,39 @@ class HsvLaw:
         self.out[:] = 0.0
 
     def step(self, p_cmd_pa: float, p_meas_pa: float, supply_pa: float = math.nan,
-             age_s: float = 0.0) -> tuple[float, float]:
+             age_s: float = 0.0, contraction_m: float = math.nan,
+             contraction_age_s: float = 0.0) -> tuple[float, float]:
         """
         Return (fill duty, vent duty) for the next PWM period.
 
         Pressures absolute [Pa]; ``p_meas_pa`` NaN = no new measurement, ``supply_pa``
-        NaN = nominal; ``age_s`` is the age of the measurement.
+        NaN = nominal; ``age_s`` is the age of the measurement. ``contraction_m`` [m], NaN = none,
+        counts where the law is told to use it.
         """
-        self._state.age_s[...] = age_s
+        self._see(age_s, contraction_m, contraction_age_s)
         hsv_step(self.state, self.par, p_cmd_pa, p_meas_pa, supply_pa, self.out)
         return self._out.fill_duty.item(), self._out.vent_duty.item()
 
     def hold(self, fill_duty: float, vent_duty: float, p_meas_pa: float = math.nan,
-             supply_pa: float = math.nan, age_s: float = 0.0) -> None:
+             supply_pa: float = math.nan, age_s: float = 0.0, contraction_m: float = math.nan,
+             contraction_age_s: float = 0.0) -> None:
         """Note a period in which these duties were sent whatever the law says."""
-        self._state.age_s[...] = age_s
+        self._see(age_s, contraction_m, contraction_age_s)
         hsv_hold(self.state, self.par, fill_duty, vent_duty, p_meas_pa, supply_pa)
         self._out.saturated[...] = 0.0
+
+    def _see(self, age_s: float, contraction_m: float, contraction_age_s: float) -> None:
+        """Set what the compiled law reads of the measurements beside their pressure."""
+        self._state.age_s[...] = age_s
+        self._state.contraction_m[...] = contraction_m
+        self._state.contraction_age_s[...] = contraction_age_s
 
     def lasted(self, periods: float) -> None:
         """Tell how long [PWM periods] the newest opening was held before the next tick came."""
         self._state.sent[0] *= periods
         self._state.through_pa[0] *= periods
+        self._state.fill_sent[0] *= periods
+        self._state.vent_sent[0] *= periods
 
     @property
     def saturated(self) -> int:

@@ -46,7 +46,8 @@ class HsvConfig:
     duty to pressure. Volumes include the dead volume and hold at 0 and at 600 kPa gauge. Loop:
     ``gain`` is the share of the predicted error removed per period, ``band_pa`` the error beyond
     which the valves start, ``fine_band_pa`` that within which they rest again. If it is 0, they
-    never open together for a dose smaller than the shortest pulse.
+    never open together for a dose smaller than the shortest pulse. ``pulse_noise_pa`` and
+    ``correct_by_contraction`` switch on what ``hsv_learned`` and ``hsv_motion`` do.
     """
 
     period_s: float = number(_RIG['pwm_period_s'], 0.002, 0.01, 'PWM period')
@@ -87,6 +88,19 @@ class HsvConfig:
     supply_margin_pa: float = number(
         5_000.0, 0.0, 5e5, 'the target stays this far below the supply')
     slope_share: float = number(1.0, 0.0, 1.0, 'share of the slope of the command fed forward')
+    volume_slope_m3_per_m: float = number(
+        1.11e-4, 0.0, 1e-1, 'volume per contraction of the muscle at rest')
+    contraction_at_600kpa_m: float = number(
+        0.0302, 1e-6, 0.3, 'contraction at 600 kPa gauge')
+    pulse_noise_pa: float = number(
+        0.0, 0.0, 1e5, 'observer: error from which gain and offset of the pulses of each '
+        'valve are found; 0 = never')
+    correct_by_contraction: float = number(
+        0.0, 0.0, 1.0, 'observer: correction of the volume by a measured contraction; 0 = none')
+    correct_rate_by_contraction: float = number(
+        0.5, 0.0, 2.0, 'observer: the same of the volume rate')
+    correct_rest_by_contraction: float = number(
+        4.0, 0.0, 20.0, 'observer: the same of the volume at which the load would rest')
 
     def par(self) -> FloatArray:
         """
@@ -113,6 +127,13 @@ def _volume_curve(config: HsvConfig) -> float:
     return (rise_m3 - config.volume_slope_m3_per_pa * span_pa) / span_pa ** 2
 
 
+def _contraction_curve(config: HsvConfig) -> float:
+    """Return half of d2V/dx2 [m^3/m^2]."""
+    x_m = config.contraction_at_600kpa_m
+    rise_m3 = config.volume_at_600kpa_m3 - config.volume_m3
+    return (rise_m3 - config.volume_slope_m3_per_m * x_m) / x_m ** 2
+
+
 def _turn(config: HsvConfig) -> float:
     """Return what turns a frequency [Hz] into radians per period."""
     return 2.0 * math.pi * config.period_s
@@ -131,6 +152,7 @@ _DERIVED: dict[str, Callable[[HsvConfig], float]] = {
     'conductance_kg_per_s_pa': lambda one: (          # C rho0 sqrt(T0/T)
         one.conductance_m3_per_s_pa * RHO_REFERENCE * math.sqrt(T_REFERENCE_K / TEMPERATURE_K)),
     'volume_curve_m3_per_pa2': _volume_curve,
+    'volume_curve_m3_per_m2': _contraction_curve,
     'swing_rad_per_period': lambda one: _turn(one) * one.swing_hz,
     'swing_lowest_rad_per_period': lambda one: _turn(one) * one.swing_lowest_hz,
     'swing_slope_rad_per_period_pa': _swing_slope,

@@ -30,6 +30,7 @@ import math
 
 import numpy as np
 from pam_actuation.drivers.hsv_config import PARAMETERS, SENT_SIZE
+from pam_actuation.drivers.hsv_learned import learned_opening, sheet_opening
 from pam_actuation.drivers.hsv_model import advance, full_rate, observe, predict, STATE
 from pam_actuation.drivers.hsv_pulses import (
     duty_of_opening, joined_opening, LONGEST_OF_A_PAIR, opening_of_duty, pair_openings,
@@ -49,12 +50,17 @@ OUTPUT = record(
 
 
 @compiled
-def _push(state: np.record, opening: float, through_pa: float) -> None:
+def _push(state: np.record, par: np.record, opening: float, through_pa: float, fill_duty: float,
+          vent_duty: float) -> None:
     for i in range(SENT_SIZE - 1, 0, -1):
         state.sent[i] = state.sent[i - 1]
         state.through_pa[i] = state.through_pa[i - 1]
+        state.fill_sent[i] = state.fill_sent[i - 1]
+        state.vent_sent[i] = state.vent_sent[i - 1]
     state.sent[0] = opening
     state.through_pa[0] = through_pa
+    state.fill_sent[0] = opening_of_duty(fill_duty, par.open_part, par.close_part)
+    state.vent_sent[0] = opening_of_duty(vent_duty, par.open_part, par.close_part)
 
 
 @compiled
@@ -103,7 +109,7 @@ def _free_error(state: np.record, par: np.record, p_pa: float, volume_m3: float,
 def _wanted_openings(state: np.record, par: np.record, p_pa: float, volume_m3: float, error: float,
                      slope_pa: float, supply_pa: float) -> tuple[float, float]:
     """
-    Return the openings (fill, vent) for the next period.
+    Return the openings (fill, vent) for the next period, of the data sheet.
 
     ``p_pa`` is the pressure it starts at, ``error`` what it has to change [Pa].
     """
@@ -128,18 +134,21 @@ def _wanted_openings(state: np.record, par: np.record, p_pa: float, volume_m3: f
     if full <= 0.0:
         return 0.0, 0.0
     shortest = shortest_opening(par.open_part, par.close_part, par.pulse_margin_part)
-    if pairs and abs(wanted) < shortest * full:
+    least = learned_opening(state, shortest, filling)
+    if pairs and abs(wanted) < least * full:
         other = abs(full_rate(state, par, middle, volume_m3, supply_pa, not filling))
         if other > 0.0:
             through = shortest * min(full, other)
             fill, vent = pair_openings(
                 wanted - state.pair_gain * through,
-                full if filling else other, other if filling else full, shortest)
+                full if filling else other, other if filling else full,
+                learned_opening(state, shortest, True), learned_opening(state, shortest, False))
+            fill, vent = sheet_opening(state, fill, True), sheet_opening(state, vent, False)
             if max(fill, vent) <= LONGEST_OF_A_PAIR:
                 return fill, vent
-    if abs(error) < par.rest_share * shortest * full:
+    if abs(error) < par.rest_share * least * full:
         return 0.0, 0.0
-    opening = min(max(abs(wanted) / full, shortest), 1.0)
+    opening = min(max(sheet_opening(state, abs(wanted) / full, filling), shortest), 1.0)
     return (opening, 0.0) if filling else (0.0, opening)
 
 
@@ -147,8 +156,10 @@ def _wanted_openings(state: np.record, par: np.record, p_pa: float, volume_m3: f
 def _joined(state: np.record, par: np.record, p_pa: float, volume_m3: float, supply_pa: float,
             fill_duty: float, vent_duty: float) -> tuple[float, float]:
     """Return the signed opening that acts like two duties, and the air through both [Pa]."""
-    fill = opening_of_duty(fill_duty, par.open_part, par.close_part)
-    vent = opening_of_duty(vent_duty, par.open_part, par.close_part)
+    fill = learned_opening(
+        state, opening_of_duty(fill_duty, par.open_part, par.close_part), True)
+    vent = learned_opening(
+        state, opening_of_duty(vent_duty, par.open_part, par.close_part), False)
     if fill <= 0.0 or vent <= 0.0:
         return fill - vent, 0.0
     fill_rate = full_rate(state, par, p_pa, volume_m3, supply_pa, True)
@@ -194,7 +205,7 @@ def _step(state: np.record, par: np.record, p_cmd_pa: float, p_meas_pa: float, s
             out.saturated = 1.0 if out.fill_duty >= 1.0 else -1.0
         sent, through = _joined(
             state, par, predicted, vol, supply_pa, out.fill_duty, out.vent_duty)
-    _push(state, sent, through)
+    _push(state, par, sent, through, out.fill_duty, out.vent_duty)
 
 
 @compiled
@@ -205,7 +216,7 @@ def _hold(state: np.record, par: np.record, fill_duty: float, vent_duty: float, 
     observe(state, par, p_meas_pa, supply_pa)
     sent, through = _joined(state, par, state.model_pa, state.volume_m3, supply_pa,
                             fill_duty, vent_duty)
-    _push(state, sent, through)
+    _push(state, par, sent, through, fill_duty, vent_duty)
     state.command_pa = math.nan
     state.command_change_pa = 0.0
 
@@ -221,8 +232,8 @@ def _entries(key: int) -> tuple[Callable[..., None], Callable[..., None]]:
         Parameters
         ----------
         state, par, out : float64 arrays
-            ``STATE``, ``PARAMETERS`` and ``OUTPUT``; ``state`` and ``out`` are written. ``age_s``
-            of the state may be set before.
+            ``STATE``, ``PARAMETERS`` and ``OUTPUT``; ``state`` and ``out`` are written. Of the
+            state ``age_s``, ``contraction_m`` and ``contraction_age_s`` may be set before.
         p_cmd_pa, p_meas_pa, supply_pa : float
             Wanted, measured and supply pressure, absolute [Pa]. A measurement of NaN means
             none this period, a supply of NaN the nominal one.

@@ -28,6 +28,8 @@ import math
 import numpy as np
 
 from pam_actuation.drivers.hsv_config import SENT_SIZE
+from pam_actuation.drivers.hsv_learned import find_pulses, note_pulses
+from pam_actuation.drivers.hsv_motion import corrected_by_contraction
 from pam_sim.compiled import compiled
 from pam_sim.records import record
 from pam_sim.units import GAS_CONSTANT_AIR, P_ATM_PA, TEMPERATURE_K
@@ -60,6 +62,20 @@ STATE = record(
     # Of the last periods, newest first.
     ('sent', SENT_SIZE),              # openings under way, fill > 0, vent < 0
     ('through_pa', SENT_SIZE),        # air through both valves
+    # What is measured of the motion, set by the caller; NaN = not measured.
+    'contraction_m',
+    'contraction_age_s',
+    'rest_m3',                        # volume at which the load would rest, less the known one
+    # Learned of the pulses, see ``hsv_learned``.
+    'fill_more',                      # what a pulse fills beside its length, part of a period
+    'vent_more',
+    ('pulse_covariance', 16),
+    ('pulse_regressor', 4),           # of gain and more of filling, then of venting [Pa]
+    ('pulse_step', 4),                # work space
+    'pulse_rest_periods',             # for so long nothing is learned of them
+    # Of the last periods, newest first.
+    ('fill_sent', SENT_SIZE),         # openings as the data sheet says
+    ('vent_sent', SENT_SIZE),
 )
 
 
@@ -79,15 +95,23 @@ def full_rate(state: np.record, par: np.record, p_pa: float, volume_m3: float, s
 
 
 @compiled
-def _volume_pull(par: np.record, p_pa: float, volume_m3: float, rate_m3: float) -> float:
+def _resting_m3(par: np.record, above_pa: float) -> float:
+    """Return the volume [m^3] at which the load rests, so far above the lift-off."""
+    volume: float = par.volume_m3 + above_pa * (
+        par.volume_slope_m3_per_pa + above_pa * par.volume_curve_m3_per_pa2)
+    return volume
+
+
+@compiled
+def _volume_pull(state: np.record, par: np.record, p_pa: float, volume_m3: float,
+                 rate_m3: float) -> float:
     """
     Return the volume's acceleration [m^3 per period^2].
 
     The load swings about the volume that belongs to the pressure.
     """
     above = max(p_pa - P_ATM_PA - par.lift_off_gauge_pa, 0.0)
-    rest = par.volume_m3 + above * (
-        par.volume_slope_m3_per_pa + above * par.volume_curve_m3_per_pa2)
+    rest = state.rest_m3 + _resting_m3(par, above)
     omega = max(par.swing_rad_per_period + above * par.swing_slope_rad_per_period_pa,
                 par.swing_lowest_rad_per_period)
     return omega * (omega * (rest - volume_m3) - 2.0 * par.swing_damping * rate_m3)
@@ -107,7 +131,7 @@ def advance(state: np.record, par: np.record, p_pa: float, volume_m3: float, rat
     if substep <= 0.0:
         return p_pa, volume_m3, rate_m3, flow_pa
     for _ in range(2):
-        rate_m3 += substep * _volume_pull(par, p_pa, volume_m3, rate_m3)
+        rate_m3 += substep * _volume_pull(state, par, p_pa, volume_m3, rate_m3)
         volume_m3 += substep * rate_m3
         if volume_m3 < par.volume_m3:      # the load rests on its lower stop
             volume_m3 = par.volume_m3
@@ -172,8 +196,7 @@ def observe(state: np.record, par: np.record, p_meas_pa: float, supply_pa: float
             return
         state.model_pa = p_meas_pa
         above = max(p_meas_pa - P_ATM_PA - par.lift_off_gauge_pa, 0.0)
-        state.volume_m3 = par.volume_m3 + above * (
-            par.volume_slope_m3_per_pa + above * par.volume_curve_m3_per_pa2)
+        state.volume_m3 = _resting_m3(par, above)
         state.volume_change_m3 = 0.0
         state.started = 1.0
         return
@@ -196,15 +219,31 @@ def observe(state: np.record, par: np.record, p_meas_pa: float, supply_pa: float
         return
     rate = (after - before) / par.period_s
     error = p_meas_pa - (after - rate * state.age_s)
-    state.model_pa = after + par.correct * error
+    corrected_pa = after + par.correct * error
+    state.model_pa = corrected_pa
     _learn_delay(state, par, error)
-    if vol > par.volume_m3:
+    above = max(corrected_pa - P_ATM_PA - par.lift_off_gauge_pa, 0.0)
+    told = corrected_by_contraction(state, par, _resting_m3(par, above))
+    if not told and vol > par.volume_m3:
         # A reading above the model: the volume grows less than it thinks.
         per_pa = vol / after
         state.volume_m3 = max(vol + par.correct_volume * error * per_pa, par.volume_m3)
         state.volume_change_m3 = vrate - par.correct_rate * error * per_pa
-    # A large flow points to a wrong flow gain, a pair of pulses to a wrong difference of two,
-    # anything else to a drift.
+    if par.pulse_noise_pa > 0.0:
+        _find_pulses(state, par, whole, part, error, supply_pa)
+    else:
+        _learn_flows(state, par, error, flow, through)
+
+
+@compiled
+def _learn_flows(state: np.record, par: np.record, error: float, flow: float,
+                 through: float) -> None:
+    """
+    Learn the gain of either flow, the drift and what a pair of pulses fills too much.
+
+    A large flow points to a wrong flow gain, a pair of pulses to a wrong difference of two,
+    anything else to a drift.
+    """
     power = through * through + par.flow_scale_pa ** 2
     pair = state.pair_gain + _LEARN_PAIR * error * through / power
     state.pair_gain = min(max(pair, -_PAIR_LIMIT), _PAIR_LIMIT)
@@ -220,6 +259,21 @@ def observe(state: np.record, par: np.record, p_meas_pa: float, supply_pa: float
     drift = state.drift_pa_per_period + par.learn_drift * rest * error
     state.drift_pa_per_period = min(
         max(drift, -par.drift_limit_pa_per_period), par.drift_limit_pa_per_period)
+
+
+@compiled
+def _find_pulses(state: np.record, par: np.record, whole: int, part: float, error: float,
+                 supply_pa: float) -> None:
+    """Learn gain and offset of the pulses of each valve, and the drift."""
+    p_pa, vol = state.model_pa, state.volume_m3
+    note_pulses(
+        state, par, whole, part,
+        full_rate(state, par, p_pa, vol, supply_pa, True) / state.fill_gain,
+        full_rate(state, par, p_pa, vol, supply_pa, False) / state.vent_gain)
+    find_pulses(state, par, error)
+    state.drift_pa_per_period = min(max(
+        state.drift_pa_per_period + par.learn_drift * error, -par.drift_limit_pa_per_period),
+        par.drift_limit_pa_per_period)
 
 
 @compiled

@@ -60,17 +60,21 @@ def shortest_opening(open_part: float, close_part: float, margin: float) -> floa
 
 @compiled
 def pair_openings(wanted_pa: float, fill_rate_pa: float, vent_rate_pa: float,
-                  shortest: float) -> tuple[float, float]:
+                  shortest_fill: float, shortest_vent: float) -> tuple[float, float]:
     """
     Return the openings (fill, vent) that change the pressure by ``wanted_pa`` between them.
 
     The rates are the sizes of the changes [Pa] one valve makes in a period when fully open.
-    One of the two pulses is the shortest possible, the other as much longer as it takes.
+    One of the two pulses is the shortest possible of its valve, the other as much longer as it
+    takes.
     """
-    rest_pa = wanted_pa - (fill_rate_pa - vent_rate_pa) * shortest
+    if shortest_fill == shortest_vent:
+        rest_pa = wanted_pa - (fill_rate_pa - vent_rate_pa) * shortest_fill
+    else:
+        rest_pa = wanted_pa - (fill_rate_pa * shortest_fill - vent_rate_pa * shortest_vent)
     if rest_pa >= 0.0:
-        return shortest + rest_pa / fill_rate_pa, shortest
-    return shortest, shortest - rest_pa / vent_rate_pa
+        return shortest_fill + rest_pa / fill_rate_pa, shortest_vent
+    return shortest_fill, shortest_vent - rest_pa / vent_rate_pa
 
 
 @compiled

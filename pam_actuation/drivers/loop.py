@@ -27,7 +27,8 @@ from pam_actuation.drivers.config import check_valve_type, DriverConfig
 from pam_actuation.drivers.hsv import HsvLaw
 from pam_actuation.drivers.ppr import PprLaw
 from pam_actuation.drivers.safety import Decision, SafetySupervisor
-from pam_actuation.messages import Pressure, SAFE_EFFORTS, Status, VALVE_NAMES, ValveSignal
+from pam_actuation.messages import (
+    Contraction, Pressure, SAFE_EFFORTS, Status, VALVE_NAMES, ValveSignal)
 from pam_sim.units import gauge_kpa, P_ATM_PA
 
 _NS = 1_000_000_000
@@ -82,6 +83,7 @@ class DriverLoop:
         self._decision: Decision | None = None
         self._law_ns: int | None = None
         self._used_stamp_ns: int | None = None
+        self._contraction: Contraction | None = None        # not used yet
         self._efforts = self._safe_efforts()
         self._followed_pa: float | None = P_ATM_PA
         self._rate_start: tuple[int, int] | None = None      # time, ticks
@@ -98,8 +100,17 @@ class DriverLoop:
 
     def takes(self) -> dict[str, Callable[[Any], None]]:
         """Return what takes each topic, by short name."""
-        return {'pressure': self.on_pressure, 'supply_pressure': self.on_supply,
-                'pressure_command': self.on_command, 'valve_command': self.on_valve_command}
+        takes: dict[str, Callable[[Any], None]] = {
+            'pressure': self.on_pressure, 'supply_pressure': self.on_supply,
+            'pressure_command': self.on_command, 'valve_command': self.on_valve_command}
+        if self.uses_contraction:
+            takes['contraction'] = self.on_contraction
+        return takes
+
+    @property
+    def uses_contraction(self) -> bool:
+        """Return whether the law makes use of a measured contraction."""
+        return self.is_hsv and self.config.hsv.correct_by_contraction > 0.0
 
     def on_command(self, message: Pressure, sequence: int | None = None) -> None:
         """Take a pressure_command; ``sequence`` is the publisher's message number, if known."""
@@ -128,6 +139,12 @@ class DriverLoop:
     def on_supply(self, message: Pressure) -> None:
         """Take a measured supply pressure."""
         self.safety.on_supply(message.stamp_ns, message.pressure_pa)
+
+    def on_contraction(self, message: Contraction) -> None:
+        """Take a measured contraction; one that is old, or older than another, is dropped."""
+        former = self._contraction
+        if former is None or message.stamp_ns > former.stamp_ns:
+            self._contraction = message
 
     def on_device(self, problem: str) -> None:
         """Tell how the valve's device took the last signal: what is wrong, '' if nothing."""
@@ -210,6 +227,7 @@ class DriverLoop:
         measured = self._new_measurement()
         age_s = max((now_ns - (self.safety.pressure.stamp_ns or now_ns)) / _NS, 0.0)
         supply_pa = self.safety.supply_pa(now_ns)
+        motion = self._motion(now_ns)
         elapsed, late = 1, 0.0
         if self._law_ns is not None:
             periods = (now_ns - self._law_ns) / (self.period_s * _NS)
@@ -227,9 +245,9 @@ class DriverLoop:
         if decision.pressure_pa is None:
             fill, vent = self._imposed(decision.duty)
             if elapsed != 0:
-                law.hold(fill, vent, measured, supply_pa, age_s)
+                law.hold(fill, vent, measured, supply_pa, age_s, *motion)
         else:
-            fill, vent = law.step(decision.pressure_pa, measured, supply_pa, age_s)
+            fill, vent = law.step(decision.pressure_pa, measured, supply_pa, age_s, *motion)
         if elapsed != 0:
             self._law_ns = now_ns
             self.safety.flow(law.flow_pa)
@@ -246,6 +264,17 @@ class DriverLoop:
         if channel.stamp_ns is None or channel.stamp_ns == self._used_stamp_ns:
             return math.nan
         return channel.pressure_pa
+
+    def _motion(self, now_ns: int) -> tuple[float, float]:
+        """Return the newest contraction [m] and its age [s], once; NaN for none that counts."""
+        reading, self._contraction = self._contraction, None
+        if reading is None or not self.uses_contraction:
+            return math.nan, 0.0
+        age_s = (now_ns - reading.stamp_ns) / _NS
+        limits = self.config.safety
+        if not -limits.stamp_ahead_s <= age_s <= limits.measurement_timeout_s:
+            return math.nan, 0.0
+        return reading.contraction_m, max(age_s, 0.0)
 
     def _safe_efforts(self) -> tuple[float, ...]:
         return SAFE_EFFORTS['hsv' if self.is_hsv else 'ppr']

@@ -33,9 +33,9 @@ from pam_actuation.bags.message_writer import MessageWriter
 from pam_actuation.bags.metadata import experiment_metadata
 from pam_actuation.bags.writer import BagWriter
 from pam_actuation.control.loop import ControllerLoop
-from pam_actuation.drivers.config import driver_facts
 from pam_actuation.drivers.for_rig import driver_loops
 from pam_actuation.drivers.loop import DriverLoop
+from pam_actuation.drivers.recorded import driver_facts
 from pam_actuation.experiments.limits import check_tracked
 from pam_actuation.experiments.reference import ReferenceLoop
 from pam_actuation.loops.bus import Bus, every
@@ -69,7 +69,8 @@ class _Loops:
         self._status_ns: dict[str, int] = {}    # by the place of a driver, when recorded last
         self.bus = bus = Bus(transport_ns, recorder.write)
         self.reached_ns = 0
-        plant, drivers = PlantLoop(rig, seed), driver_loops(rig, changes)
+        plant, drivers = PlantLoop(rig, seed), driver_loops(
+            rig, {**(controller and controller.driver or {}), **(changes or {})})
         reference = ReferenceLoop(experiment, valve=rig.valve)
         lead_ns = LEAD_NS if experiment.asks_for_motion else 0
 

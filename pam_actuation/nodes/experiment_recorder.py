@@ -156,7 +156,7 @@ class ExperimentRecorder(ManagedNode):
                     return json.load(stream)
             except (OSError, ValueError) as error:
                 raise InputError(f'cannot be read: {error}', path) from None
-        from pam_actuation.drivers.config import driver_facts
+        from pam_actuation.drivers.recorded import driver_facts
         valve, seed = self.value('valve_type'), self.value('seed')
         valve = '' if valve == UNKNOWN_VALVE else valve
         experiment = rig = controller = None

@@ -39,7 +39,9 @@ OF_EVERY_NODE = ('/diagnostics', '/parameter_events', '/rosout')
 VARIANTS: dict[str, tuple[dict[str, Any], ...]] = {
     'plant_simulator': ({'valve_type': 'hsv'}, {'use_sim_time': True}),
     'hardware_sensors': ({'place': 'joint'},),
-    'valve_driver': ({'accept_valve_command': True},),
+    'valve_driver': (
+        {'accept_valve_command': True},
+        {'valve_type': 'hsv', 'hsv.correct_by_contraction': 0.8}),
     'valve_watchdog': (),
     'sofc_controller': (), 'pid_controller': (),
     'reference_generator': (

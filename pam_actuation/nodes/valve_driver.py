@@ -66,6 +66,9 @@ class ValveDriver(ManagedNode):
             'the driver valves, volume and load; numbers given beside it win. Empty: the '
             'defaults of the parameters.'),
         node_parameter(
+            'controller', '', 'Controller preset or file whose section driver says how its '
+            'driver differs; numbers given beside it win. Empty: it does not differ.'),
+        node_parameter(
             'accept_valve_command', False, 'Take valve_command, the wanted raw signal, besides '
             'pressure_command; supervised alike.'),
         node_parameter(
@@ -80,6 +83,7 @@ class ValveDriver(ManagedNode):
 
     loop: Any = None            # a DriverLoop, once configured
     output: Any = None          # what the valve hangs on
+    contractions: PolledSubscription | None = None      # where the law uses them
     _not_vented = ''        # why not, at the end
     _refusal = ''           # of the last signal by the device
     _stopped: Any = None    # what a latched stop is carried over from
@@ -99,6 +103,8 @@ class ValveDriver(ManagedNode):
         awaited: list[TickInput] = [lockstep.EachTick(self.pressures)]
         if self.loop.is_hsv:
             awaited.append(lockstep.EachTick(self.supplies))
+        if self.contractions is not None:
+            awaited.append(lockstep.EachTick(self.contractions))
         if {lockstep.REFERENCE, *lockstep.CONTROLLERS} & {*self.participants}:
             awaited.append(lockstep.Stamped(*filter(None, (self.commands, self.raw_commands))))
         return awaited
@@ -126,6 +132,9 @@ class ValveDriver(ManagedNode):
         self.pressures = self.add_subscription('pressure', writers=True)
         self.ear = DriverEar(self)
         self.supplies = self.add_subscription('supply_pressure')
+        self.contractions = None
+        if loop.uses_contraction:
+            self.contractions = self.add_subscription('contraction')
         self._safety_services = [
             self.create_service(Trigger, '~/emergency_stop', self._on_emergency_stop),
             self.create_service(Trigger, '~/reset', self._on_reset),
@@ -133,13 +142,17 @@ class ValveDriver(ManagedNode):
 
     def _config(self) -> DriverConfig:
         """Return the driver's numbers: those given, else the rig's, else the defaults."""
+        from pam_actuation.drivers.asked import asked_by
+        asked = asked_by(self.value('controller')) if self.value('controller') else {}
         if not self.value('rig'):
-            return DriverConfig.from_parameters(
-                {p.name: self.value(p.name) for p in DRIVER_PARAMETERS})
+            usual = {p.name: self.value(p.name) for p in DRIVER_PARAMETERS}
+            return DriverConfig.from_parameters(usual | {
+                name: value for name, value in asked.items()
+                if name not in self._parameter_overrides})
         from pam_actuation.drivers.for_rig import driver_config
         from pam_sim.joint import load_rig_or_side
-        given = {p.name: self.value(p.name) for p in DRIVER_PARAMETERS
-                 if p.name in self._parameter_overrides}
+        given = asked | {p.name: self.value(p.name) for p in DRIVER_PARAMETERS
+                         if p.name in self._parameter_overrides}
         config = driver_config(
             load_rig_or_side(self.value('rig'), valve=self.value('valve_type')), given)
         told = {name: value for name, value in config.as_parameters().items()
@@ -210,6 +223,8 @@ class ValveDriver(ManagedNode):
             self.loop.on_pressure(message)
         for message, _ in self.supplies.take():
             self.loop.on_supply(message)
+        for message, _ in self.contractions.take() if self.contractions is not None else ():
+            self.loop.on_contraction(message)
         self.ear.listen()
         now_ns = self.now_ns()
         if self.ear.vented:

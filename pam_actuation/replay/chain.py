@@ -33,8 +33,8 @@ import numpy as np
 from pam_actuation.bags.load_joint import MEASURED
 from pam_actuation.control.config import load_controller
 from pam_actuation.control.loop import ControllerLoop
-from pam_actuation.drivers.config import as_recorded
 from pam_actuation.drivers.for_rig import driver_loops
+from pam_actuation.drivers.recorded import as_recorded
 from pam_actuation.loops.bus import Bus
 from pam_actuation.loops.wiring import (
     attach, attach_plant, controller_tick, send_followed, signal_tick)

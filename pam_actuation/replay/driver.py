@@ -27,9 +27,9 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from pam_actuation.drivers.config import as_recorded
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.drivers.loop import DriverLoop
+from pam_actuation.drivers.recorded import as_recorded
 from pam_actuation.loops.bus import Bus
 from pam_actuation.loops.wiring import attach
 from pam_actuation.messages import ValveSignal

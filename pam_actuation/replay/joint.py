@@ -33,7 +33,7 @@ from pam_actuation.bags.ending import early_sentences
 from pam_actuation.bags.load_joint import MEASURED
 from pam_actuation.control.config import load_controller
 from pam_actuation.control.modes.joint import JointController
-from pam_actuation.drivers.config import as_recorded
+from pam_actuation.drivers.recorded import as_recorded
 from pam_actuation.replay.arrivals import recorded_topics_of_joint
 from pam_actuation.replay.chain import ChainReplay, recorded_seed, RepeatedLoops, replay_chain
 from pam_actuation.replay.joint_controller import replay_joint_controller, states_suffice

@@ -23,6 +23,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+from pam_actuation.drivers.asked import asked_by
 from pam_actuation.hardware.files import hardware_file
 from pam_actuation.namespaces import namespace_of
 from pam_actuation.rigging.node_spec import NodeSpec
@@ -72,6 +73,8 @@ def rig(namespace: str = '/muscle', rig: str = 'dmsp_5_300_realistic', valve: st
     described = {**kind, 'rig': rig}
     name, raw = played(experiment, rig, valve, controller)
     driver = {**described, 'accept_valve_command': True} if raw else described
+    if name and asked_by(name):
+        driver = {**driver, 'controller': name}
     accept = {'accept_other_rig': True} if accept_other_rig else {}
     nodes = [NodeSpec('sofc_controller', namespace, {
         **described, **accept, 'controller': name})] if name else []

@@ -161,7 +161,7 @@ def make_plan(experiment: 'StrPath | Experiment', rig: 'StrPath | Rig | JointRig
 def _parameters(plan: RigPlan, bag: StrPath | None, learning: bool, seed: int, namespace: str,
                 overwrite: bool) -> dict[str, Parameters]:
     """Return the place of each node to its parameters and write the files they name."""
-    from pam_actuation.drivers.config import driver_facts
+    from pam_actuation.drivers.recorded import driver_facts
     rig, controller = plan.rig, plan.controller
     rig_file = _write(plan.rig_file, rig.to_yaml())
     law_text = '' if controller is None else controller.to_yaml()
@@ -189,6 +189,8 @@ def _parameters(plan: RigPlan, bag: StrPath | None, learning: bool, seed: int, n
         nodes[driver] = {
             'valve_type': muscle.valve, 'rig': file,
             'accept_valve_command': plan.experiment.sends_valve_command(rig.valve)}
+        if controller is not None and controller.driver:
+            nodes[driver]['controller'] = str(plan.controller_file)
     if controller is not None:
         nodes[plan.controller_node] = {
             **model, 'valve_type': rig.valve,

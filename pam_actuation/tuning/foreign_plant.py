@@ -122,7 +122,7 @@ class ForeignLoop(ClosedLoop):
         learns = learning_mask(controller, learn, self.ticks, self.rate_hz).tolist()
         pressure_step, contraction_step, force_step = self._quantum.tolist()
         steps, every, latency = self._timing
-        drive = _driver(self._driver.fresh(), self.hsv)
+        drive = _driver(self._driver.fresh(controller.driver), self.hsv)
         signal: tuple[float, ...] = (0.0, 0.0) if self.hsv else (0.0,)
         for tick in range(self.ticks):
             before, supply_pa = signal, plant.supply_pa
@@ -137,7 +137,7 @@ class ForeignLoop(ClosedLoop):
                 measured_m, reference, rate, lead, lead_rate, learns[tick] > 0.0,
                 pressure_pa=measured_pa, force_n=_read(true_n + force_noise, force_step))
             if tick % every == 0:
-                signal = drive(command_pa, measured_pa, supply_pa)
+                signal = drive(command_pa, measured_pa, supply_pa, measured_m)
             if latency:
                 plant.step(before, forces[tick], steps=latency)
             plant.step(signal, forces[tick], steps=steps - latency)
@@ -160,20 +160,24 @@ def _read(value: float, step_size: float) -> float:
 
 
 def _driver(law: tuple[FloatArray, FloatArray, FloatArray],
-            hsv: bool) -> Callable[[float, float, float], tuple[float, ...]]:
-    """Return the driver law as a function of command, measured and supply pressure."""
+            hsv: bool) -> Callable[[float, float, float, float], tuple[float, ...]]:
+    """Return the driver law as a function of command, pressure, supply and contraction."""
     state, par, out = law
     if hsv:
-        age_s, duties = cells(state, hsv_model.STATE).age_s, cells(out, hsv_kernel.OUTPUT)
+        seen, duties = cells(state, hsv_model.STATE), cells(out, hsv_kernel.OUTPUT)
 
-        def pair(command_pa: float, measured_pa: float, supply_pa: float) -> tuple[float, ...]:
-            age_s[...] = 0.0
+        def pair(command_pa: float, measured_pa: float, supply_pa: float,
+                 measured_m: float) -> tuple[float, ...]:
+            seen.age_s[...] = 0.0
+            seen.contraction_m[...] = measured_m
+            seen.contraction_age_s[...] = 0.0
             hsv_kernel.hsv_step(state, par, command_pa, measured_pa, supply_pa, out)
             return duties.fill_duty.item(), duties.vent_duty.item()
         return pair
     signal = cells(out, ppr.OUTPUT).signal_v
 
-    def regulator(command_pa: float, measured_pa: float, supply_pa: float) -> tuple[float, ...]:
+    def regulator(command_pa: float, measured_pa: float, supply_pa: float,
+                  measured_m: float) -> tuple[float, ...]:
         ppr.ppr_step(state, par, command_pa, math.nan, math.nan, out)
         return (signal.item(),)
     return regulator

@@ -59,7 +59,8 @@ def look_up(values: FloatArray, place: float) -> float:
 
 @compiled
 def drive(driver: Driver, hsv: bool, command_pa: float,
-          measured_pa: float, supply_pa: float = np.nan) -> tuple[float, float]:
+          measured_pa: float, supply_pa: float = np.nan,
+          measured_m: float = np.nan) -> tuple[float, float]:
     """
     Run a driver law once and return its two valve signals.
 
@@ -73,11 +74,16 @@ def drive(driver: Driver, hsv: bool, command_pa: float,
         Wanted and measured muscle pressure, absolute Pa.
     supply_pa : float
         Measured supply, absolute Pa; NaN where none is: the nominal one. Only for a pair.
+    measured_m : float
+        Measured contraction; NaN where none is. Only for a pair.
 
     """
     state, par, out = driver
     if hsv:
-        part(state, 0, hsv_model.STATE).age_s = 0.0
+        seen = part(state, 0, hsv_model.STATE)
+        seen.age_s = 0.0
+        seen.contraction_m = measured_m
+        seen.contraction_age_s = 0.0
         hsv_step(state, par, command_pa, measured_pa, supply_pa, out)
         duties = part(out, 0, hsv_kernel.OUTPUT)
         return duties.fill_duty, duties.vent_duty

@@ -14,7 +14,7 @@
 
 """What a closed loop gets: timing, reference, sensor noise, where rules learn, driver laws."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -108,8 +108,12 @@ class DriverLaw:
         period_s = config.hsv.period_s if self.hsv else 1.0 / rate_hz
         self.every = max(1, round(period_s * rate_hz))
 
-    def fresh(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return new state, par, out."""
+    def fresh(self, asked: Mapping[str, float] | None = None
+              ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return new state, par, out; ``asked``: what a controller asks for, by name."""
         if self.hsv:
-            return initial_state(), self._hsv_config.par(), zeros(hsv_kernel.OUTPUT)
+            changes = {name.removeprefix('hsv.'): value for name, value in (asked or {}).items()
+                       if name.startswith('hsv.')}
+            config = replace(self._hsv_config, **changes)
+            return initial_state(), config.par(), zeros(hsv_kernel.OUTPUT)
         return zeros(ppr.STATE), self._ppr_config.par(), zeros(ppr.OUTPUT)

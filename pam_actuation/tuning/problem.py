@@ -133,6 +133,7 @@ def rebuild(controller: Law, settings: dict[str, float],
     """
     fresh = _rebuilt(controller, {**controller.settings, **settings}, rules)
     fresh.made_for, fresh.other_rig = controller.made_for, controller.other_rig
+    fresh.driver = controller.driver
     return fresh
 
 

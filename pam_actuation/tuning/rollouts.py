@@ -79,7 +79,8 @@ def actuate(tick: int, command_pa: float, measured_pa: float, hsv: bool, driver:
     signal_0, signal_1 = acting.signal_0, acting.signal_1
     if tick % driver_every == 0:
         supply_pa = disturbances[max(tick - 1, 0)].supply_pa
-        signal_0, signal_1 = drive(driver, hsv, command_pa, measured_pa, supply_pa)
+        signal_0, signal_1 = drive(
+            driver, hsv, command_pa, measured_pa, supply_pa, log.measured_m)
     acting.external_force_n = disturbances[tick].external_force_n
     part(plant_par, 0, layout.PARAMETERS).supply_pa = disturbances[tick].supply_pa
     for j in range(steps):

@@ -88,13 +88,14 @@ class FaultyRig:
         rig = load_rig('dmsp_5_300_realistic', valve=valve)
         self.contraction_m, self.gauge_pa, self.reference_m = [], [], []
         self.reasons = set()
-        self._control = ControllerLoop(load_controller(controller, rig))
+        law = load_controller(controller, rig)
+        self._control = ControllerLoop(law)
         self._tells = tells
         self._sound = {}            # newest readings by topic
         self._fault, self._topics, self._reference = '', (), None
         self._now_ns = START_NS
         self._bus = bus = Bus(on_sent=self._heard)
-        driver = DriverLoop(valve, driver_config(rig))
+        driver = DriverLoop(valve, driver_config(rig, law.driver))
         self._plant = SuppliedPlant(moved or rig, seed=seed)
         self._measure = attach_plant(bus, self._plant)
         self._decide = controller_tick(bus, self._control)

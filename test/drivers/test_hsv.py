@@ -171,7 +171,7 @@ def test_duty_and_opening_are_inverse():
 @pytest.mark.parametrize('wanted_pa', [-3000.0, -1.0, 0.0, 700.0, 3000.0])
 def test_two_pulses_make_a_small_dose(wanted_pa):
     """Neither is shorter than a valve can; their difference is the dose wanted."""
-    fill, vent = pulses.pair_openings(wanted_pa, 16e3, 12e3, 0.21)
+    fill, vent = pulses.pair_openings(wanted_pa, 16e3, 12e3, 0.21, 0.21)
     assert min(fill, vent) == 0.21
     assert 16e3 * fill - 12e3 * vent == pytest.approx(wanted_pa, abs=1e-6)
     one = pulses.joined_opening(fill, vent, 16e3, 12e3)

@@ -16,8 +16,8 @@
 import numpy as np
 from pam_actuation.bags.load import load_run
 from pam_actuation.control.config import load_controller
-from pam_actuation.drivers.config import as_recorded, driver_facts
 from pam_actuation.drivers.loop import DriverLoop
+from pam_actuation.drivers.recorded import as_recorded, driver_facts
 from pam_actuation.drivers.steady_age import SteadyAge
 from pam_actuation.experiments import load_experiment
 from pam_actuation.experiments.offline import simulate_experiment

@@ -49,6 +49,7 @@ class WrappedLaw:
 
     tracked: Tracked
     made_for: dict[str, Any] | None = None      # facts of the rig, see ``control/made_for``
+    driver: dict[str, float] | None = None      # numbers of the driver's law it asks for
     other_rig = ''          # how the rig it runs on differs, if that was accepted
 
     def __init__(self, law: CompiledController) -> None:

@@ -1,0 +1,91 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What a controller file asks of its driver: read, passed on, recorded and replayed."""
+
+from pam_actuation.bags.load import load_run
+from pam_actuation.control.config import load_controller
+from pam_actuation.drivers.asked import asked_by
+from pam_actuation.experiments import load_experiment
+from pam_actuation.experiments.offline import simulate_experiment
+from pam_actuation.replay.driver import replay_driver
+from pam_actuation.rigging.layouts import rig as layout
+from pam_actuation.rigging.plan import make_plan
+from pam_sim import load_rig
+from pam_sim.errors import InputError
+import pytest
+
+TEXT = """
+controller: pid
+driver:
+  hsv.gain: 0.4
+  hsv.correct_by_contraction: 0.8
+"""
+ASKED = {'hsv.gain': 0.4, 'hsv.correct_by_contraction': 0.8}
+SHORT = """
+name: short
+segments:
+  - rest: {duration_s: 0.5}
+  - sine: {center_m: 0.008, amplitude_m: 0.003, frequency_hz: 1.0, cycles: 2}
+"""
+
+
+@pytest.fixture(scope='module')
+def rig():
+    """Return a rig with on/off valves."""
+    return load_rig('dmsp_5_300_realistic', valve='hsv')
+
+
+def test_asked_numbers(rig, tmp_path):
+    """They are read from text and file, written again, and reach the node of the driver."""
+    assert asked_by(TEXT) == ASKED
+    assert asked_by('pid_hsv') == {}
+    controller = load_controller(TEXT, rig)
+    assert controller.driver == ASKED
+    assert load_controller(controller.to_yaml()).driver == ASKED
+    path = tmp_path / 'own.yaml'
+    path.write_text(TEXT)
+    nodes = {node.name: node for node in layout(valve='hsv', controller=str(path))}
+    assert nodes['valve_driver'].parameters['controller'] == str(path)
+    plan = make_plan(load_experiment(SHORT), rig, controller)
+    try:
+        assert asked_by(plan.parameters['valve_driver']['controller']) == ASKED
+    finally:
+        plan.remove()
+
+
+@pytest.mark.parametrize('line, what', [
+    ('max_pressure_gauge_pa: 7.0e5', 'unknown number of a driver law'),
+    ('hsv.gain: 3', 'hsv.gain'),
+    ('hsv.gian: 0.3', 'did you mean .?hsv.gain')])
+def test_what_cannot_be_asked(line, what):
+    """A safety limit, a value out of range and a typing error, each with its line."""
+    with pytest.raises(InputError, match=what) as found:
+        asked_by(f'\ncontroller: pid\ndriver:\n  {line}\n')
+    assert ':4' in str(found.value) or 'line 4' in str(found.value)
+
+
+def differing(run):
+    """Return how many ticks of a replay differ from the recording."""
+    return sum(one.differing for one in replay_driver(run).differences)
+
+
+def test_a_recording_replays_with_what_was_asked(rig, tmp_path):
+    """The driver's replay has the same bits; without what was asked it would have others."""
+    bag = tmp_path / 'bag'
+    simulate_experiment(load_experiment(SHORT), rig, load_controller(TEXT, rig), bag, seed=2)
+    run = load_run(bag)
+    assert not differing(run)
+    text = run.metadata['controller']
+    run.metadata['controller'] = text.replace('hsv.gain: 0.4', 'hsv.gain: 0.3')
+    assert differing(run)
