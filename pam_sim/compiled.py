@@ -34,10 +34,14 @@ from typing import Any, ParamSpec, Protocol, TypeGuard, TypeVar
 
 from numba import njit
 import numpy as np
+from pam_sim import compile_notice
 
 P = ParamSpec('P')
 R = TypeVar('R')
 R_co = TypeVar('R_co', covariant=True)
+
+
+compile_notice.listen()
 
 
 class Compiled(Protocol[P, R_co]):

@@ -15,10 +15,11 @@
 """Model files and presets: YAML in, Rig out."""
 
 from collections.abc import Callable, Iterable
+from pathlib import Path
 
-from pam_sim.effects.registry import get_effect
+from pam_sim.effects.registry import all_effects, get_effect
 from pam_sim.errors import did_you_mean, InputError
-from pam_sim.files import StrPath
+from pam_sim.files import shown, StrPath
 from pam_sim.keys import Key, names_of
 from pam_sim.load import LOADS
 from pam_sim.located_yaml import Located, LocatedList
@@ -175,6 +176,11 @@ def _effects(data: Located, base: Rig) -> list[EffectSetting]:
                              listed.where(index))
         item.check_keys(names_of(EFFECT_KEYS))
         name = item.require('name', str)
+        beside = Path(data.name).parent / f'{name}.py'
+        if name not in all_effects() and beside.is_file():
+            raise item.error(
+                f'effect `{name}` is in {shown(beside)}, a folder that is not searched; name it: '
+                f'export PAM_EFFECTS_PATH={shown(beside.parent)}', 'name')
         effect = get_effect(name, item.where('name'))
         if name in stated:
             raise item.error(f'effect `{name}` is listed twice', 'name')

@@ -112,13 +112,16 @@ def _ask(args: argparse.Namespace, question: 'Question', out: str) -> 'GapResult
 
 
 def _next_lines(result: 'GapResult', out: str) -> list[str]:
-    """Return in words what to measure next and how; nothing where that is not known."""
-    if not result.next_experiment:
-        return []
+    """Return how to use a proposed term, what to measure next and how; nothing where none."""
     from pathlib import Path
-    from pam_actuation.report.gap import next_command
-    return [f'what to measure next: {result.next_experiment["why"]}',
-            f'next: {next_command(result, Path(out) / "next_experiment.yaml")}']
+    from pam_actuation.report.gap import next_command, with_term
+    lines = []
+    if result.proposal:
+        lines += [f'the model with the term: {with_term(out)}']
+    if result.next_experiment:
+        lines += [f'what to measure next: {result.next_experiment["why"]}',
+                  f'next: {next_command(result, Path(out) / "next_experiment.yaml")}']
+    return lines
 
 
 def _plan(args: argparse.Namespace) -> int:

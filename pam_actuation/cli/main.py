@@ -107,6 +107,7 @@ def _parsed_and_run(argv: list[str] | None, begin: Callable[[], object]) -> int:
     from pam_actuation.cli.options import (
         complain, EXIT_BAD_INPUT, EXIT_DONE, EXIT_FINDING, EXIT_INTERRUPTED)
     from pam_actuation.cli.overview import overview
+    from pam_sim.compile_notice import tell_when_compiling
     from pam_sim.errors import InputError
     from pam_sim.files import reason, shown
     # BLAS threads only get in the way of small matrices and worker processes.
@@ -121,6 +122,9 @@ def _parsed_and_run(argv: list[str] | None, begin: Callable[[], object]) -> int:
     except SystemExit as ended:     # --help, or an option that is not allowed
         return ended.code if isinstance(ended.code, int) else EXIT_BAD_INPUT
     begin()
+    tell_when_compiling(lambda: print(
+        f'pam {args.verb}: compiling the equations of this rig, once; up to two minutes',
+        file=sys.stderr, flush=True))
     try:
         with _no_numerical_warnings():
             code = args.call(args)

@@ -26,7 +26,7 @@ nodes with it, as those they had been started by.
 """
 
 import atexit
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 import contextlib
 import gc
 import importlib
@@ -42,6 +42,7 @@ from typing import Any
 from pam_actuation.nodes import executables
 from pam_actuation.rigging.compile_ahead import compile_ahead
 from pam_actuation.rigging.processes import end_with_parent, name_process
+from pam_sim.compile_notice import told_of_compilation
 
 # What nodes import only once they know their parameters.
 LATER = ('pam_actuation.bags.recorder', 'pam_actuation.control.config',
@@ -163,30 +164,6 @@ class Children:
             self._channel.sendall(json.dumps(answer).encode() + b'\n')
         except OSError:
             pass
-
-
-@contextlib.contextmanager
-def told_of_compilation(tell: Callable[[], object]) -> Iterator[None]:
-    """Call ``tell`` once if something is compiled meanwhile, and not read from the cache."""
-    from numba.core import event
-
-    class Told(event.Listener):     # type: ignore[misc]  # numba has no annotations
-        first = True
-
-        def on_start(self, event: object) -> None:
-            if self.first:
-                self.first = False
-                tell()
-
-        def on_end(self, event: object) -> None:
-            pass
-
-    told = Told()
-    event.register('numba:compile', told)
-    try:
-        yield
-    finally:
-        event.unregister('numba:compile', told)
 
 
 def _become(request: dict[str, Any]) -> None:

@@ -200,6 +200,14 @@ def next_command(result: 'GapResult', path: StrPath) -> str:
     return f'pam run {shlex.quote(str(path))} --valve {load_rig(result.model_yaml).valve}'
 
 
+def with_term(folder: StrPath) -> str:
+    """Return the command that simulates the model with the term of this folder of a result."""
+    searched = os.pathsep.join(filter(None, (os.environ.get('PAM_EFFECTS_PATH'), str(folder))))
+    model = shlex.quote(str(Path(folder) / MODEL_FILE))
+    return (f'PAM_EFFECTS_PATH={shlex.quote(searched)} pam simulate sine_quarter_hz --rig {model} '
+            '--out runs/with_term')
+
+
 def write_compare(result: 'GapResult', namespace: str, path: StrPath) -> None:
     """Write measured and simulated signals and their residuals as one MCAP file."""
     path = Path(path)

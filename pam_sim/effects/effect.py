@@ -119,6 +119,7 @@ class Effect:
     amplitude : tuple of str
         Parameters that switch it: all zero means the effect is not there.
     reported : tuple of Reported
+        By default the amplitudes.
     states : numpy.dtype, optional
         Record of its states, ``record('anchor_m')``; none by default.
     packed : numpy.dtype, optional
@@ -237,6 +238,12 @@ class Effect:
 
     def report(self, values: Mapping[str, float],
                rig: 'Rig | None') -> dict[str, tuple[float, str]]:
-        """Return reported name -> (value, unit) for a rig; all of them without one."""
-        return {item.name: (item.function(values, rig), item.unit) for item in self.reported
-                if rig is None or rig.valve in item.valves}
+        """
+        Return reported name -> (value, unit) for a rig; all of them without one.
+
+        Where nothing is declared, the amplitudes tell the size.
+        """
+        found = {item.name: (item.function(values, rig), item.unit) for item in self.reported
+                 if rig is None or rig.valve in item.valves}
+        return found or {p.name: (float(values[p.name]), p.unit) for p in self.parameters
+                         if p.name in self.amplitude}

@@ -44,6 +44,7 @@ SCRIPT = """
 import json, sys
 import numpy as np
 from pam_sim import load_rig
+from pam_sim.effects.registry import get_effect
 for name, valve, effects in json.load(open(sys.argv[1])):
     rig = load_rig('dmsp_5_300_hanging_mass', valve=valve)
     signal = np.linspace(4.0, 5.0, 40)
@@ -53,7 +54,10 @@ for name, valve, effects in json.load(open(sys.argv[1])):
         rig.with_(effects=chosen).simulate(signal, initial_pressure_pa=501325.0).outputs
         for chosen in (effects[:1], effects[1:], []))
     same, acts = np.allclose(one, other, 1e-6, 1e-9), not np.allclose(one, none, 1e-9)
-    print(name, same, acts)
+    effect = get_effect(effects[0]['name'])
+    # What a second look states of it.
+    sizes = effect.report(effect.values(effects[0]['parameters']), rig)
+    print(name, same, acts, list(sizes) == list(effect.amplitude))
 """
 RANGES = {'p': (1e4, 5e5), 'x': (1e-4, 0.02), 'v': (-0.2, 0.2), 't': (0.005, 60.0),
           'F': (1.0, 90.0), 's': (1e5, 6e5), 'e': (-1e5, 1e5), 'a': (0.0, 1.0), 'b': (0.0, 1.0)}
@@ -155,7 +159,7 @@ def test_files_load_and_simulate_as_the_terms_that_were_tried(drag, tmp_path):
         env={**os.environ, 'PAM_EFFECTS_PATH': str(tmp_path), 'NUMBA_DISABLE_JIT': '1',
              'PYTHONPATH': os.pathsep.join(sys.path), 'PAM_CACHE_DIR': str(tmp_path / 'cache')})
     assert answer.returncode == 0, answer.stderr
-    assert answer.stdout.split('\n')[:-1] == [f'{name} True True' for name, *_ in pairs]
+    assert answer.stdout.split('\n')[:-1] == [f'{name} True True True' for name, *_ in pairs]
 
 
 def test_noise_alone_has_no_term():

@@ -159,6 +159,18 @@ def test_the_next_experiment_is_told_with_its_command():
     assert command in gap_section(result, command=command).body
 
 
+def test_a_proposed_term_is_told_with_the_command_that_uses_it(monkeypatch):
+    result = GapResult('unknown', '')
+    result.proposal = object()
+    monkeypatch.delenv('PAM_EFFECTS_PATH', raising=False)
+    assert gap_verb._next_lines(result, 'my gap') == [
+        "the model with the term: PAM_EFFECTS_PATH='my gap' pam simulate sine_quarter_hz "
+        "--rig 'my gap/proposed_model.yaml' --out runs/with_term"]
+    monkeypatch.setenv('PAM_EFFECTS_PATH', 'effects')
+    told, = gap_verb._next_lines(result, 'gap')
+    assert 'PAM_EFFECTS_PATH=effects:gap pam' in told
+
+
 @pytest.fixture(scope='module')
 def run():
     return recorded(nominal(), voltages(4.0))

@@ -56,6 +56,17 @@ def test_round_trip():
         assert load_rig(text).to_yaml() == text
 
 
+def test_an_effect_whose_file_lies_beside_the_model_is_told_with_the_way_to_it(tmp_path):
+    path = tmp_path / 'model.yaml'
+    path.write_text('rig: dmsp_5_300_hanging_mass\neffects: [{name: my_effect}]\n')
+    with pytest.raises(InputError, match='unknown effect `my_effect`'):
+        load_rig(path)
+    (tmp_path / 'my_effect.py').touch()
+    with pytest.raises(InputError, match=r'model.yaml:2: effect `my_effect` is in .*my_effect.py, '
+                       r'a folder that is not searched; name it: export PAM_EFFECTS_PATH=/'):
+        load_rig(path)
+
+
 def test_realistic_preset_has_the_stated_numbers():
     rig = load_rig('dmsp_5_300_realistic')
     assert rig.effect('valve_dead_time').parameters == {'delay_s': 0.030}
