@@ -23,7 +23,9 @@ from pam_sim.gap.subsystems.simulation import free_run
 from pam_sim.rig import Rig
 
 SAMPLES = 1.9                # of the pressure in a period; rates scatter a little
-PHASES = 10                  # numerics: delays tried over a period, for nobody knows the dead time
+# Numerics, in periods: delays of the mean, for nobody knows the dead time; steps of these delays
+# and, within a period, of those of pulses.
+PERIODS, COARSE, FINE = 5.0, 0.2, 0.05
 
 
 def shows_pulses(rig: Rig, recordings: Sequence[Recording], criteria: Criteria = CRITERIA
@@ -38,9 +40,18 @@ def shows_pulses(rig: Rig, recordings: Sequence[Recording], criteria: Criteria =
     period_s = rig.parameters['pwm_period_s']
     if any(SAMPLES * np.median(np.diff(r.time_s['pressure'])) > period_s for r in recordings):
         return False
-    least = 1.0 - criteria.close_share
-    return all(min(_roughness(switching, r, d) for d in period_s * np.arange(PHASES) / PHASES)
-               < least * _roughness(averaged, r, 0.0) for r in recordings)
+    return all(_is_nearer(averaged, switching, r, period_s, criteria) for r in recordings)
+
+
+def _is_nearer(averaged: Rig, switching: Rig, recording: Recording, period_s: float,
+               criteria: Criteria) -> bool:
+    """Return whether pulses are nearer than their mean, each with the delay that suits it best."""
+    mean, delay_s = min((_roughness(averaged, recording, d), d)
+                        for d in period_s * np.arange(0.0, PERIODS, COARSE))
+    # What opens at once comes sooner than its mean, so it needs more delay; any phase is tried.
+    single = min(_roughness(switching, recording, delay_s + d)
+                 for d in period_s * np.arange(0.0, 1.0, FINE))
+    return single < (1.0 - criteria.close_share) * mean
 
 
 def _roughness(rig: Rig, recording: Recording, delay_s: float) -> float:
