@@ -29,6 +29,7 @@ from pam_sim.gap.data.noise import autocorrelation_time
 from pam_sim.gap.fit.candidate import Setting
 from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
 from pam_sim.gap.fit.parallel import parallel_map
+from pam_sim.gap.fit.trust_region import minimised
 from pam_sim.gap.subsystems.effects import shows
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.rig import Rig
@@ -99,6 +100,8 @@ class Solver:
                 prior.append(FREE_SD if free else 1.0)
         self.bounds = (np.array(low, float), np.array(high, float))
         self.prior: FloatArray = np.array(prior)
+        self._weight: dict[str, FloatArray] = {}
+        self._known: FloatArray | None = None
         self._errors: dict[bytes, dict[str, FloatArray]] = {}
         self._moved: tuple[bytes, list[tuple[float, dict[str, FloatArray]]]] = (b'', [])
 
@@ -141,22 +144,30 @@ class Solver:
 
     def slopes(self, x: FloatArray) -> FloatArray:
         """Return the derivatives of ``residuals``."""
-        base, count = self.errors(x), len(self.free)
-        columns = np.zeros((self.residuals(x).size, x.size))
+        base = self.errors(x)
+        columns = self._known_columns().copy()
         rows = columns.shape[0] - self.prior.size
-        columns[rows:] = np.diag(1.0 / self.prior)
         for j, (step, simulated) in enumerate(self._moved_from(x)):
             # An effect of one subsystem leaves the other one as it is.
             errors = {**base, **simulated}
             columns[:rows, j] = np.concatenate([
                 self._weighted(c, errors[c.subsystem] - base[c.subsystem])
                 for c in self.problems]) / step
-        row, column = 0, count
-        for problem in self.problems:
-            slope = self._weighted(problem, self.estimator.slopes[problem.subsystem])
-            columns[row:row + len(slope), column:column + len(problem.known)] = slope
-            row, column = row + len(slope), column + len(problem.known)
         return columns
+
+    def _known_columns(self) -> FloatArray:
+        """Return ``slopes`` without those of the effects, the same until the weights change."""
+        if self._known is None:
+            masked = [self._weighted(c, self.estimator.slopes[c.subsystem]) for c in self.problems]
+            row, column = 0, len(self.free)
+            rows = sum(len(slope) for slope in masked)
+            self._known = np.zeros((rows + self.prior.size, self.prior.size))
+            self._known[rows:] = np.diag(1.0 / self.prior)
+            for slope in masked:
+                end = column + slope.shape[1]
+                self._known[row:row + len(slope), column:end] = slope
+                row, column = row + len(slope), end
+        return self._known
 
     def _moved_from(self, x: FloatArray) -> list[tuple[float, dict[str, FloatArray]]]:
         """Return (step, errors after it) for each parameter of the effects."""
@@ -184,15 +195,13 @@ class Solver:
 
     def run(self, x: FloatArray) -> FloatArray:
         """Return the solution from a start."""
-        from scipy.optimize import least_squares       # slow to import
-
         low, high = self.bounds
         if not x.size:
             return x
         margin = 1e-6 * (high - low)
         start = np.clip(x, low + margin, high - margin)
-        return least_squares(self.residuals, start, self.slopes, (low, high), x_scale='jac',
-                             ftol=FTOL, xtol=XTOL, max_nfev=EVALUATIONS).x
+        return minimised(
+            self.residuals, self.slopes, start, low, high, FTOL, XTOL, EVALUATIONS)
 
     def settle(self, x: FloatArray, rounds: int = ROUNDS
                ) -> tuple[FloatArray, dict[str, FloatArray]]:
@@ -207,6 +216,7 @@ class Solver:
     def retemper(self, errors: Mapping[str, FloatArray]) -> bool:
         """Set the weights after the errors; return whether they had settled."""
         settled = True
+        self._weight, self._known = {}, None
         for problem in self.problems:
             fresh = tempering(problem, errors[problem.subsystem], self.estimator.use)
             old = self.temper[problem.subsystem]
@@ -215,8 +225,10 @@ class Solver:
         return settled
 
     def _weighted(self, problem: SubsystemProblem, errors: FloatArray) -> FloatArray:
-        mask = self.masks[problem.subsystem]
-        weight = 1.0 / np.sqrt(self.temper[problem.subsystem][problem.signal[mask]])
+        s, mask = problem.subsystem, self.masks[problem.subsystem]
+        if s not in self._weight:
+            self._weight[s] = 1.0 / np.sqrt(self.temper[s][problem.signal[mask]])
+        weight = self._weight[s]
         return errors[mask] * (weight if errors.ndim == 1 else weight[:, np.newaxis])
 
 
