@@ -58,6 +58,22 @@ def test_an_effect_shows_in_its_own_cut_only(effect, here, there):
     assert acts_on(effect, here) and not acts_on(effect, there)
 
 
+def test_errors_are_simulated_once_until_the_inputs_are_disturbed():
+    problem, left = errors(nominal())['muscle']
+    known, made = np.zeros(len(problem.known)), problem.simulations
+    # What acts in the valve leaves these as they are.
+    assert problem.errors(with_effect('valve_dead_time'), known) is left
+    assert problem.simulations == made
+    assert not np.array_equal(problem.errors(with_effect('coulomb_friction'), known), left)
+    assert not np.array_equal(problem.errors(nominal(), known + 0.1), left)
+    problem.disturb(np.random.default_rng(0))
+    disturbed = problem.errors(nominal(), known)
+    problem.disturb(None)
+    again = problem.errors(nominal(), known)
+    assert not np.array_equal(disturbed, left) and again is not left
+    assert np.array_equal(again, left) and problem.simulations == made + 4
+
+
 @pytest.mark.parametrize('sensor, parameters', [
     ('pressure_bias', {'bias_pa': 4e3}), ('pressure_gain', {'gain_error': 0.03}),
     ('pressure_lag', {'time_constant_s': 0.006}), ('contraction_bias', {'bias_m': 3e-4})])

@@ -14,7 +14,8 @@
 
 """One subsystem with the recordings it is compared with."""
 
-from collections.abc import Mapping, Sequence
+from collections import OrderedDict
+from collections.abc import Hashable, Mapping, Sequence
 from functools import lru_cache
 import threading
 
@@ -25,15 +26,18 @@ from pam_sim.gap.data.noise import sensor_floor, STAMP_SD_S
 from pam_sim.gap.data.recording import GRID_S, Recording
 from pam_sim.gap.data.signals import FIELD, SIGNALS
 from pam_sim.gap.data.split import part_of, UNUSED
+from pam_sim.gap.subsystems.effects import shows
 from pam_sim.gap.subsystems.known import Known, of_run
-from pam_sim.response import Response
+from pam_sim.response import COLUMNS, Response
 from pam_sim.rig import Rig
+from pam_sim.rollout.sampling import sample_into
 
 RATE_HZ = 200.0              # of the samples that are compared
 TEST_BLOCK_S = 0.5           # of the paired tests between rivals
 INPUT_DRAWS = 3
 COARSE_GAIN = 4.0            # error of linear interpolation over twice the period
 KEPT = 16                    # inputs and instants that many simulations in a row share
+KEPT_ERRORS = 100            # of the last simulations; fits and slopes ask for some again
 
 
 class SubsystemProblem:
@@ -84,6 +88,7 @@ class SubsystemProblem:
                              if any(s in self.outputs(r) for r in recordings))
         self.level, self._stamp_sd_s = 1.0, STAMP_SD_S
         self.simulations, self._lock = 0, threading.Lock()
+        self._kept: OrderedDict[Hashable, tuple[FloatArray, object]] = OrderedDict()
         self.known = self._rig_numbers(rig) + self._nuisances(recordings)
         self._start = [{s: r.start(s) for s in r.measured} for r in recordings]
         self._index, parts, blocks, signals, measured, times, runs = ([] for _ in range(7))
@@ -128,6 +133,7 @@ class SubsystemProblem:
                 ) -> None:
         """Disturb the measured inputs as noise and stamps do, or no more where it is None."""
         self._stamp_sd_s = stamp_sd_s
+        self._kept.clear()
         self._disturb(random)
 
     def _disturb(self, random: np.random.Generator | None) -> None:
@@ -136,6 +142,7 @@ class SubsystemProblem:
 
     def shift_inputs(self, noise_sd: float) -> None:
         """Shift measured inputs by so many deviations of their noise, until ``disturb``."""
+        self._kept.clear()
         self._disturb(None)
 
     def _simulate(self, rig: Rig, index: int, numbers: Mapping[str, float]) -> Response:
@@ -143,7 +150,9 @@ class SubsystemProblem:
 
     def errors(self, rig: Rig, known_z: FloatArray) -> FloatArray:
         """
-        Return simulated minus measured in noise floors, shape (N,).
+        Return simulated minus measured in noise floors, shape (N,); not to be written to.
+
+        What was asked for shortly before is not simulated again.
 
         Parameters
         ----------
@@ -153,7 +162,20 @@ class SubsystemProblem:
             Normalised values of ``known``.
 
         """
-        return (self.values(rig, known_z) - self.measured) / self._scale
+        key = (id(rig.muscle), rig.load, rig.valve, rig.fidelity, *rig.parameters.values(), *(
+            (e.name, *e.parameters.values()) for e in rig.effects if shows(e.name, self)),
+            known_z.tobytes())
+        with self._lock:
+            if key in self._kept:
+                self._kept.move_to_end(key)
+                return self._kept[key][0]
+        found = (self.values(rig, known_z) - self.measured) / self._scale
+        found.flags.writeable = False
+        with self._lock:
+            self._kept[key] = found, rig.muscle         # held, so that its id stays its own
+            while len(self._kept) > KEPT_ERRORS:
+                self._kept.popitem(last=False)
+        return found
 
     def values(self, rig: Rig, known_z: FloatArray) -> FloatArray:
         """Return the simulated values of all compared samples, shape (N,)."""
@@ -167,9 +189,8 @@ class SubsystemProblem:
             for name in instants:
                 late = numbers.get(of_run('force_skew', index), 0.0) if name == 'force' else 0.0
                 row, ahead = self._place(index, name, late, len(response))
-                value = getattr(response, FIELD[name])
-                before = value[row]
-                found.append(before + ahead * (value[row + 1] - before))
+                found.append(np.empty(row.size))
+                sample_into(response.outputs, COLUMNS[FIELD[name]], row, ahead, found[-1])
         return np.concatenate(found)
 
     def _place_of(self, index: int, name: str, late_s: float, count: int
