@@ -29,9 +29,10 @@ from pathlib import Path
 import sys
 
 import numpy as np
+from pam_sim.characterise.beyond import beyond, LEAST_LENGTHS
 from pam_sim.errors import InputError
 from pam_sim.muscle.fit import CASES, fit_law, judge
-from pam_sim.muscle.force_maps import ForceMap
+from pam_sim.muscle.force_maps import ForceMap, read_force_map
 from pam_sim.muscle.registry import laws, make_law
 import results_page
 
@@ -121,6 +122,33 @@ def left_out(points):
     return found
 
 
+def print_bounds(records):
+    """
+    Print between which bounds `pam characterise` expects the force at longer lengths.
+
+    Parameters
+    ----------
+    records : list of (ForceMap, str)
+        Records, and the shape that is not used because it is that of the muscle.
+
+    """
+    print('\n| record | fitted from | judged at | bounds, N | measured, N |\n'
+          '|---|---|---|---|---|')
+    for points, own in records:
+        strains = np.unique(points.strain)
+        for count in range(1, len(strains) - LEAST_LENGTHS + 1):
+            kept = some(points, points.strain >= strains[count] - 1e-9)
+            for strain in strains[:count]:
+                there = beyond(kept, float(strain), own)
+                if there is None:
+                    continue
+                at = np.flatnonzero(points.strain == strain)
+                at = at[np.argmax(points.pressure_gauge_pa[at])]
+                print(f'| {points.name} | {100.0 * strains[count]:.1f} % '
+                      f'| {100.0 * strain:.1f} % | {there.low_n:.0f} to {there.high_n:.0f} '
+                      f'| {points.force_n[at]:.0f} |')
+
+
 def command_line():
     """Return the parser of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[1])
@@ -155,6 +183,8 @@ def show(args):
     for label, pairs in left_out(points).items():
         cells = ('refused' if one is None else f'{one[0]:.1f} ({one[1]:.1f})' for one in pairs)
         print(f'| {label} | ' + ' | '.join(cells) + ' |')
+    print_bounds([(points, ''), (read_force_map('dmsp_10_250'), 'dmsp_10_250_map'),
+                  (read_force_map('dmsp_20_300'), 'dmsp_20_300_map')])
     return 0
 
 

@@ -20,11 +20,13 @@ from typing import Any
 
 import numpy as np
 from pam_sim.annotations import FloatArray
+from pam_sim.characterise.beyond import beyond
 from pam_sim.characterise.dimensions import Dimensions
 from pam_sim.characterise.fixed_load import fixed_load, FixedLoad
 from pam_sim.characterise.points import points_of, without_stuck
 from pam_sim.characterise.surfaces import build_surfaces, Surfaces
-from pam_sim.characterise.tables import loads_of_table, MeasuredTable, points_of_map
+from pam_sim.characterise.tables import (
+    loads_of_table, map_of, MeasuredTable, points_of_map)
 from pam_sim.errors import InputError
 from pam_sim.model_file import load_rig
 from pam_sim.muscle.lookup_table import LookupTable
@@ -167,6 +169,9 @@ def characterise_table(
         result.remarks.append(
             'A force map has one branch and states no noise: the uncertainty given is only '
             'that of the contraction at which the force vanishes.')
+        longer = beyond(map_of(table, dimensions.length_m))
+        if longer is not None:
+            result.remarks.append(longer.text(dimensions.length_m))
     _finish(result)
     return result
 

@@ -30,6 +30,7 @@ from pam_sim.characterise.holds import Hold
 from pam_sim.characterise.points import Points
 from pam_sim.errors import InputError
 from pam_sim.files import StrPath
+from pam_sim.muscle.force_maps import ForceMap
 from pam_sim.muscle.lookup_table import read_commented_csv
 from pam_sim.short_repr import short_repr
 from scipy.interpolate import PchipInterpolator
@@ -127,6 +128,13 @@ def strain_of(table: MeasuredTable, length_m: float) -> FloatArray:
             f'contractions of {100 * strain.min():.0f} to {100 * strain.max():.0f} % of the '
             f'length of {length_m:g} m are impossible', table.path)
     return strain
+
+
+def map_of(table: MeasuredTable, length_m: float) -> ForceMap:
+    """Return the ForceMap of a table of kind ``force map``, for a length at rest [m]."""
+    force = table.columns['force']
+    return ForceMap(table.path, length_m, table.columns['pressure'], strain_of(table, length_m),
+                    force, force <= 0.0)
 
 
 def loads_of_table(table: MeasuredTable, length_m: float) -> list[FixedLoad]:
