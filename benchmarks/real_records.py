@@ -18,6 +18,7 @@
     python benchmarks/real_records.py FOLDER
     python benchmarks/real_records.py FOLDER --pressure --write    # the table of the valve alone
     python benchmarks/real_records.py FOLDER --contraction --write # contraction and black boxes
+    python benchmarks/real_records.py FOLDER --alone --write       # steps: `pam gap`, black boxes
 
 FOLDER holds ``steps_100hz.csv`` and ``quasi_static_loop.csv``, transcribed from
 github.com/tbazina/pam_lqi_pid; they are no part of this project. Another muscle than the one of
@@ -43,6 +44,7 @@ from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.subsystems.simulation import run_from_pressure
 from pam_sim.run import Run, Series
 from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
+import real_alone
 import real_contraction
 import real_pressure
 import results_page
@@ -60,8 +62,6 @@ RATE_HZ = 100.0
 RESOLUTION = {'pressure_pa': 900.0, 'contraction_m': 4.9e-5}       # of the loop's readings
 MUSCLE_NAMES = ('coulomb_friction', 'pressure_friction', 'hysteresis', 'viscous_damping', 'creep',
                 'end_taper', 'bladder_stiffness', 'threshold_pressure', 'thermal_softening')
-VALVE_NAMES = ('valve_dead_time', 'tube_lag', 'flow_limit', 'vent_asymmetry', 'valve_dead_zone',
-               'valve_hysteresis', 'pressure_lag', 'vent_bleed')
 MIDDLE_BAR = np.linspace(1.0, 5.4, 23)
 INJECTED = (('coulomb_friction', 'force_n', 15.0), ('coulomb_friction', 'force_n', 6.0),
             ('end_taper', 'k_minus_1', 0.2), ('end_taper', 'k_minus_1', 0.07),
@@ -172,6 +172,8 @@ def command_line():
     parser.add_argument('--pressure', action='store_true', help='the table of the valve alone')
     parser.add_argument('--contraction', action='store_true',
                         help='the tables of contraction and black boxes alone')
+    parser.add_argument('--alone', action='store_true',
+                        help='the table of what `pam gap` makes of the steps alone')
     results_page.add_write(parser, 'real_records')
     return parser
 
@@ -179,9 +181,10 @@ def command_line():
 def main():
     """Look at the loop, at the steps, and for what was injected."""
     args = command_line().parse_args()
-    is_all = not (args.pressure or args.contraction)
+    is_all = not (args.pressure or args.contraction or args.alone)
     for part, is_asked, tables in (('pressure', args.pressure, show_pressure),
                                    ('contraction', args.contraction, show_contraction),
+                                   ('alone', args.alone, show_alone),
                                    ('', False, show)):
         if is_all or is_asked:
             with results_page.printed(args, __file__, part):
@@ -204,9 +207,21 @@ def show_contraction(args):
     steps = read_table(args.folder, 'steps_100hz.csv')
     zero, slope = calibrated(loop)
     rig, _ = model_of(loop, zero)
-    real_contraction.loop_table(rig, *(cycle(loop, k, zero, slope, seed=k) for k in (1, 2)))
+    cycles = [cycle(loop, k, zero, slope, seed=k) for k in (1, 2)]
+    found = [load_rig(find_gap(one, rig, other, MUSCLE_NAMES, args.seconds).model_yaml)
+             for one, other in (cycles, cycles[::-1])]
+    real_contraction.loop_table(rig, *cycles, found)
     real_contraction.chain_table(rig, np.clip(slope * steps['u_V'], 0.0, 6.0),
                                  1e5 * (zero + steps['p_bar']), 1e-3 * steps['s_mm'])
+
+
+def show_alone(args):
+    """Print what `pam gap` makes of the steps, beside black boxes."""
+    loop = read_table(args.folder, 'quasi_static_loop.csv')
+    steps = read_table(args.folder, 'steps_100hz.csv')
+    zero, slope = calibrated(loop)
+    rig, _ = model_of(loop, zero)
+    real_alone.print_table(step_run(steps, zero, slope), rig, args.seconds)
 
 
 def show(args):
@@ -229,8 +244,8 @@ def show(args):
     better = load_rig(found.model_yaml)
     offs = [f'- {label}: {mm_off(rig, run):.2f} mm before, {mm_off(better, run):.2f} mm after'
             for label, run in (('second cycle', second), ('steps', stepped))]
-    result = find_gap(stepped, rig, None, VALVE_NAMES, args.seconds)
-    print('| steps, names of the valve |', told(result), '|', flush=True)
+    result = find_gap(stepped, rig, None, None, args.seconds)
+    print('| steps, all names |', told(result), '|', flush=True)
     better = replace(better, tolerance=dict.fromkeys(better.tolerance, KNOWN_NOW))
     for name, parameter, size in INJECTED:
         looks = [injected(better, run, name, parameter, size) for run in (first, second)]

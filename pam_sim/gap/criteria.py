@@ -106,6 +106,10 @@ class Criteria:
         0.0005, 'm', 'health',
         'Range of the contraction below which the rig is at rest.',
         'Design choice.')
+    even_share: float = _criterion(
+        0.05, 'of an even share', 'health',
+        'Moves, up or down, below which a part has none, so that edges are dealt out in pieces.',
+        'Recordings of an identification: the least is three times as much.')
     seen_gap: float = _criterion(
         0.05, 'floors squared', 'detection',
         'Gap from which on a subsystem needs an explanation.',

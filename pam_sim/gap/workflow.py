@@ -22,7 +22,7 @@ from pam_sim.gap.data.health import check_health, without_dead
 from pam_sim.gap.data.overlap import check_apart
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.speeds import moves_at_one_speed
-from pam_sim.gap.data.split import FIT, SELECT
+from pam_sim.gap.data.split import FIT, SELECT, SETTLE_S, split_of
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit
 from pam_sim.gap.plan.detectable import least_sizes
@@ -46,6 +46,15 @@ from pam_sim.gap.verify.refutation import refute, unconfirmed
 from pam_sim.gap.verify.validation import Validation
 from pam_sim.rig import Rig
 from pam_sim.run import Run
+
+SHORT_STRETCHES = (
+    'the recordings hold few moves, so the search fits and judges stretches of {:.2g} s of the '
+    'same edges in turn')
+SAME_EDGES = (
+    'the recording holds few moves, so stretches of {:.2g} s of the same edges are dealt out in '
+    'turn to the fit, the choice and the proof; the proof is on the same edges at other moments '
+    'and does not show that other steps are followed; record other steps and give them as '
+    '--certify')
 
 
 def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
@@ -116,11 +125,16 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     # Its valve signal alone: what was measured on it stays untouched until the validation.
     held_out = (Recording(without_dead(certify), rig.valve, driven) if certify
                 else recordings[0])
+    settle_s = SETTLE_S if certify else split_of(held_out, criteria=criteria).settle_s
+    settled = {s: held_out.time_s[s] > settle_s for s in held_out.signals}
+    first = estimator.problems[0]
+    if first.is_dealt_short:
+        remarks.append((SAME_EDGES if certify is None else SHORT_STRETCHES).format(first.block_s))
 
     def matters(found: Fit, without: Fit) -> bool:
         bare = held_without(found, without.hypothesis.names)
         run, *others = (free_run_of(estimator, f, held_out) for f in (found, bare, without))
-        own, refitted = (moved(held_out, run, o) for o in others)
+        own, refitted = (moved(held_out, run, o, settled) for o in others)
         is_number = len(bare.theta) == len(found.theta)
         return is_material(refitted if is_number else own, refitted, materiality,
                            criteria=criteria)

@@ -22,7 +22,7 @@ from pam_actuation.report.gap import free_run_overlay, write_gap
 from pam_sim import load_rig
 from pam_sim.gap import find_gap
 from pam_sim.gap.data.recording import held_mean, Recording
-from pam_sim.gap.data.split import CERTIFY, FIT, part_of, SELECT, UNUSED
+from pam_sim.gap.data.split import CERTIFY, FIT, long_split, SELECT, UNUSED
 from pam_sim.gap.result import SignalGap
 from pam_sim.gap.subsystems.simulation import free_run
 import pytest
@@ -198,10 +198,11 @@ def test_mean_of_a_held_signal_is_exact_between_grid_points():
 
 
 def test_parts_cover_everything_once_the_start_has_settled():
-    part = part_of(np.arange(0.0, 20.0, 0.5), 20.0)
+    part = long_split(20.0).part_of(np.arange(0.0, 20.0, 0.5))
     assert part[0] == UNUSED
     assert [(part == p).sum() for p in (FIT, SELECT, CERTIFY)] == [15, 16, 8]
-    assert not (part_of(np.arange(0.5, 20.0, 0.5), 20.0, holds_certify=False) == CERTIFY).any()
+    assert not (long_split(20.0, holds_certify=False).part_of(
+        np.arange(0.5, 20.0, 0.5)) == CERTIFY).any()
 
 
 def test_shrink_takes_the_noise_out():

@@ -179,6 +179,17 @@ class Recording:
         The median of the first 50 ms, or the end of a straight line through them where
         the signal is already moving.
         """
+        level = self._moving_from(signal)
+        if level is not None:
+            return level
+        return float(np.median(self.measured[signal][self.time_s[signal] <= START_S]))
+
+    def moves_at_start(self, signal: str) -> bool:
+        """Return whether a signal follows a line rather than a level at the start."""
+        return self._moving_from(signal) is not None
+
+    def _moving_from(self, signal: str) -> float | None:
+        """Return where a signal comes from that is already moving; None where it rests."""
         early = self.time_s[signal] <= START_S
         early[:START_SAMPLES] = True
         seconds, value = self.time_s[signal][early], self.measured[signal][early]
@@ -187,7 +198,7 @@ class Recording:
             left = float(np.std(value - level - slope * seconds))
             if abs(slope) * float(np.std(seconds)) > 2.0 * left:
                 return float(level)
-        return float(np.median(value))
+        return None
 
     def at_stamps(self, response: Response, late_s: Mapping[str, float] | None = None
                   ) -> dict[str, FloatArray]:

@@ -29,7 +29,7 @@ import numpy as np
 from pam_sim.annotations import BoolArray, FloatArray
 from pam_sim.effects.unnamed import terms
 from pam_sim.gap.data.recording import GRID_S, Recording
-from pam_sim.gap.data.split import FIT, part_of
+from pam_sim.gap.data.split import FIT, split_of
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit
 from pam_sim.gap.propose.library import Factor, moved_to, StandIn, Term
@@ -151,7 +151,7 @@ def force_error(estimator: Estimator, recordings: Sequence[Recording], now: Fit,
     parts = [_inputs(rig, r) for r in recordings]
     inputs = {k: np.concatenate([p[k] for p in parts]) for k in parts[0]}
     time_s = inputs['t']
-    part = np.concatenate([part_of(p['t'], r.grid_s[-1], False)
+    part = np.concatenate([split_of(r, False).part_of(p['t'])
                            for p, r in zip(parts, recordings)])
     chosen = (part == FIT) & (np.abs(inputs['v']) > MOVING_M_PER_S) & (inputs['x'] > AT_STOP_M)
     if int(chosen.sum()) < LEAST_SAMPLES:

@@ -22,6 +22,7 @@ its subsystem without implausible numbers.
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from pam_sim.gap.data.split import FIT
 from pam_sim.gap.fit.hypothesis import Fit
 from pam_sim.gap.select.candidates import is_limit, same_as
 from pam_sim.gap.select.comparison import preference, share
@@ -114,8 +115,16 @@ def is_missed(context: SearchContext, problem: SubsystemProblem, current: Fit, w
     # By itself in its subsystem it needs no more than one that is alone altogether.
     alone = not without.hypothesis.touches(problem)
     least = criteria.greater_part if alone else criteria.later_gain
-    return (gained > 0.0 and gained >= least * rest and preference(
-        problem, base, current.errors[s], without.errors[s]) >= criteria.certain_sd)
+    if not (gained > 0.0 and gained >= least * rest):
+        return False
+    sure = preference(problem, base, current.errors[s], without.errors[s])
+    if problem.is_dealt_short and not (
+            sure < criteria.hint_sd or sure >= criteria.certain_sd):
+        # Few blocks see an edge, or too few for a test. The other part judges as well.
+        crossed, bare = (context.estimator.cross_fit(f).errors[s] for f in (current, without))
+        sure = preference(problem, base, current.errors[s], without.errors[s],
+                          other_part=(FIT, crossed, bare))
+    return sure >= criteria.certain_sd
 
 
 def _simpler(context: SearchContext, current: Fit, w: NamedEffect, without: Fit,

@@ -30,6 +30,7 @@ from pam_sim.gap.select.ranking import Ranking
 from pam_sim.gap.select.rival import Rival
 from pam_sim.gap.select.screening import screen, Screened
 from pam_sim.gap.subsystems.problem import SubsystemProblem
+from pam_sim.gap.subsystems.valve import ValveProblem
 
 
 @dataclass(frozen=True)
@@ -146,8 +147,19 @@ def first_gap_of(problem: SubsystemProblem, base: Fit, screened: Iterable[Screen
     Return the gap of a subsystem before anything is added.
 
     Both the fitted and the judging part must show it. One that is below the floor
-    can still be seen, if an effect promises to explain a part of the errors.
+    can still be seen, if an effect promises to explain a part of the errors. Where stretches of
+    the same edges are dealt out, errors of the measured pressure are the same in all parts; a gap
+    of muscle and load no larger than the floor may be theirs, and is none.
     """
+    found = _seen_gap_of(problem, base, screened, seen_gap)
+    if (problem.is_dealt_short and problem.subsystem != ValveProblem.subsystem
+            and found <= problem.criteria.hint_sd ** 2):
+        return 0.0
+    return found
+
+
+def _seen_gap_of(problem: SubsystemProblem, base: Fit, screened: Iterable[Screened],
+                 seen_gap: float) -> float:
     s = problem.subsystem
     seen = min(gap(problem, base.errors[s], part) for part in (FIT, SELECT))
     if seen > seen_gap:

@@ -65,6 +65,7 @@ class Outcome:
 
 def search(context: SearchContext) -> Outcome:
     """Search for the missing effects and return the Outcome."""
+    every = context
     current, added = forward_selection(context, context.base, [])
     selected = backward_elimination(context, current, added)
     gone = {w.name for w in added} - {w.name for w in selected.named}
@@ -74,7 +75,10 @@ def search(context: SearchContext) -> Outcome:
         again, added = forward_selection(context, selected.fit, selected.named)
         if len(added) > len(selected.named):
             selected = backward_elimination(context, again, added)
-    selected = _grouped(context, _paired(context, selected))
+    selected = _paired(context, selected)
+    # What did not hold alone may hold in its group; long recordings had their chance.
+    few = any(p.is_dealt_short for p in context.problems)
+    selected = _grouped(every if few else context, selected)
     fit, named, explained = with_wrong_numbers(
         context, selected.fit, selected.named, selected.explained)
     return Outcome(context.base, fit, named, explained, not context.out_of_time(),

@@ -17,6 +17,7 @@
 from collections import OrderedDict
 from collections.abc import Hashable, Mapping, Sequence
 from functools import lru_cache
+import math
 import threading
 
 import numpy as np
@@ -25,7 +26,7 @@ from pam_sim.gap.criteria import CRITERIA, Criteria
 from pam_sim.gap.data.noise import sensor_floor, STAMP_SD_S
 from pam_sim.gap.data.recording import GRID_S, Recording
 from pam_sim.gap.data.signals import FIELD, SIGNALS
-from pam_sim.gap.data.split import part_of, UNUSED
+from pam_sim.gap.data.split import split_of, UNUSED
 from pam_sim.gap.subsystems.effects import shows
 from pam_sim.gap.subsystems.known import Known, of_run
 from pam_sim.response import COLUMNS, Response
@@ -33,7 +34,6 @@ from pam_sim.rig import Rig
 from pam_sim.rollout.sampling import sample_into
 
 RATE_HZ = 200.0              # of the samples that are compared
-TEST_BLOCK_S = 0.5           # of the paired tests between rivals
 INPUT_DRAWS = 3
 COARSE_GAIN = 4.0            # error of linear interpolation over twice the period
 KEPT = 16                    # inputs and instants that many simulations in a row share
@@ -68,6 +68,10 @@ class SubsystemProblem:
         floor turned out too careful.
     simulations : int
         Made so far.
+    is_dealt_short : bool
+        Whether a recording has few moves, so that stretches of its edges are dealt out.
+    block_s : float
+        Length of the shortest blocks that are dealt out [s].
     part, block, signal : numpy.ndarray of int, shape (N,)
         Part, test block and signal (index into ``signals``) of every compared sample.
     time_s, run : numpy.ndarray, shape (N,)
@@ -92,8 +96,11 @@ class SubsystemProblem:
         self.known = self._rig_numbers(rig) + self._nuisances(recordings)
         self._start = [{s: r.start(s) for s in r.measured} for r in recordings]
         self._index, parts, blocks, signals, measured, times, runs = ([] for _ in range(7))
-        first = 0
+        first, self.is_dealt_short, self.block_s = 0, False, math.inf
         for index, recording in enumerate(recordings):
+            split = split_of(recording, holds_certify, criteria)
+            self.is_dealt_short |= split.is_short
+            self.block_s = min(self.block_s, split.block_s)
             chosen = {}
             for name in self.outputs(recording):
                 s = self.signals.index(name)
@@ -101,15 +108,14 @@ class SubsystemProblem:
                 every = max(int(round(1.0 / (np.median(np.diff(time_s)) * RATE_HZ))), 1)
                 chosen[name] = at = time_s[::every]
                 parts.append(np.where(
-                    recording.tells(name, at),
-                    part_of(at, recording.grid_s[-1], holds_certify), UNUSED))
-                blocks.append(first + (at // TEST_BLOCK_S).astype(int))
+                    recording.tells(name, at), split.part_of(at), UNUSED))
+                blocks.append(first + (at // split.test_block_s).astype(int))
                 signals.append(np.full(at.size, s))
                 times.append(at)
                 runs.append(np.full(at.size, index))
                 measured.append(recording.measured[name][::every])
             self._index.append(chosen)
-            first += int(recording.grid_s[-1] // TEST_BLOCK_S) + 1
+            first += int(recording.grid_s[-1] // split.test_block_s) + 1
         self.part, self.block = np.concatenate(parts), np.concatenate(blocks)
         self.signal, self.measured = np.concatenate(signals), np.concatenate(measured)
         self.time_s, self.run = np.concatenate(times), np.concatenate(runs)

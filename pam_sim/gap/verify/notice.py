@@ -122,7 +122,9 @@ def notices(runs: OwnRuns, estimator: Estimator, found: Fit, seed: int = 0) -> l
                     searched.part, (FIT, SELECT))
                 followed = _most([z, *(flow.follows(index, mine & (searched.run == index))
                                        for index in range(len(searched.recordings)))])
-            tested.append(here.notice(signal, SLOW_S, followed))
+            # Dealt out in short stretches, the certify data hold no long spans.
+            if not (problem is searched and problem.is_dealt_short):
+                tested.append(here.notice(signal, SLOW_S, followed))
             # When a valve opens is known no better than its pulses are long.
             if not _integrates(problem, problem.recordings[0]):
                 tested.append(here.notice(signal, FAST_S))

@@ -27,7 +27,7 @@ from pam_sim.annotations import FloatArray
 from pam_sim.gap.data.noise import noise_of, sensor_floor, STAMP_SD_S
 from pam_sim.gap.data.recording import Recording, START_S
 from pam_sim.gap.data.signals import UNIT
-from pam_sim.gap.data.split import CERTIFY, part_of, SETTLE_S
+from pam_sim.gap.data.split import CERTIFY, SETTLE_S, split_of
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit
 from pam_sim.gap.result import SignalGap, Trace
@@ -86,10 +86,10 @@ class Validation:
     def __init__(self, recording: Recording, whole: bool, estimator: Estimator, base: Fit,
                  final: Fit, seed: int = 0) -> None:
         self.recording, self.estimator = recording, estimator
+        split = split_of(recording, criteria=estimator.criteria)
         self.part = {s: recording.tells(s, recording.time_s[s]) & (
             recording.time_s[s] > SETTLE_S if whole else
-            part_of(recording.time_s[s], recording.grid_s[-1]) == CERTIFY)
-            for s in recording.signals}
+            split.part_of(recording.time_s[s]) == CERTIFY) for s in recording.signals}
         self.before = free_run(estimator.rig, recording)
         self.refit, self.after = self.run(base, whole), self.run(final, whole)
         self.simulations = 3
