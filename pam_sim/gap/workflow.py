@@ -127,9 +127,9 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
                 else recordings[0])
     settle_s = SETTLE_S if certify else split_of(held_out, criteria=criteria).settle_s
     settled = {s: held_out.time_s[s] > settle_s for s in held_out.signals}
-    first = estimator.problems[0]
-    if first.is_dealt_short:
-        remarks.append((SAME_EDGES if certify is None else SHORT_STRETCHES).format(first.block_s))
+    valve = estimator.problems[0]
+    if valve.is_dealt_short:
+        remarks.append((SAME_EDGES if certify is None else SHORT_STRETCHES).format(valve.block_s))
 
     def matters(found: Fit, without: Fit) -> bool:
         bare = held_without(found, without.hypothesis.names)

@@ -96,11 +96,14 @@ def test_a_number_that_hides_the_gap_from_far_off_is_what_is_wrong(too_large):
 
 @pytest.mark.parametrize('promise, flat, first', [(0.1, 0.02, 0.08), (0.001, 0.2, 0.16)])
 def test_what_drifts_slowly_opens_a_cut_at_full_weight(promise, flat, first):
-    problem = types.SimpleNamespace(subsystem='muscle', level=1.0, chi2=lambda errors, part: 0.8)
+    problem = types.SimpleNamespace(subsystem='muscle', level=1.0, is_dealt_short=False,
+                                    criteria=CRITERIA, chi2=lambda errors, part: 0.8)
     base = types.SimpleNamespace(errors={'muscle': None})
     screened = [Screened(
         None, (), {'muscle': promise}, flat=Screened(None, (), {'muscle': flat}))]
     assert first_gap_of(problem, base, screened, 0.05) == pytest.approx(first)
+    problem.is_dealt_short = True          # what is below the floor may be that of the pressure
+    assert first_gap_of(problem, base, screened, 0.05) == 0.0
 
 
 def test_names_can_be_limited():

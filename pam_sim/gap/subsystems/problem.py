@@ -83,6 +83,7 @@ class SubsystemProblem:
 
     subsystem = ''
     criteria: Criteria = CRITERIA
+    is_dealt_short, block_s = False, math.inf
 
     def __init__(self, rig: Rig, recordings: Sequence[Recording], holds_certify: bool = True,
                  seed: int = 0, criteria: Criteria = CRITERIA) -> None:
@@ -96,7 +97,7 @@ class SubsystemProblem:
         self.known = self._rig_numbers(rig) + self._nuisances(recordings)
         self._start = [{s: r.start(s) for s in r.measured} for r in recordings]
         self._index, parts, blocks, signals, measured, times, runs = ([] for _ in range(7))
-        first, self.is_dealt_short, self.block_s = 0, False, math.inf
+        first = 0
         for index, recording in enumerate(recordings):
             split = split_of(recording, holds_certify, criteria)
             self.is_dealt_short |= split.is_short
