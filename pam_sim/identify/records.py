@@ -76,7 +76,7 @@ class LoadedMechanics(MechanicsProblem):
         recording = self.recordings[index]
         if recording.driven and 'contraction' not in recording.stamp_ns:
             # Nobody recorded the length: it is a number of the rig, perhaps an unknown one.
-            recording.measured['contraction'].fill(rig.parameters.get('contraction_m', 0.0))
+            recording.hold(rig.parameters.get('contraction_m', 0.0))
         added = self._added_kg[index]
         if added:
             rig = rig.with_(parameters={'mass_kg': rig.parameters['mass_kg'] + added})

@@ -206,7 +206,8 @@ def test_another_run_of_the_same_clock_is_a_proof(run):
 def test_an_answer_ends_with_0_and_what_is_wrong_with_the_data_with_1(
         monkeypatch, tmp_path, capsys, verdict, implausible, code):
     run = SimpleNamespace(implausible=implausible, unusable=())
-    monkeypatch.setattr('pam_actuation.bags.load.load_run', lambda path, namespace=None: run)
+    monkeypatch.setattr('pam_actuation.report.joint_gap.load_run',
+                        lambda path, namespace=None: run)
     monkeypatch.setattr('pam_actuation.report.origin.origin', lambda *given: '')
     monkeypatch.setattr('pam_actuation.report.gap.write_gap',
                         lambda *given, **more: GapResult(verdict, 'Because.'))

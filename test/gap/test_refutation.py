@@ -172,6 +172,7 @@ def test_an_effect_is_missed_in_whichever_cut_gets_worse_without_it(harm):
         block = np.repeat(np.arange(40), 50)
         part, signal = np.full(2000, SELECT), np.zeros(2000, dtype=int)
         signals, level, known, criteria = ('contraction',), 1.0, [], CRITERIA
+        is_dealt_short = False
 
         def __init__(self, subsystem):
             self.subsystem = subsystem

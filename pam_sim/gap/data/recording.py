@@ -156,6 +156,12 @@ class Recording:
         return given_motion(
             self.time_s['contraction'], self.measured['contraction'], self.grid_s)
 
+    def hold(self, contraction_m: float) -> None:
+        """Set the contraction [m] at which the muscle is held, where nobody recorded it."""
+        self.measured['contraction'].fill(contraction_m)
+        self._given = (np.full(self.grid_s.size, contraction_m),
+                       np.zeros(self.grid_s.size, dtype=bool))
+
     @property
     def given_contraction_m(self) -> FloatArray:
         """Return the contraction that a driven load prescribes [m], on the grid, without noise."""
