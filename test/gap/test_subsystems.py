@@ -16,8 +16,11 @@
 
 from gap_runs import nominal, recorded, voltages
 import numpy as np
+from pam_sim.effects.unnamed import terms
+from pam_sim.effects.unnamed.reading import with_terms
 from pam_sim.gap.data.noise import noise_of
 from pam_sim.gap.data.recording import Recording
+from pam_sim.gap.data.signals import FIELD
 from pam_sim.gap.data.split import FIT, SELECT
 from pam_sim.gap.subsystems.effects import acts_on
 from pam_sim.gap.subsystems.problems import subsystem_problems
@@ -120,3 +123,21 @@ def test_noise_with_a_memory_is_measured_where_the_signal_rests():
     assert np.std(found.draw(time_s, random)) == pytest.approx(found.sd, rel=0.1)
     white = noise_of(time_s, motion + random.standard_normal(time_s.size))
     assert white.slow_sd == 0.0 and white.sd == pytest.approx(1.0, rel=0.05)
+
+
+@pytest.mark.parametrize('signal, size', [('contraction', 1e-4), ('force', 1.0)])
+@pytest.mark.parametrize('kind, of, shape', [
+    (terms.STOP, 1, 2e-4), (terms.SINE, 1, 3e-3), (terms.PASSING, 0, 0.02), (terms.LINEAR, 3, 1.0),
+    (terms.SIGNED_SQUARE, 2, 1.0)])
+def test_terms_of_a_reading_are_those_of_a_simulation(signal, size, kind, of, shape):
+    effect = {'name': f'{signal}_reading_term', 'parameters': {
+        'first_of_1': size, 'kind_1_of_1': kind, 'input_1_of_1': of, 'shape_1_of_1': shape}}
+    rig = nominal().with_(parameters={'contraction_zero_m': 1e-4, 'force_zero_n': 0.3})
+    volts = 3.0 + np.sin(np.arange(2000) * 5e-3)
+    whole, bare = (one.simulate(volts, initial_pressure_pa=401325.0)
+                   for one in (rig.with_(effects=[effect]), rig))
+    read, = (with_terms(bare.outputs, signal, one.parameters, rig.parameters)
+             for one in rig.with_(effects=[effect]).effects)
+    wanted, without = (getattr(one, FIELD[signal]) for one in (whole, bare))
+    np.testing.assert_allclose(read, wanted, rtol=0, atol=1e-12 * np.abs(wanted).max())
+    assert np.abs(wanted - without).max() > 1e-3 * size

@@ -82,7 +82,7 @@ class MechanicsProblem(SubsystemProblem):
 
     def shift_inputs(self, noise_sd: float) -> None:
         """Shift the measured pressure by so many deviations of its noise, until ``disturb``."""
-        self._kept.clear()
+        self._forget()
         self._command.cache_clear()
         self._noise_pa = [noise_sd * noise.sd for noise in self._noise]
 

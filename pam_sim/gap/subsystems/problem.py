@@ -22,6 +22,7 @@ import threading
 
 import numpy as np
 from pam_sim.annotations import FloatArray, IntArray
+from pam_sim.effects.unnamed.reading import of_reading, with_terms
 from pam_sim.gap.criteria import CRITERIA, Criteria
 from pam_sim.gap.data.noise import sensor_floor, STAMP_SD_S
 from pam_sim.gap.data.recording import GRID_S, Recording
@@ -38,6 +39,7 @@ INPUT_DRAWS = 3
 COARSE_GAIN = 4.0            # error of linear interpolation over twice the period
 KEPT = 16                    # inputs and instants that many simulations in a row share
 KEPT_ERRORS = 100            # of the last simulations; fits and slopes ask for some again
+KEPT_RUNS = 4                # simulations to which terms of a reading are added
 
 
 class SubsystemProblem:
@@ -94,6 +96,7 @@ class SubsystemProblem:
         self.level, self._stamp_sd_s = 1.0, STAMP_SD_S
         self.simulations, self._lock = 0, threading.Lock()
         self._kept: OrderedDict[Hashable, tuple[FloatArray, object]] = OrderedDict()
+        self._runs: OrderedDict[Hashable, tuple[Response, object]] = OrderedDict()
         self.known = self._rig_numbers(rig) + self._nuisances(recordings)
         self._start = [{s: r.start(s) for s in r.measured} for r in recordings]
         self._index, parts, blocks, signals, measured, times, runs = ([] for _ in range(7))
@@ -140,7 +143,7 @@ class SubsystemProblem:
                 ) -> None:
         """Disturb the measured inputs as noise and stamps do, or no more where it is None."""
         self._stamp_sd_s = stamp_sd_s
-        self._kept.clear()
+        self._forget()
         self._disturb(random)
 
     def _disturb(self, random: np.random.Generator | None) -> None:
@@ -149,7 +152,7 @@ class SubsystemProblem:
 
     def shift_inputs(self, noise_sd: float) -> None:
         """Shift measured inputs by so many deviations of their noise, until ``disturb``."""
-        self._kept.clear()
+        self._forget()
         self._disturb(None)
 
     def _simulate(self, rig: Rig, index: int, numbers: Mapping[str, float]) -> Response:
@@ -169,9 +172,7 @@ class SubsystemProblem:
             Normalised values of ``known``.
 
         """
-        key = (id(rig.muscle), rig.load, rig.valve, rig.fidelity, *rig.parameters.values(), *(
-            (e.name, *e.parameters.values()) for e in rig.effects if shows(e.name, self)),
-            known_z.tobytes())
+        key = self._key(rig), known_z.tobytes()
         with self._lock:
             if key in self._kept:
                 self._kept.move_to_end(key)
@@ -184,21 +185,57 @@ class SubsystemProblem:
                 self._kept.popitem(last=False)
         return found
 
+    def _key(self, rig: Rig) -> Hashable:
+        """Return what tells a rig from others that differ here; its muscle is held meanwhile."""
+        return (id(rig.muscle), rig.load, rig.valve, rig.fidelity, *rig.parameters.values(), *(
+            (e.name, *e.parameters.values()) for e in rig.effects if shows(e.name, self)))
+
     def values(self, rig: Rig, known_z: FloatArray) -> FloatArray:
         """Return the simulated values of all compared samples, shape (N,)."""
         numbers = {k.name: k.value + k.sd * float(z) for k, z in zip(self.known, known_z)}
         rig = rig.with_(parameters={k.name: numbers[k.name] for k in self.known if k.of_rig})
+        added = {of_reading(e.name): e for e in rig.effects if of_reading(e.name)}
+        if len(added) == 1:                  # nothing else feels it
+            rig = rig.with_(effects=[e for e in rig.effects if not of_reading(e.name)])
+        else:
+            added = {}
         found = []
         for index, instants in enumerate(self._index):
-            response = self._simulate(rig, index, numbers)
-            with self._lock:                 # several threads count at once
-                self.simulations += 1
+            response = (self._run_kept if added else self._run)(rig, index, numbers)
             for name in instants:
                 late = numbers.get(of_run('force_skew', index), 0.0) if name == 'force' else 0.0
                 row, ahead = self._place(index, name, late, len(response))
+                outputs, column = response.outputs, COLUMNS[FIELD[name]]
+                if name in added:
+                    outputs, column = with_terms(
+                        outputs, name, added[name].parameters, rig.parameters)[:, np.newaxis], 0
                 found.append(np.empty(row.size))
-                sample_into(response.outputs, COLUMNS[FIELD[name]], row, ahead, found[-1])
+                sample_into(outputs, column, row, ahead, found[-1])
         return np.concatenate(found)
+
+    def _run(self, rig: Rig, index: int, numbers: Mapping[str, float]) -> Response:
+        with self._lock:                     # several threads count at once
+            self.simulations += 1
+        return self._simulate(rig, index, numbers)
+
+    def _run_kept(self, rig: Rig, index: int, numbers: Mapping[str, float]) -> Response:
+        """Return the same; of the last ones none is made again."""
+        key = self._key(rig), index, tuple(numbers.values())
+        with self._lock:
+            if key in self._runs:
+                self._runs.move_to_end(key)
+                return self._runs[key][0]
+        response = self._run(rig, index, numbers)
+        with self._lock:
+            self._runs[key] = response, rig.muscle
+            while len(self._runs) > KEPT_RUNS:
+                self._runs.popitem(last=False)
+        return response
+
+    def _forget(self) -> None:
+        """Keep nothing of the inputs before they change."""
+        self._kept.clear()
+        self._runs.clear()
 
     def _place_of(self, index: int, name: str, late_s: float, count: int
                   ) -> tuple[IntArray, FloatArray]:
