@@ -105,8 +105,8 @@ class Estimator:
 
     @property
     def simulations(self) -> int:
-        """Return how many simulations were made so far."""
-        return sum(problem.simulations for problem in self.problems)
+        """Return how many simulations were asked for so far."""
+        return sum(problem.asked for problem in self.problems)
 
     def with_effects(self, effects: Sequence[Setting]) -> Rig:
         """Return the given model with entries of a model file added."""

@@ -68,8 +68,9 @@ class SubsystemProblem:
     level : float
         Mean squared error in floors squared that noise alone leaves: 1, or less where the
         floor turned out too careful.
-    simulations : int
-        Made so far.
+    simulations, asked : int
+        Made so far, and asked for. Threads that ask for the same at once make it twice, so only
+        the second is the same in every run.
     is_dealt_short : bool
         Whether a recording has few moves, so that stretches of its edges are dealt out.
     block_s : float
@@ -94,7 +95,7 @@ class SubsystemProblem:
         self.signals = tuple(s for s in SIGNALS
                              if any(s in self.outputs(r) for r in recordings))
         self.level, self._stamp_sd_s = 1.0, STAMP_SD_S
-        self.simulations, self._lock = 0, threading.Lock()
+        self.simulations, self.asked, self._lock = 0, 0, threading.Lock()
         self._kept: OrderedDict[Hashable, tuple[FloatArray, object]] = OrderedDict()
         self._runs: OrderedDict[Hashable, tuple[Response, object]] = OrderedDict()
         self.known = self._rig_numbers(rig) + self._nuisances(recordings)
@@ -174,10 +175,11 @@ class SubsystemProblem:
         """
         key = self._key(rig), known_z.tobytes()
         with self._lock:
+            self.asked += len(self._index)
             if key in self._kept:
                 self._kept.move_to_end(key)
                 return self._kept[key][0]
-        found = (self.values(rig, known_z) - self.measured) / self._scale
+        found = (self._values(rig, known_z) - self.measured) / self._scale
         found.flags.writeable = False
         with self._lock:
             self._kept[key] = found, rig.muscle         # held, so that its id stays its own
@@ -192,6 +194,11 @@ class SubsystemProblem:
 
     def values(self, rig: Rig, known_z: FloatArray) -> FloatArray:
         """Return the simulated values of all compared samples, shape (N,)."""
+        with self._lock:
+            self.asked += len(self._index)
+        return self._values(rig, known_z)
+
+    def _values(self, rig: Rig, known_z: FloatArray) -> FloatArray:
         numbers = {k.name: k.value + k.sd * float(z) for k, z in zip(self.known, known_z)}
         rig = rig.with_(parameters={k.name: numbers[k.name] for k in self.known if k.of_rig})
         added = {of_reading(e.name): e for e in rig.effects if of_reading(e.name)}

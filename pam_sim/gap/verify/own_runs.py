@@ -74,8 +74,8 @@ class OwnRuns:
 
     @property
     def simulations(self) -> int:
-        """Return how many simulations were made for this."""
-        return sum(p.simulations for p in self._problems) if self._whole else 0
+        """Return how many simulations were asked for here."""
+        return sum(p.asked for p in self._problems) if self._whole else 0
 
     def spread(self) -> dict[tuple[str, str], float]:
         """Return the rms by which the final model may be off by its numbers alone."""
