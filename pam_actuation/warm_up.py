@@ -37,6 +37,7 @@ from pam_actuation.tuning.closed_loop import ClosedLoop
 from pam_actuation.tuning.force_loop import ForceLoop
 from pam_actuation.tuning.joint_loop import JointLoop
 from pam_sim import load_rig
+from pam_sim.effects.unnamed.reading import with_terms
 from pam_sim.joint import load_joint
 
 RIG = 'dmsp_5_300_realistic'
@@ -76,7 +77,10 @@ def rollouts() -> None:
     term = {'name': 'load_term', 'parameters': {'first_of_1': 1.0}}
     rig.with_(effects=[term]).simulate(np.zeros(ROWS))
     load_joint(JOINT).simulate(np.zeros(ROWS), np.zeros(ROWS), np.zeros(ROWS))
-    rig.simulate(np.zeros(ROWS))
+    found = rig.simulate(np.zeros(ROWS))
+    reading, = rig.with_(effects=[
+        {'name': 'force_reading_term', 'parameters': {'first_of_1': 1.0}}]).effects
+    with_terms(found.outputs, 'force', reading.parameters, rig.parameters)
 
 
 def limb() -> None:
