@@ -18,8 +18,9 @@ How often `pam gap` names a hidden effect in recordings as people have them.
     python benchmarks/recordings_people_have.py --seed 7 --number 4 --kinds slow,joint
     python benchmarks/recordings_people_have.py --work exam --minutes 40      # again to go on
 
-The kinds are a closed loop (SOFC or PID track a contraction), a slow log (50 Hz), on/off valves
-that switch, a joint with two muscles, and three runs of one day in one question. Each case hides
+There are five kinds: a closed loop, in which SOFC or PID track a contraction, a slow log of 50 Hz,
+and on/off valves that switch. The others are a joint with two muscles, and three runs of one day
+in one question. Each case hides
 one effect of everyday size in a rig of the independent simulator under test/hidden, or nothing.
 The cases are recorded first, and the key is opened after the answers. With --work DIR each
 recording and each answer is kept; an interrupted run goes on where it stopped.

@@ -20,9 +20,9 @@ each valve has two numbers, ``flow = rate (gain opening + more)``. Recursive lea
 four from what the readings differ from the model when the pulses have arrived. They have the form
 of a Kalman filter whose numbers drift. A valve that is not pulsed keeps its numbers.
 
-A wrong dead time looks like wrong pulses where the flow changes much. An error counts the less
-the more of it a wrong dead time could explain, and not at all where a valve is fully open or the
-error is far from what was expected.
+A wrong dead time looks like wrong pulses where the flow changes much. The more of an error a wrong
+dead time could explain, the less it counts. It does not count where a valve is fully open, nor
+where it is far from what was expected.
 
 A pulse so short that the valve does not open fully is no straight line. Such pulses are left out
 by ``pulse_margin_s``.

@@ -15,10 +15,10 @@
 """
 How large a hidden effect is: what it moves, in standard deviations of the sensors, after refit.
 
-The numbers of the rig without the effect are fitted to the noise-free fit run (regularised
-least squares: prior deviations as a data sheet has them, a shared latency as nuisance); the gap
-is what is left of the certify run, as rms over the run in standard deviations of the sensor, of
-the signal where it is largest. Two refits are made. With full weights the numbers go where the
+The numbers of the rig without the effect are fitted to the noise-free fit run, by regularised
+least squares. The prior deviations are those of a data sheet, and a shared latency is a nuisance.
+The gap is the error left on the certify run: its rms in standard deviations of the sensor, of the
+signal where that is largest. Two refits are made. With full weights the numbers go where the
 data draw them. Tempered, by misfit and memory of the residual, they stay nearer to the data
 sheet, and what they could have taken up counts as gap. Like any model of the rig, that without
 the effect starts at the pressure that is read at first.
