@@ -30,6 +30,8 @@ must say so and name an experiment; the experiment is run on the hidden rig and 
 
 With --gap N the first N cases are given to `pam gap`, with the same numbers unknown. It must name
 neither an effect that is not hidden nor an error of a sensor.
+
+With --beside the tables are those of a second seed, and stand beside the ones of the first.
 """
 
 import argparse
@@ -228,6 +230,8 @@ def command_line():
     parser.add_argument('--seed', type=int, default=2026)
     parser.add_argument('--minutes', type=float, default=float('inf'), metavar='N',
                         help='begin no case after N minutes; the tables say how many there were')
+    parser.add_argument('--beside', action='store_true',
+                        help='the tables of a second seed, written beside those of the first')
     results_page.add_write(parser, 'unknown_numbers')
     return parser
 
@@ -236,15 +240,13 @@ def main():
     """Answer all cases and print the tables."""
     args = command_line().parse_args()
     until = time.time() + 60.0 * args.minutes
-    if args.number:
-        with results_page.printed(args, __file__):
-            show_covered(args, until)
-    if args.undetermined:
-        with results_page.printed(args, __file__, 'undetermined'):
-            show_open(args, until)
-    if args.gap:
-        with results_page.printed(args, __file__, 'gap'):
-            show_named(args, until)
+    for count, part, show in ((args.number, '', show_covered),
+                              (args.undetermined, 'undetermined', show_open),
+                              (args.gap, 'gap', show_named)):
+        if count:
+            part = f'{part} beside'.strip() if args.beside else part
+            with results_page.printed(args, __file__, part):
+                show(args, until)
 
 
 def show_covered(args, until):
