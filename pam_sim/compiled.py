@@ -33,6 +33,7 @@ import types
 from typing import Any, ParamSpec, Protocol, TypeGuard, TypeVar
 
 from numba import njit
+from numba.core.registry import CPUDispatcher
 import numpy as np
 from pam_sim import compile_notice
 
@@ -62,11 +63,47 @@ class Compiler(Protocol):
         """Compile a function."""
 
 
-compiled: Compiler = njit(error_model='numpy', nogil=True, _nrt=False)
-inlined: Compiler = njit(error_model='numpy', nogil=True, _nrt=False, forceinline=True)
+class _Within(CPUDispatcher):     # type: ignore[misc]  # numba has no annotations
+    """
+    A function for other compiled functions, without the code through which Python calls one.
+
+    That code is a third of all that is compiled. The first call from Python makes it.
+    """
+
+    def __call__(self, *args: object, **kwargs: object) -> object:
+        given = inspect.signature(self.py_func).bind(*args, **kwargs)
+        given.apply_defaults()
+        return self._called_from_python(*given.args)
+
+    @functools.cached_property
+    def _called_from_python(self) -> Callable[..., object]:
+        within = self
+        return _python_calls(lambda *args: within(*args))
+
+
+class _Inner:
+    """A compiler of functions for other compiled functions; Python may call them as well."""
+
+    def __init__(self, **options: bool) -> None:
+        self._compile = njit(error_model='numpy', nogil=True, _nrt=False,
+                             no_cpython_wrapper=True, no_cfunc_wrapper=True, **options)
+
+    def __call__(self, function: Callable[P, R], /) -> Compiled[P, R]:
+        """Compile a function."""
+        made = self._compile(function)
+        if isinstance(made, CPUDispatcher):     # the function itself with the compiler off
+            made.__class__ = _Within
+        return made
+
+
+_python_calls = njit(error_model='numpy', nogil=True, _nrt=False, no_cfunc_wrapper=True)
+compiled: Compiler = _Inner()
+inlined: Compiler = _Inner(forceinline=True)
 # Entry points, their machine code stored on disk; the second one may make arrays.
-entry_point: Compiler = njit(cache=True, error_model='numpy', nogil=True, _nrt=False)
-allocating_entry_point: Compiler = njit(cache=True, error_model='numpy', nogil=True)
+entry_point: Compiler = njit(
+    cache=True, error_model='numpy', nogil=True, _nrt=False, no_cfunc_wrapper=True)
+allocating_entry_point: Compiler = njit(
+    cache=True, error_model='numpy', nogil=True, no_cfunc_wrapper=True)
 
 
 def interpreted(function: Callable[P, R]) -> Callable[P, R]:

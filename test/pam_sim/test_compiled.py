@@ -24,7 +24,7 @@ import sys
 from numba.core.caching import NullCache
 import pam_actuation
 import pam_sim
-from pam_sim.compiled import source_key, sources
+from pam_sim.compiled import compiled, source_key, sources
 import pytest
 
 FLOW = """
@@ -126,3 +126,17 @@ def test_the_steps_of_rig_and_joint_follow_effects_laws_and_records():
         assert {'creep.py', 'lag.py', 'sarosi.py', 'step.py', 'records.py'} <= names
         assert any(name.startswith('pam_hooks_') for name in names)
         assert {'STATE', 'PARAMETERS', 'PACKED'} <= {one.split(' = ')[0] for one in constants}
+
+
+def test_an_inner_function_is_called_from_python_as_well():
+    @compiled
+    def _half(number, of=1.0):
+        return 0.5 * number * of
+
+    @compiled
+    def _quarter(number):
+        return 0.5 * _half(number)
+
+    assert (_quarter(8.0), _half(8.0), _half(of=2.0, number=8.0)) == (2.0, 4.0, 8.0)
+    with pytest.raises(TypeError, match="missing a required argument: 'number'"):
+        _half()
