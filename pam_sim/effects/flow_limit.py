@@ -27,7 +27,7 @@ from typing import Any
 
 import numpy as np
 
-from pam_sim.compiled import compiled
+from pam_sim.compiled import compiled, interpreted
 from pam_sim.effects.air_volume import air_volume_m3, pack_volume, VOLUME
 from pam_sim.effects.effect import Effect, Numbers, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
@@ -49,10 +49,10 @@ def _pack(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     p = P_ATM_PA + _GAUGE_PA
     fill = vent = _NO_LIMIT
     if values['fill_rate_at_400kpa_pa_per_s'] > 0.0:
-        flow = mass_flow_kg_per_s(_NOMINAL_SUPPLY_PA, p, 1.0, CRITICAL_RATIO)
+        flow = interpreted(mass_flow_kg_per_s)(_NOMINAL_SUPPLY_PA, p, 1.0, CRITICAL_RATIO)
         fill = values['fill_rate_at_400kpa_pa_per_s'] * volume / flow
     if values['vent_rate_at_400kpa_pa_per_s'] > 0.0:
-        flow = mass_flow_kg_per_s(p, P_ATM_PA, 1.0, CRITICAL_RATIO)
+        flow = interpreted(mass_flow_kg_per_s)(p, P_ATM_PA, 1.0, CRITICAL_RATIO)
         vent = values['vent_rate_at_400kpa_pa_per_s'] * volume / flow
     return {'fill_m3_per_s': fill, 'vent_m3_per_s': vent,
             'supply_pa': numbers.parameters['supply_pa'], 'atmosphere_pa': P_ATM_PA,
