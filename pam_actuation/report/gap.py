@@ -45,6 +45,7 @@ from pam_sim import load_rig, preset_names
 from pam_sim.errors import InputError
 from pam_sim.files import check_folder, StrPath, whole_files, write_json, write_text
 from pam_sim.gap import find_gap
+from pam_sim.gap.data.commanded import commanded
 from pam_sim.gap.data.health import check_health, dead_signals, recorded_valve
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.propose.proposal import EFFECT_FILE, MODEL_FILE
@@ -116,14 +117,17 @@ def gap_of(runs: 'Sequence[Run]', model: 'StrPath | Rig', certify: 'Run | None' 
     if not runs:
         raise InputError('a gap look needs at least one recording')
     rig = model_for(runs[0], model)
+    # Now, for a gain that is unknown is another one after its identification.
+    every, remarks = commanded([*runs, *([certify] if certify else [])], rig)
+    runs, certify = every[:len(runs)], every[-1] if certify else None
     began, told = time.perf_counter(), options.pop('progress', lambda done: None)
     share = NUMBERS_SHARE if rig.unknown else 0.0
-    rig, found, remarks = numbers_first(runs, rig, certify is None, options.get('seed', 0),
+    rig, found, sayings = numbers_first(runs, rig, certify is None, options.get('seed', 0),
                                         lambda done: told(share * done))
     spent = time.perf_counter() - began
     result = find_gap(runs, rig, certify,
                       progress=lambda done: told(share + (1.0 - share) * done), **options)
-    result.remarks += remarks
+    result.remarks += remarks + sayings
     if found is not None:
         result.numbers_first, result.first_lines = numbers_block(found), numbers_text(found)
         result.runtime_s += spent
@@ -237,6 +241,7 @@ def free_run_overlay(run: 'Run', rig: Rig) -> list[Overlay]:
 
     For the section "Simulated against recorded" of a report.
     """
+    (run,), _ = commanded([run], rig)
     if not check_health(run, rig.valve).usable:
         return []
     recording = Recording(run, rig.valve, driven=rig.load != 'hanging_mass')

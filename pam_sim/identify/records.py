@@ -118,7 +118,8 @@ def offer_of(run: Run, rig: Rig, added_kg: float = 0.0) -> Offer:
     if not (valve or mechanics):
         needs = 'a `force`' if held else 'a `contraction`'
         raise InputError(f'has a pressure alone: {needs} tells of muscle and load, a '
-                         f'`valve_signal` of the valve', where)
+                         f'`valve_signal` of the valve (a `pressure_command` too, behind a '
+                         'regulator)', where)
     recording = Recording(run, rig.valve, held, 0.0 if isometric_m is None else isometric_m)
     if recording.grid_s[-1] < LEAST_DURATION_S:
         raise InputError(f'has {recording.grid_s[-1]:.2f} s in which all its signals are there; '

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
+from pam_sim.gap.data.commanded import commanded
 from pam_sim.gap.data.signals import UNIT
 from pam_sim.gap.subsystems.effects import subsystem_of_number
 from pam_sim.gap.verify.uncertainty import NORMAL_95
@@ -89,6 +90,7 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
     if not wanted:
         raise InputError('no number is unknown: state `unknown` in `tolerance`, or name numbers',
                          rig.name)
+    runs, remarks = commanded(runs, rig)
     offers = [offer_of(run, rig, mass) for run, mass in zip(
         runs, added_kg or [0.0] * len(runs))]
     problems = problems_of(rig, offers, spare_certify)
@@ -124,7 +126,7 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
         _identified(rig, found), found, combinations,
         [{'path': one.path, 'kind': one.kind, 'added_kg': one.added_kg} for one in offers],
         _signals(before, _rms(weighted, x)), incomplete)
-    result.remarks += _starting_values(weighted, x, acting)
+    result.remarks += remarks + _starting_values(weighted, x, acting)
     result.remarks += [
         f'{name}: {effect.name} would look the same and counts in; a recorded force tells them '
         'apart' for effect, name in counted_in(problems, acting)]
@@ -177,7 +179,7 @@ def _what_shows(number: Number) -> str:
     if number.name == 'force_zero_n':
         return 'record a force'
     valve = subsystem_of_number(number.name) == 'valve'
-    return 'record a `valve_signal`' if valve else 'record a contraction'
+    return 'record a `valve_signal` or `pressure_command`' if valve else 'record a contraction'
 
 
 def _identified(rig: Rig, found: Sequence[Found]) -> Rig:

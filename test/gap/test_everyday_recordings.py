@@ -19,13 +19,15 @@ import numpy as np
 from pam_actuation.report.joint_gap import contraction_of, questions
 from pam_sim.effects.valve_dead_zone_gradual import mean_opening_with_lift
 from pam_sim.gap import find_gap
+from pam_sim.gap.data.commanded import commanded
 from pam_sim.gap.data.given_motion import given_motion
 from pam_sim.gap.data.health import check_health
 from pam_sim.gap.data.pulses import openings, Pulses
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.subsystems.pulses_seen import shows_pulses
 from pam_sim.model_file import load_rig
-from pam_sim.run import Series
+from pam_sim.run import Run, Series
+from pam_sim.units import P_ATM_PA
 import pytest
 
 DUTIES = (0.0, 0.05, 0.2, 0.5, 0.95, 1.0)
@@ -68,6 +70,25 @@ def test_a_slow_log_names_an_effect():
     result = find_gap(recorded(rig, voltages(12.0), rate_hz=50), nominal(),
                       effects=['bladder_stiffness', 'parallel_spring', 'coulomb_friction'])
     assert [effect['name'] for effect in result.effects] == ['bladder_stiffness'], result.reason
+
+
+def test_of_a_regulator_the_commanded_pressure_is_the_input():
+    rig = nominal().with_(parameters={'K_m': 80e3, 'ppr_lowest_v': 1.0, 'ppr_zero_pa': 5e3})
+    run = recorded(rig, voltages(8.0))
+    signal = run.topics['valve_signal']
+    wanted = P_ATM_PA + 5e3 + 80e3 * (signal.values['ppr_voltage'] - 1.0)
+    without = Run({name: series for name, series in run.topics.items() if name != 'valve_signal'}
+                  | {'pressure_command': Series(signal.stamp_ns, {'pressure_pa': wanted})})
+    (same,), remarks = commanded([without], rig)
+    assert same.topics['valve_signal'].values['ppr_voltage'] == pytest.approx(
+        signal.values['ppr_voltage'])
+    assert 'at 80 kPa/V' in remarks[0] and 'valve_signal' not in without
+    assert commanded([same], rig)[1] == commanded([run], rig)[1] == []
+    result = find_gap(without, rig, effects=[])
+    assert result.verdict == 'no_gap' and result.remarks[0] == remarks[0]
+    # Nothing tells when on/off valves open.
+    refused = find_gap(without, load_rig(NOMINAL, valve='hsv'))
+    assert refused.verdict == 'refused' and 'behind a regulator' in refused.reason
 
 
 def test_of_on_off_valves_every_pulse_is_needed():

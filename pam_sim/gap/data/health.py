@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from pam_sim.gap.criteria import CRITERIA, Criteria
+from pam_sim.gap.data.commanded import COMMAND
 from pam_sim.gap.data.signals import FIELD, READABLE, SIGNALS, VALVE_FIELDS
 from pam_sim.run import Run
 
@@ -71,9 +72,7 @@ def check_health(run: Run, valve: str, criteria: Criteria = CRITERIA,
     health = Health()
     health.valve = recorded_valve(run)
     if not health.valve:
-        health.problems.append(
-            'the recording has no valve_signal with ppr_voltage or fill_duty and vent_duty, '
-            'so the model has no input')
+        health.problems.append(_no_input(run, valve))
         return health
     if health.valve != valve:
         health.problems.append(
@@ -103,6 +102,19 @@ def check_health(run: Run, valve: str, criteria: Criteria = CRITERIA,
         _check_motion(run, health, criteria)
         _check_saturation(run, health, criteria)
     return health
+
+
+def _no_input(run: Run, valve: str) -> str:
+    """Return the sentence on a recording that does not tell what the valve was given."""
+    if valve == 'ppr':
+        return ('the recording has neither a valve_signal with ppr_voltage nor a '
+                'pressure_command, so the model has no input')
+    if COMMAND in run:
+        return ('the recording has a pressure_command and no valve_signal; it can be followed '
+                'behind a regulator (a model with valve ppr), while on/off valves need fill_duty '
+                'and vent_duty')
+    return ('the recording has no valve_signal with fill_duty and vent_duty, so the model has no '
+            'input')
 
 
 def dead_signals(run: Run) -> tuple[str, ...]:

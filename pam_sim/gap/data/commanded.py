@@ -1,0 +1,67 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The pressure command of a regulator as its valve signal, where nobody recorded that signal."""
+
+from collections.abc import Sequence
+import copy
+
+import numpy as np
+from pam_sim.gap.data.signals import FIELD, VALVE_FIELDS
+from pam_sim.rig import Rig
+from pam_sim.run import Run, Series
+from pam_sim.units import P_ATM_PA
+from pam_sim.valve.ppr import voltage_v
+
+COMMAND = 'pressure_command'
+TAKEN = ('The recording has no valve signal, so the pressure command is taken for the input of a '
+         'pressure regulator, at {:.4g} kPa/V.')
+
+
+def commanded(runs: Sequence[Run], rig: Rig) -> tuple[list[Run], list[str]]:
+    """
+    Return (runs, remarks): each run without a valve signal gets that of its pressure command.
+
+    The voltage is the one that gives the commanded pressure by the numbers of the model. What
+    the true gain differs by thus shows as an error of ``K_m``. The runs given stay as they are.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        Recordings.
+    rig : pam_sim.Rig
+        The model. Behind on/off valves a pressure command is not used.
+
+    """
+    found = [_with_signal(run, rig) if is_commanded(run, rig.valve) else run for run in runs]
+    taken = any(one is not run for one, run in zip(found, runs))
+    return found, [TAKEN.format(1e-3 * rig.parameters['K_m'])] if taken else []
+
+
+def is_commanded(run: Run, valve: str) -> bool:
+    """Return whether a pressure command is all that tells what a regulator was given."""
+    return (valve == 'ppr' and 'valve_signal' not in run and COMMAND in run
+            and FIELD['pressure'] in run.topics[COMMAND].values
+            and run.metadata.get('valve') != 'hsv')
+
+
+def _with_signal(run: Run, rig: Rig) -> Run:
+    command = run.topics[COMMAND]
+    name, = VALVE_FIELDS['ppr']
+    volts = np.array([voltage_v(value - P_ATM_PA, rig.parameters)
+                      for value in command.values[FIELD['pressure']].tolist()])
+    found = copy.copy(run)
+    found.topics = run.topics | {'valve_signal': Series(
+        command.stamp_ns, {name: volts}, {name: 'V'}, command.start_ns)}
+    return found
