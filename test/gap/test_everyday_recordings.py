@@ -119,3 +119,14 @@ def test_a_muscle_of_a_joint_has_a_model_of_its_own_and_its_contraction_by_the_a
         found = contraction_of(angle, one.joint, side)
         assert found.values['contraction_m'] == pytest.approx(expected)
     assert questions(NOMINAL, 'unread')[0].joint is None
+
+
+def test_of_a_muscle_in_a_joint_without_load_cell_only_the_valve_is_judged():
+    rig = nominal().with_(effects=[
+        {'name': 'bladder_stiffness', 'parameters': {'stiffness_n_per_m': 400.0}}])
+    run = recorded(rig, voltages(8.0), topics=('pressure', 'contraction'))
+    result = find_gap(run, nominal().with_(load='driven'), effects=['bladder_stiffness'])
+    assert result.verdict == 'no_gap' and list(result.subsystems) == ['valve']
+    assert result.reason.startswith('The valve ')
+    assert result.reason.endswith('The muscle was not compared.')
+    assert any(remark.endswith('record the force of its tendon') for remark in result.remarks)

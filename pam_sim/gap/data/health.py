@@ -92,8 +92,8 @@ def check_health(run: Run, valve: str, criteria: Criteria = CRITERIA,
             health.problems.append(f'the recording has no {needed}')
     if 'force' not in health.signals:
         health.remarks.append(
-            'without a load cell, nothing tells of a muscle whose contraction is given: only its '
-            'valve is compared' if driven else
+            'without a load cell, nothing tells of a muscle whose contraction is given, so only its '
+            'valve is compared; record the force of its tendon' if driven else
             'without a load cell, errors of the force map and of the load look alike')
     if health.usable:
         _check_duration(run, health, criteria)

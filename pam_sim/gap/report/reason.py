@@ -37,6 +37,9 @@ def explain(result: GapResult, outcome: Outcome, harms: Iterable[Harm] = ()) -> 
 
 
 def _told(result: GapResult, outcome: Outcome) -> str:
+    if result.verdict == 'no_gap' and tuple(result.signals) == ('pressure',):
+        return 'The valve of the model follows the recorded pressure within sensor noise and ' \
+            'stamps, its numbers calibrated within their tolerance. The muscle was not compared.'
     if result.verdict == 'no_gap':
         return 'The model follows the recording within sensor noise and stamps, its numbers ' \
             'calibrated within their tolerance.'
