@@ -92,8 +92,8 @@ def check_health(run: Run, valve: str, criteria: Criteria = CRITERIA,
             health.problems.append(f'the recording has no {needed}')
     if 'force' not in health.signals:
         health.remarks.append(
-            'without a load cell, nothing tells of a muscle whose contraction is given, so only its '
-            'valve is compared; record the force of its tendon' if driven else
+            'without a load cell, nothing tells of a muscle whose contraction is given, so only '
+            'its valve is compared; record the force of its tendon' if driven else
             'without a load cell, errors of the force map and of the load look alike')
     if health.usable:
         _check_duration(run, health, criteria)
@@ -180,7 +180,8 @@ def _check_stamps(run: Run, topic: str, health: Health, criteria: Criteria) -> N
             rate_hz < criteria.min_pulse_rate_hz):
         health.problems.append(
             f'{topic} comes at {rate_hz:.0f} Hz; of on/off valves every pulse counts, so at least '
-            '100 Hz are needed')
+            '100 Hz are needed: record each of its messages as it is sent (the other topics may '
+            'be slow)')
     holes = periods[periods > max(criteria.max_hole_s, HOLE_PERIODS / rate_hz)]
     lost = float(holes.sum() / periods.sum())
     if lost > criteria.max_lost_share:
