@@ -14,7 +14,6 @@
 
 """One subsystem with the recordings it is compared with."""
 
-from collections import OrderedDict
 from collections.abc import Hashable, Mapping, Sequence
 from functools import lru_cache
 import math
@@ -30,6 +29,7 @@ from pam_sim.gap.data.signals import FIELD, SIGNALS
 from pam_sim.gap.data.split import split_of, UNUSED
 from pam_sim.gap.subsystems.effects import shows
 from pam_sim.gap.subsystems.known import Known, of_run
+from pam_sim.gap.subsystems.recent import Recent
 from pam_sim.response import COLUMNS, Response
 from pam_sim.rig import Rig
 from pam_sim.rollout.sampling import sample_into
@@ -96,8 +96,8 @@ class SubsystemProblem:
                              if any(s in self.outputs(r) for r in recordings))
         self.level, self._stamp_sd_s = 1.0, STAMP_SD_S
         self.simulations, self.asked, self._lock = 0, 0, threading.Lock()
-        self._kept: OrderedDict[Hashable, tuple[FloatArray, object]] = OrderedDict()
-        self._runs: OrderedDict[Hashable, tuple[Response, object]] = OrderedDict()
+        self._kept_errors: Recent[FloatArray] = Recent(KEPT_ERRORS)
+        self._kept_runs: Recent[Response] = Recent(KEPT_RUNS)
         self.known = self._rig_numbers(rig) + self._nuisances(recordings)
         self._start = [{s: r.start(s) for s in r.measured} for r in recordings]
         self._index, parts, blocks, signals, measured, times, runs = ([] for _ in range(7))
@@ -173,19 +173,14 @@ class SubsystemProblem:
             Normalised values of ``known``.
 
         """
-        key = self._key(rig), known_z.tobytes()
+        def made() -> FloatArray:
+            found = (self._values(rig, known_z) - self.measured) / self._scale
+            found.flags.writeable = False
+            return found
+
         with self._lock:
             self.asked += len(self._index)
-            if key in self._kept:
-                self._kept.move_to_end(key)
-                return self._kept[key][0]
-        found = (self._values(rig, known_z) - self.measured) / self._scale
-        found.flags.writeable = False
-        with self._lock:
-            self._kept[key] = found, rig.muscle         # held, so that its id stays its own
-            while len(self._kept) > KEPT_ERRORS:
-                self._kept.popitem(last=False)
-        return found
+        return self._kept_errors.get((self._key(rig), known_z.tobytes()), made, rig.muscle)
 
     def _key(self, rig: Rig) -> Hashable:
         """Return what tells a rig from others that differ here; its muscle is held meanwhile."""
@@ -227,22 +222,13 @@ class SubsystemProblem:
 
     def _run_kept(self, rig: Rig, index: int, numbers: Mapping[str, float]) -> Response:
         """Return the same; of the last ones none is made again."""
-        key = self._key(rig), index, tuple(numbers.values())
-        with self._lock:
-            if key in self._runs:
-                self._runs.move_to_end(key)
-                return self._runs[key][0]
-        response = self._run(rig, index, numbers)
-        with self._lock:
-            self._runs[key] = response, rig.muscle
-            while len(self._runs) > KEPT_RUNS:
-                self._runs.popitem(last=False)
-        return response
+        return self._kept_runs.get((self._key(rig), index, tuple(numbers.values())),
+                                   lambda: self._run(rig, index, numbers), rig.muscle)
 
     def _forget(self) -> None:
         """Keep nothing of the inputs before they change."""
-        self._kept.clear()
-        self._runs.clear()
+        self._kept_errors.clear()
+        self._kept_runs.clear()
 
     def _place_of(self, index: int, name: str, late_s: float, count: int
                   ) -> tuple[IntArray, FloatArray]:
