@@ -123,6 +123,11 @@ class Term:
         return (1 + (self.one.kind in terms.PAIRED) + self.one.is_shaped
                 + (self.two.kind != terms.ONE))
 
+    @property
+    def factors(self) -> tuple[int, ...]:
+        """Return what it has in common with terms that differ in their shapes alone."""
+        return self.channel.number, self.one.kind, self.one.of, self.two.kind, self.two.of
+
     def held(self, place: int) -> dict[str, float]:
         """Return the numbers of slot ``place`` that make the form."""
         return {f'{name}_of_{place}': float(value) for name, value in (

@@ -34,6 +34,7 @@ from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
 from pam_sim.gap.fit.parallel import parallel_map
 from pam_sim.gap.fit.solver import Solver
 from pam_sim.gap.propose.library import library, StandIn, Term
+from pam_sim.gap.propose.response import responses_of, worth_a_run
 from pam_sim.gap.propose.signals import force_error
 from pam_sim.gap.select.comparison import gap, preference
 from pam_sim.gap.subsystems.effects import shows
@@ -138,8 +139,8 @@ def _most_promising(promises: Sequence[Promise], fitted: int = FITTED) -> list[P
     kept: list[Promise] = []
     count: dict[object, int] = {}
     for one in sorted(promises, key=lambda p: -p.share):
-        f, g, owner = one.term.one, one.term.two, one.stand_in.effect
-        key = (owner, one.term.channel.number, f.kind, f.of, g.kind, g.of)
+        owner = one.stand_in.effect
+        key = (owner, *one.term.factors)
         best = max(p.share for p in promises if p.stand_in.effect == owner)
         most = FITTED_READINGS if one.stand_in.signal else fitted
         if (count.get(key, 0) < ALIKE and count.get(owner, 0) < most
@@ -187,14 +188,17 @@ def _simulated(estimator: Estimator, problem: SubsystemProblem, now: Fit, stand_
     weight = 1.0 / np.sqrt(now.temper[s][problem.signal[mask]])
     tail = np.zeros(residuals.size - int(mask.sum()))
 
+    def free(change: FloatArray) -> FloatArray:
+        y = np.concatenate([change[mask] * weight, tail])
+        return y - basis @ (basis.T @ y)
+
     def column(candidate: Candidate, values: Mapping[str, float]) -> FloatArray | None:
         rig = estimator.with_effects([*_others(now, candidate), candidate.setting(values)])
         try:
             change = problem.errors(rig, now.known_z[s]) - now.errors[s]
         except InputError:
             return None
-        y = np.concatenate([change[mask] * weight, tail])
-        return y - basis @ (basis.T @ y)
+        return free(change)
 
     def promise(term: Term) -> Promise | None:
         terms = (*found.terms, term) if found else (term,)
@@ -218,6 +222,10 @@ def _simulated(estimator: Estimator, problem: SubsystemProblem, now: Fit, stand_
         return Promise(stand_in, term, tuple(float(a) for a in amounts),
                        1.0 - float(rest @ rest) / float(left @ left))
 
+    if stand_in.subsystem == 'valve':
+        library_terms = worth_a_run(
+            library_terms, [one.symbol for one in stand_in.inputs], problem,
+            responses_of(estimator, problem, now), free, left)
     return [p for p in parallel_map(promise, library_terms) if p is not None]
 
 

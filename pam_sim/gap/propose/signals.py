@@ -27,12 +27,12 @@ from typing import Self
 
 import numpy as np
 from pam_sim.annotations import BoolArray, FloatArray
-from pam_sim.effects.unnamed import terms
 from pam_sim.gap.data.recording import GRID_S, Recording
 from pam_sim.gap.data.split import FIT, split_of
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit
-from pam_sim.gap.propose.library import Factor, moved_to, StandIn, Term
+from pam_sim.gap.propose.factors import columns_of, EVERY
+from pam_sim.gap.propose.library import moved_to, StandIn, Term
 from pam_sim.gap.propose.ranges import waves_of
 from pam_sim.gap.report.location import AT_STOP_M, MOVING_M_PER_S, smooth_motion
 from pam_sim.gap.subsystems.simulation import pressure_driven, simulate_driven
@@ -40,7 +40,6 @@ from pam_sim.gap.verify.model import model_of
 from pam_sim.rig import Rig
 from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
 
-EVERY = 10                   # grid steps between the samples
 LATE_S = 1e-3                # of two topics against each other
 LEAST_SAMPLES = 200
 SMOOTH = 31                  # grid steps of the mean
@@ -94,16 +93,21 @@ class ForceError:
         error = self.error
         for place, term in enumerate(found, 1):
             fitted = moved_to(term, values.get(f'shape_1_of_{place}', term.one.shape))
-            columns = columns_of(fitted, self, [one.symbol for one in stand_in.inputs], 1.0)
+            columns = self.columns(fitted, stand_in, 1.0)
             for name, column in zip(('first', 'second'), columns):
                 error = error - values[f'{name}_of_{place}'] * column
         return replace(self, error=error)
 
+    def columns(self, term: Term, stand_in: StandIn, friction: float) -> list[FloatArray]:
+        """Return a term of 1 N at all samples, a wave as two; ``friction``: of a dry level."""
+        sign = friction * self.direction if term.channel.least == 0.0 else 1.0
+        return [sign * column for column in columns_of(
+            term, self.inputs, self.time_s, [one.symbol for one in stand_in.inputs])]
+
     def promise(self, stand_in: StandIn, term: Term) -> tuple[tuple[float, ...], float]:
         """Return (amplitudes in trials, squared error [N^2] that it explains) of a term."""
-        symbols = [one.symbol for one in stand_in.inputs]
-        matrix = np.column_stack([self.free(c) for c in columns_of(
-            term, self, symbols, -1.0 if stand_in.subsystem == 'muscle' else 1.0)])
+        matrix = np.column_stack([self.free(c) for c in self.columns(
+            term, stand_in, -1.0 if stand_in.subsystem == 'muscle' else 1.0)])
         left = self.free(self.error)
         amounts, *_ = np.linalg.lstsq(matrix, left, rcond=None)
         if term.channel.least == 0.0 and amounts[0] <= 0.0:
@@ -199,62 +203,3 @@ def _thinned(values: FloatArray) -> FloatArray:
     padded = np.concatenate([np.full(SMOOTH // 2, values[0]), values,
                              np.full(SMOOTH // 2, values[-1])])
     return np.convolve(padded, kernel, mode='valid')[::EVERY]
-
-
-def columns_of(term: Term, seen: ForceError, symbols: Sequence[str], friction: float
-               ) -> list[FloatArray]:
-    """Return a term of 1 N at all samples, a wave as two; ``friction``: sign of a dry level."""
-    second = _values(term.two, seen, symbols)
-    sign = friction * seen.direction if term.channel.least == 0.0 else 1.0
-    if term.one.kind == terms.SINE:
-        angle = 2.0 * np.pi * seen.inputs[symbols[term.one.of]] / term.one.shape
-        return [np.sin(angle) * second, np.cos(angle) * second]
-    return [_values(term.one, seen, symbols) * second * sign]
-
-
-def _values(f: Factor, seen: ForceError, symbols: Sequence[str]) -> FloatArray:
-    if f.kind == terms.ONE:
-        return np.ones(seen.error.size)
-    value = seen.inputs[symbols[f.of]]
-    scale = SCALES[symbols[f.of]]
-    if f.kind in terms.REMEMBER:
-        return _remembered(f, value, scale, seen.time_s)
-    q = value / scale
-    found: FloatArray = q
-    if f.kind == terms.SQUARE:
-        found = q ** 2
-    elif f.kind == terms.CUBE:
-        found = q ** 3
-    elif f.kind == terms.SIZE:
-        found = np.abs(q)
-    elif f.kind == terms.SIGNED_SQUARE:
-        found = q * np.abs(q)
-    elif f.kind == terms.SIGN:
-        found = np.tanh(value / f.shape)
-    elif f.kind == terms.ABOVE:
-        found = np.maximum(value - f.shape, 0.0) / scale
-    elif f.kind == terms.BELOW:
-        found = np.maximum(f.shape - value, 0.0) / scale
-    elif f.kind == terms.FADE:
-        found = np.exp(-np.abs(value) / f.shape)
-    return found
-
-
-def _remembered(f: Factor, value: FloatArray, scale: float, time_s: FloatArray) -> FloatArray:
-    """Return a factor with a memory, which starts anew in every recording."""
-    found = np.empty(value.size)
-    step_s, memory = EVERY * GRID_S, 0.0
-    for k in range(value.size):
-        if k == 0 or time_s[k] < time_s[k - 1]:
-            memory = value[k]
-        if f.kind == terms.STOP:
-            memory = min(max(memory, value[k] - f.shape), value[k] + f.shape)
-            found[k] = (value[k] - memory) / f.shape
-        else:
-            memory += step_s / (f.shape + 0.5 * step_s) * (value[k] - memory)
-            found[k] = (value[k] - memory) / scale
-    return found
-
-
-SCALES = {one.symbol: one.scale for one in (
-    terms.PRESSURE, terms.CONTRACTION, terms.SPEED, terms.TIME, terms.TENSION)}

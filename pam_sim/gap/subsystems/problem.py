@@ -193,6 +193,13 @@ class SubsystemProblem:
             self.asked += len(self._index)
         return self._values(rig, known_z)
 
+    def responses(self, rig: Rig, known_z: FloatArray) -> list[Response]:
+        """Return the simulation of every recording; arguments as of ``errors``."""
+        with self._lock:
+            self.asked += len(self._index)
+        numbers = {k.name: k.value + k.sd * float(z) for k, z in zip(self.known, known_z)}
+        return [self._run(rig, index, numbers) for index in range(len(self._index))]
+
     def _values(self, rig: Rig, known_z: FloatArray) -> FloatArray:
         numbers = {k.name: k.value + k.sd * float(z) for k, z in zip(self.known, known_z)}
         rig = rig.with_(parameters={k.name: numbers[k.name] for k in self.known if k.of_rig})
