@@ -26,7 +26,7 @@ from typing import Any
 
 import numpy as np
 
-from pam_sim.compiled import compiled
+from pam_sim.compiled import compiled, interpreted
 from pam_sim.effects.effect import Effect, Numbers, Reported
 from pam_sim.effects.fitting import DELAY_STARTS_S, Fitting, FreeParameter
 from pam_sim.effects.lag import HELD, mean_of_held, pack_held
@@ -42,7 +42,8 @@ def _initial(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
         return {'set_point_pa': set_point_of(
             voltage, numbers.parameters, numbers.parameters['p_atm'])}
     fill, vent = numbers.signal
-    return {'fill_opening': clip_duty(fill), 'vent_opening': clip_duty(vent)}
+    duty = interpreted(clip_duty)
+    return {'fill_opening': duty(fill), 'vent_opening': duty(vent)}
 
 
 EFFECT = Effect(
