@@ -248,3 +248,14 @@ def test_a_pressure_sensor_that_is_off_or_lost_does_no_harm(off_pa):
     error_m = loop.run(load_controller('sofc_model_ppr', rig)).error_m
     assert np.abs(error_m[3600:]).max() < 1.5e-3
     assert np.sqrt(np.mean(error_m[4600:] ** 2)) < 0.6e-3
+
+
+def test_a_quick_regulator_makes_no_lasting_oscillation():
+    # With 1.73e5 Pa s/m on the predicted rate, this rig went on swinging by 0.8 mm.
+    nominal = load_rig('dmsp_5_300_realistic')
+    rig = random_rigs(nominal, 16, seed=9100)[-1]
+    motion = RANDOM_MOTION.replace('duration_s: 31.0, seed: 77', 'duration_s: 60.0, seed: 9115')
+    for seed in (0, 2):
+        loop = ClosedLoop(rig, load_experiment(motion), seed=seed, preview_s=0.0,
+                          driver=driver_config(nominal))
+        assert loop.run(load_controller('sofc_model_ppr', nominal)).rmse_m(13.0, 33.0) < 0.15e-3
