@@ -14,7 +14,7 @@
 
 """Model files and presets: YAML in, Rig out."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from pam_sim.effects.registry import all_effects, get_effect
@@ -23,13 +23,14 @@ from pam_sim.files import shown, StrPath
 from pam_sim.keys import Key, names_of
 from pam_sim.load import LOADS
 from pam_sim.located_yaml import Located, LocatedList
-from pam_sim.muscle.muscle import get_muscle, muscle_names, read_law, read_muscle
+from pam_sim.muscle.coefficients import ALL, coefficients, PREFIX, stated_names
+from pam_sim.muscle.muscle import get_muscle, LawChoice, muscle_names, read_law, read_muscle
 from pam_sim.named_files import file_stem, NamedFiles
-from pam_sim.parameters import check_parameters
+from pam_sim.parameters import check_parameters, Parameter
 from pam_sim.rig import EffectSetting, Rig
 from pam_sim.rig_parameters import rig_parameters, VALVES
 from pam_sim.sensors import SENSOR_PARAMETERS
-from pam_sim.tolerance import read_tolerance
+from pam_sim.tolerance import read_tolerance, Tolerance
 from pam_sim.valve import hsv
 
 KEYS = (
@@ -50,7 +51,8 @@ KEYS = (
         'ones.', otherwise='nominal'),
     Key('tolerance', dict, 'How well a number of `parameters` is known: its relative standard '
         'deviation, 0 for exactly; `{sd: ...}`, the same in the unit of the number; or '
-        '`unknown`, anywhere in its range. `pam gap` adjusts a number within it.',
+        '`unknown`, anywhere in its range. `pam gap` adjusts a number within it. `law.NAME` is a '
+        'coefficient of the force law, `law` stands for all on which its force depends.',
         otherwise='that of the parameter', lower=0.0, upper=1.0),
     Key('effects', list, 'Effects added to the nominal physics, each a mapping.',
         otherwise='those of `rig`'),
@@ -138,10 +140,9 @@ def _from_mapping(data: Located, name: str | None, seen: tuple[str, ...]) -> Rig
     check_parameters(known, given)
     tolerance = dict(base.tolerance)
     stated = data.get('tolerance', dict) if data.get('tolerance') is not None else Located({})
-    stated.check_keys([parameter.name for parameter in known], 'parameter')
-    for parameter in known:
-        if parameter.name in stated:
-            tolerance[parameter.name] = read_tolerance(stated, parameter)
+    if muscle.law.name != base.muscle.law.name:
+        tolerance = {key: value for key, value in tolerance.items() if not key.startswith(PREFIX)}
+    tolerance.update(_tolerances(stated, (*known, *coefficients(muscle.law)), muscle.law))
     sensors = data.get('sensors', dict) if data.get('sensors') is not None else {}
     check_parameters(SENSOR_PARAMETERS, sensors, 'sensor setting')
     return Rig(
@@ -150,6 +151,19 @@ def _from_mapping(data: Located, name: str | None, seen: tuple[str, ...]) -> Rig
         data.get('fidelity', str, base.fidelity, choices=hsv.FIDELITIES),
         {**base.parameters, **dict(given)}, _effects(data, base),
         {**base.sensors, **dict(sensors)}, tolerance, muscle)
+
+
+def _tolerances(stated: Located, known: Sequence[Parameter], law: LawChoice
+                ) -> dict[str, Tolerance]:
+    """Return the tolerances that a file states; ``law`` stands for all its coefficients."""
+    by_name = {parameter.name: parameter for parameter in known}
+    stated.check_keys([*by_name, ALL], 'parameter')
+    found: dict[str, Tolerance] = {}
+    if ALL in stated:
+        for name in stated_names(law, ALL, stated.where(ALL)):
+            found[name] = read_tolerance(stated, by_name[name], ALL)
+    return found | {name: read_tolerance(stated, by_name[name])
+                    for name in by_name if name in stated}
 
 
 def _check_made_of(data: Located) -> None:

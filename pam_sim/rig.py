@@ -24,6 +24,7 @@ from pam_sim.annotations import FloatArray, Number
 from pam_sim.effects.registry import get_effect
 from pam_sim.errors import InputError
 from pam_sim.load import LOADS
+from pam_sim.muscle.coefficients import coefficients, own_value, PREFIX, with_coefficients
 from pam_sim.muscle.muscle import get_muscle, LawChoice, Muscle
 from pam_sim.parameters import check_parameters, Parameter
 from pam_sim.rig_parameters import rig_parameters, VALVES
@@ -98,7 +99,8 @@ class Rig:
         Sensor settings, name -> value (see :class:`pam_sim.sensors.SensorChain`).
     tolerance : dict
         Parameter name -> how well it is known: a relative standard deviation, an
-        ``AbsoluteSd``, or ``UNKNOWN`` (infinite).
+        ``AbsoluteSd``, or ``UNKNOWN`` (infinite). ``law.NAME``, where stated, is a coefficient
+        of the force law.
     muscle : Muscle or str
         Dimensions and force law, or the name of a muscle; ``dmsp_5_300`` by default.
 
@@ -137,7 +139,8 @@ class Rig:
         checked: dict[str, object] = {
             'parameters': check_parameters(known, self.parameters),
             'sensors': check_parameters(SENSOR_PARAMETERS, self.sensors, 'sensor setting'),
-            'tolerance': tolerances(known, self.tolerance), 'effects': list(settings.values())}
+            'tolerance': tolerances(known, self.tolerance, self.law_list),
+            'effects': list(settings.values())}
         for name, ready in checked.items():
             object.__setattr__(self, name, ready)
 
@@ -145,6 +148,16 @@ class Rig:
     def parameter_list(self) -> tuple[Parameter, ...]:
         """Parameter descriptions (unit, bounds, nominal, tolerance) of this rig."""
         return rig_parameters(self.load)
+
+    @property
+    def law_list(self) -> tuple[Parameter, ...]:
+        """Coefficients of the force law as parameters ``law.NAME``; none of a table."""
+        return coefficients(self.muscle.law)
+
+    def number(self, name: str) -> float:
+        """Return the value of a parameter of the rig or of a coefficient ``law.NAME``."""
+        return (own_value(self.muscle.law, name) if name.startswith(PREFIX)
+                else self.parameters[name])
 
     @property
     def unknown(self) -> tuple[str, ...]:
@@ -156,9 +169,11 @@ class Rig:
         Return the standard deviation with which a parameter is known, in its unit.
 
         That of an unknown one is half of its range, see :func:`pam_sim.tolerance.prior_sd`.
+        A coefficient ``law.NAME`` is a parameter, too.
         """
-        parameter = next(p for p in self.parameter_list if p.name == name)
-        return prior_sd(parameter, self.parameters[name], self.tolerance[name])
+        among = self.law_list if name.startswith(PREFIX) else self.parameter_list
+        parameter = next(p for p in among if p.name == name)
+        return prior_sd(parameter, self.number(name), self.tolerance[name])
 
     @property
     def signal_names(self) -> tuple[str, ...]:
@@ -186,7 +201,7 @@ class Rig:
         Parameters
         ----------
         parameters : dict, optional
-            Numbers to change, the others stay.
+            Numbers to change, the others stay; ``law.NAME`` is a coefficient of the force law.
         effects : list, optional
             The effects instead of the present ones (``EffectSetting``, dict or name).
         valve, fidelity, load, name : str, optional
@@ -210,13 +225,21 @@ class Rig:
         chosen = get_muscle(muscle) if isinstance(muscle, str) else muscle or self.muscle
         if law is not None:
             chosen = chosen.with_law(law)
+        given = dict(parameters or {})
+        of_law = {key: given.pop(key) for key in list(given) if key.startswith(PREFIX)}
+        if of_law:
+            chosen = replace(chosen, law=with_coefficients(chosen.law, of_law))
         known = {p.name for p in rig_parameters(new_load)} if new_load in LOADS else set()
         kept = {key: value for key, value in self.parameters.items() if key in known}
-        tolerated = {key: value for key, value in self.tolerance.items() if key in known}
+        if chosen.law.name == self.muscle.law.name:
+            known_too = known | {key for key in self.tolerance if key.startswith(PREFIX)}
+        else:
+            known_too = known
+        tolerated = {key: value for key, value in self.tolerance.items() if key in known_too}
         tolerated.update(tolerance or {})
         return replace(
             self, name=name or self.name, load=new_load, valve=valve or self.valve,
-            fidelity=fidelity or self.fidelity, parameters={**kept, **(parameters or {})},
+            fidelity=fidelity or self.fidelity, parameters={**kept, **given},
             effects=self.effects if effects is None else [
                 EffectSetting.of(item) for item in effects], tolerance=tolerated,
             sensors={**self.sensors, **(sensors or {})}, muscle=chosen)

@@ -18,6 +18,7 @@ from dataclasses import replace
 from typing import Any, TYPE_CHECKING
 
 from pam_sim.located_yaml import dump_yaml
+from pam_sim.muscle.coefficients import PREFIX
 from pam_sim.muscle.muscle import get_muscle
 from pam_sim.rig_parameters import rig_parameters
 from pam_sim.sensors import SENSOR_PARAMETERS
@@ -61,6 +62,8 @@ def rig_to_yaml(rig: 'Rig') -> str:
                if rig.parameters[p.name] != p.default}
     tolerance = {p.name: plain_tolerance(rig.tolerance[p.name]) for p in known
                  if rig.tolerance[p.name] != p.tolerance}
+    tolerance.update({name: plain_tolerance(value) for name, value in rig.tolerance.items()
+                      if name.startswith(PREFIX)})
     sensors = {p.name: rig.sensors[p.name] for p in SENSOR_PARAMETERS
                if rig.sensors[p.name] != p.default}
     effects = []

@@ -55,9 +55,9 @@ class AbsoluteSd:
 Tolerance = float | AbsoluteSd
 
 
-def read_tolerance(stated: Located, parameter: Parameter) -> Tolerance:
+def read_tolerance(stated: Located, parameter: Parameter, key: str = '') -> Tolerance:
     """
-    Return the tolerance of one parameter, stated by its key in a mapping.
+    Return the tolerance of one parameter, stated by its name or another key in a mapping.
 
     Raises
     ------
@@ -65,7 +65,7 @@ def read_tolerance(stated: Located, parameter: Parameter) -> Tolerance:
         Another word, an unknown key, or a number that is negative, not finite or too large.
 
     """
-    name = parameter.name
+    name = key or parameter.name
     value = stated[name]
     if value == WORD:
         return UNKNOWN
@@ -131,9 +131,12 @@ def prior_sd(parameter: Parameter, value: float, tolerance: Tolerance) -> float:
     return 0.5 * _width(parameter)
 
 
-def tolerances(known: tuple[Parameter, ...], given: Mapping[str, Any]) -> dict[str, Tolerance]:
+def tolerances(known: tuple[Parameter, ...], given: Mapping[str, Any],
+               exact: tuple[Parameter, ...] = ()) -> dict[str, Tolerance]:
     """
     Return the tolerance of every parameter: that of its declaration, or the one given.
+
+    Those of ``exact`` are known exactly, and left out, unless another one is given.
 
     Raises
     ------
@@ -141,13 +144,13 @@ def tolerances(known: tuple[Parameter, ...], given: Mapping[str, Any]) -> dict[s
         Unknown name, or as of ``check_tolerance``.
 
     """
-    names = [p.name for p in known]
+    names = [p.name for p in (*known, *exact)]
     for name in given:
         if name not in names:
             raise InputError(f'unknown parameter `{name}`{did_you_mean(name, names)}; allowed: '
                              f'{", ".join(names)}', 'tolerance')
     return {p.name: check_tolerance(given[p.name], p) if p.name in given else p.tolerance
-            for p in known}
+            for p in (*known, *(p for p in exact if p.name in given))}
 
 
 def _width(parameter: Parameter) -> float:

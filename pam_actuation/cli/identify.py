@@ -33,7 +33,8 @@ def add_arguments(parser: Parser) -> None:
                         'unknown')
     parser.add_argument('--unknown', type=source, nargs='+', default=[], metavar='NUMBER',
                         help='further unknown numbers: a parameter of the rig such as mass_kg, '
-                        'spring_n_per_m or pressure_zero_pa, or EFFECT.PARAMETER')
+                        'spring_n_per_m or pressure_zero_pa, law.NAME of its force law, law '
+                        'for all its coefficients, or EFFECT.PARAMETER')
     parser.add_argument('--added-kg', type=number(0.0, 500.0, 'kg'), nargs='+', default=[],
                         metavar='KG', help='known mass that hung on the load in addition, one '
                         'for each bag (default: none)')

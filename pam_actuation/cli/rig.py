@@ -73,7 +73,8 @@ def add_arguments(parser: Parser) -> None:
                         '1.2+-0.3; may be repeated')
     parser.add_argument('--unknown', action='append', default=[], metavar='NAME[=VALUE]',
                         help='a number that may be anywhere in its range; with a value where the '
-                        'search begins; may be repeated')
+                        'search begins; law.NAME is a coefficient of the force law, law stands '
+                        'for all on which its force depends; may be repeated')
     add_overwrite_option(parser, 'the file that is there')
 
 
@@ -173,6 +174,7 @@ def _described(args: argparse.Namespace) -> 'Description':
 def _state_numbers(args: argparse.Namespace, found: 'Description') -> None:
     from pam_actuation.rig_files.numbers import FORMS, read_stated, split_statement, Stated
     from pam_sim.errors import InputError
+    from pam_sim.muscle.coefficients import ALL, PREFIX
     from pam_sim.sensors import SENSOR_PARAMETERS
     from pam_sim.tolerance import UNKNOWN
     known = {p.name: p for p in found.parameters}
@@ -181,6 +183,9 @@ def _state_numbers(args: argparse.Namespace, found: 'Description') -> None:
                           ('--unknown', args.unknown)):
         for text in texts:
             where = f'{option} {text}'
+            if option == '--unknown' and (text == ALL or text.startswith(PREFIX)):
+                found.unknown_law.append(text)
+                continue
             names = {**known, **sensors} if option == '--known' else known
             name, rest = split_statement(text, names, where)
             if name in found.numbers or name in found.sensors:
@@ -223,15 +228,15 @@ def _check(args: argparse.Namespace) -> int:
 def _numbers(rig: 'Rig') -> dict[str, Any]:
     """Return the numbers that are not exact, for programs."""
     return {'unknown': list(rig.unknown), 'about': [
-        {'name': p.name, 'unit': p.unit, 'value': rig.parameters[p.name],
+        {'name': p.name, 'unit': p.unit, 'value': rig.number(p.name),
          'sd': rig.prior_sd(p.name)} for p in _inexact(rig)]}
 
 
 def _numbers_text(rig: 'Rig') -> list[str]:
-    lines = [f'  {p.name}: unknown, {p.allowed}' for p in rig.parameter_list
+    lines = [f'  {p.name}: unknown, {p.allowed}' for p in (*rig.parameter_list, *rig.law_list)
              if p.name in rig.unknown]
     return lines + [
-        f'  {p.name}: {rig.parameters[p.name]:g} ± {rig.prior_sd(p.name):.3g} {p.unit}'
+        f'  {p.name}: {rig.number(p.name):g} ± {rig.prior_sd(p.name):.3g} {p.unit}'
         for p in _inexact(rig)]
 
 
@@ -239,5 +244,6 @@ def _inexact(rig: 'Rig') -> list[Any]:
     """Return the parameters of rig and valve that are neither unknown nor exact."""
     from pam_sim.valve import hsv, ppr
     other = {p.name for p in (hsv if rig.valve == 'ppr' else ppr).PARAMETERS}
-    return [p for p in rig.parameter_list if p.name not in rig.unknown and p.name not in other
+    return [p for p in (*rig.parameter_list, *rig.law_list) if p.name in rig.tolerance
+            and p.name not in rig.unknown and p.name not in other
             and rig.prior_sd(p.name) > 0.0]

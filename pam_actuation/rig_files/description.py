@@ -53,6 +53,8 @@ class Description:
         Parameter name -> Stated.
     sensors : dict
         Sensor setting -> value.
+    unknown_law : list of str
+        Unknown coefficients of the force law, ``law.NAME``; ``law`` for all.
     notes : dict
         Parameter name -> where its number comes from; filled by ``work_out``.
 
@@ -68,6 +70,7 @@ class Description:
     gauge_pa: tuple[float, float] | None = None
     numbers: dict[str, Stated] = field(default_factory=dict)
     sensors: dict[str, float] = field(default_factory=dict)
+    unknown_law: list[str] = field(default_factory=list)
     notes: dict[str, str] = field(default_factory=dict)
 
     @property

@@ -80,7 +80,7 @@ def _text(described: Description, force_map: str) -> str:
               f'load: {described.load}', '',
               f'# {ppr.SENTENCE if described.valve == "ppr" else hsv.SENTENCE}',
               f'valve: {described.valve}', '', 'parameters:']
-    tolerated: list[str] = []
+    tolerated = [f'  {name}: {WORD}' for name in described.unknown_law]
     valve = ppr.PARAMETERS if described.valve == 'ppr' else hsv.PARAMETERS
     for title, group in (('muscle', MUSCLE_PARAMETERS),
                          ('load', LOADS[described.load].PARAMETERS),

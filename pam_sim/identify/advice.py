@@ -194,7 +194,7 @@ def _is_narrow_about(number: Number, centre: float, variance: float) -> bool:
 
 def _value(rig: Rig, number: Number) -> float:
     if not number.effect:
-        return rig.parameters[number.parameter]
+        return rig.number(number.parameter)
     here = next((e for e in rig.effects if e.name == number.effect), None)
     return here.parameters[number.parameter] if here is not None else number.start
 

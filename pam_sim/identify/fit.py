@@ -28,7 +28,7 @@ import numpy as np
 from pam_sim.annotations import BoolArray, FloatArray
 from pam_sim.errors import InputError
 from pam_sim.gap.data.split import FIT, SELECT
-from pam_sim.gap.fit.solver import REFUSED, simulated_errors, tempering
+from pam_sim.gap.fit.solver import is_refused, REFUSED, simulated_errors, tempering
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.identify.numbers import Number, with_values
 from pam_sim.rig import Rig
@@ -125,10 +125,19 @@ class Weighted:
             moved[j] += step
             own = (np.arange(x.size) == j) * self.prior
             rows.append(np.concatenate([
-                self._scaled(self.errors(moved, p) - base[k], k) / step
+                self._scaled(self._changes(x, moved, base[k], p), k) / step
                 if number.acts_in(p) else np.zeros(base[k].size)
                 for k, p in enumerate(self.problems)] + [own]))
         return np.array(rows).T
+
+    def _changes(self, x: FloatArray, moved: FloatArray, base: FloatArray,
+                 problem: SubsystemProblem) -> FloatArray:
+        """Return how errors change with a small step; away from a model that is refused."""
+        found = self.errors(moved, problem)
+        if not is_refused(found[used(problem)]):
+            return found - base
+        found = self.errors(2.0 * x - moved, problem)
+        return np.zeros(base.size) if is_refused(found[used(problem)]) else base - found
 
     def solve(self, x: FloatArray, held: BoolArray | None = None,
               evaluations: int = EVALUATIONS) -> tuple[FloatArray, float]:
@@ -153,7 +162,7 @@ class Weighted:
         start = np.clip(x, self.low + margin, self.high - margin)[free]
         found = least_squares(
             lambda part: self.residuals(whole(part)), start,
-            lambda part: self.slopes(whole(part))[:, free],
+            lambda part: self.slopes(whole(part), np.flatnonzero(free)),
             (self.low[free], self.high[free]), x_scale='jac', ftol=1e-6, xtol=1e-6,
             max_nfev=evaluations)
         return whole(found.x), 2.0 * float(found.cost)
@@ -234,7 +243,9 @@ def fit(weighted: Weighted, seed: int = 0) -> FloatArray:
         Of the spread of the starts.
 
     """
-    unknown = [j for j, n in enumerate(weighted.numbers) if n.unknown]
+    # Coefficients of the force law begin at those of its set, once the other numbers are found.
+    late = np.array([n.of_law for n in weighted.numbers], bool)
+    unknown = [j for j, n in enumerate(weighted.numbers) if n.unknown and not n.of_law]
     starts = [np.zeros(len(weighted.numbers))]
     if unknown:
         from scipy.stats import qmc       # slow to import
@@ -254,10 +265,13 @@ def fit(weighted: Weighted, seed: int = 0) -> FloatArray:
         for evaluations in (EVALUATIONS // 2, EVALUATIONS):
             # From full weight: a poor start would lower the weight that could lead away from it.
             weighted.temper = [np.ones(len(p.signals)) for p in weighted.problems]
-            start, _ = weighted.solve(start, evaluations=evaluations)
+            start, _ = weighted.solve(start, late, evaluations)
         misfit = weighted.misfit(start)
         if misfit < least - BETTER:
             best, least = start, misfit
+    if late.any():
+        weighted.temper = [np.ones(len(p.signals)) for p in weighted.problems]
+        best, _ = weighted.solve(best)
     for _ in range(ROUNDS):
         if weighted.retemper(best):
             break

@@ -68,7 +68,8 @@ class Combination:
 
 def is_narrow(number: Number, low: float, high: float) -> bool:
     """Tell whether an interval is short beside the range of the number."""
-    if low > 0.0 and high / low <= NARROW_RATIO:
+    least, most = sorted((abs(low), abs(high)))
+    if low * high > 0.0 and most / least <= NARROW_RATIO:
         return True
     if number.is_scale:
         return False

@@ -23,6 +23,7 @@ from pam_sim.errors import did_you_mean, InputError
 from pam_sim.gap.data.noise import SMALLEST
 from pam_sim.gap.subsystems.effects import acts_on
 from pam_sim.gap.subsystems.problem import SubsystemProblem
+from pam_sim.muscle.coefficients import ALL, PREFIX, stated_names
 from pam_sim.parameters import Parameter
 from pam_sim.rig import EffectSetting, Rig
 from pam_sim.sensors.zeros import ZEROS
@@ -77,6 +78,11 @@ class Number:
     def unknown(self) -> bool:
         """Tell whether there is no prior but the range."""
         return math.isinf(self.sd)
+
+    @property
+    def of_law(self) -> bool:
+        """Tell whether it is a coefficient of the force law."""
+        return self.name.startswith(PREFIX)
 
     @property
     def is_scale(self) -> bool:
@@ -166,7 +172,8 @@ def unknown_numbers(rig: Rig, names: Sequence[str] = ()) -> list[Number]:
     rig : pam_sim.Rig
         Its tolerances say what is unknown, its values where the search begins.
     names : sequence of str
-        A parameter of the rig, or ``EFFECT.PARAMETER``.
+        A parameter of the rig, a coefficient ``law.NAME`` of its force law, ``law`` for all of
+        them on which the static force depends, or ``EFFECT.PARAMETER``.
 
     Raises
     ------
@@ -174,17 +181,18 @@ def unknown_numbers(rig: Rig, names: Sequence[str] = ()) -> list[Number]:
         There is no such number.
 
     """
-    parameters = {p.name: p for p in rig.parameter_list}
+    parameters = {p.name: p for p in (*rig.parameter_list, *rig.law_list)}
     found: dict[str, Number] = {}
-    for name in (*rig.unknown, *names):
+    for name in (*rig.unknown, *(n for name in names for n in stated_names(
+            rig.muscle.law, name, 'unknown number'))):
         if name in parameters:
             p = parameters[name]
-            value = rig.parameters[name]
+            value = rig.number(name)
             found[name] = Number(name, '', name, p.unit, value if value > 0.0 or p.lower <= 0.0
                                  else p.default, p.lower, p.upper, description=p.description)
             continue
         effect_name, dot, key = name.partition('.')
-        if not dot:
+        if not dot or effect_name == ALL:
             raise InputError(
                 f'`{name}` is no number of the rig{did_you_mean(name, parameters)}; allowed: '
                 f'{", ".join(parameters)}, or EFFECT.PARAMETER', 'unknown number')

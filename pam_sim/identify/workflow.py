@@ -36,6 +36,7 @@ from pam_sim.identify.profile import Interval, profile
 from pam_sim.identify.records import offer_of, problems_of
 from pam_sim.identify.result import Found, half_width, Identification
 from pam_sim.identify.secant import settle, solve_from
+from pam_sim.muscle.coefficients import stated_names
 from pam_sim.rig import Rig
 from pam_sim.run import Run
 from pam_sim.tolerance import AbsoluteSd, UNKNOWN
@@ -58,7 +59,8 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
     rig : pam_sim.Rig
         Its unknown numbers are looked for, from the values it has.
     unknown : sequence of str
-        Further ones: a parameter of the rig, or ``EFFECT.PARAMETER``.
+        Further ones: a parameter of the rig, a coefficient ``law.NAME`` of its force law, ``law``
+        for all on which the force depends, or ``EFFECT.PARAMETER``.
     added_kg : sequence of float
         Known masses that hung on the load in addition, one per run; none by default.
     seed : int
@@ -85,7 +87,10 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
     if added_kg and len(added_kg) != len(runs):
         raise InputError(f'{len(added_kg)} masses for {len(runs)} recordings; give one for each, '
                          '0 for none', 'added mass')
-    rig = rig.with_(tolerance={name: UNKNOWN for name in unknown if name in rig.parameters})
+    unknown = [n for name in unknown for n in stated_names(rig.muscle.law, name, 'unknown number')]
+    coefficients = [p.name for p in rig.law_list]
+    rig = rig.with_(tolerance={
+        name: UNKNOWN for name in unknown if name in rig.parameters or name in coefficients})
     wanted = unknown_numbers(rig, unknown)
     if not wanted:
         raise InputError('no number is unknown: state `unknown` in `tolerance`, or name numbers',

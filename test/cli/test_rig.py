@@ -81,6 +81,16 @@ def test_without_a_word_it_is_the_nominal_rig_with_every_number_in_a_comment(loa
     assert load_rig('stated.yaml').with_(name='made') == rig
 
 
+def test_the_force_law_may_be_unknown(capsys):
+    rig = new('--muscle', 'dmsp_10_250', '--unknown', 'mass_kg', '--unknown', 'law')
+    assert rig.unknown[0] == 'mass_kg' and 'law.a3' in rig.unknown and len(rig.unknown) == 7
+    assert main(['rig', 'check', 'made.yaml']) == 0
+    assert 'law.a3: unknown, -85.' in capsys.readouterr().out
+    assert new('--unknown', 'law.a2_n', '--overwrite').unknown == ('law.a2_n',)
+    assert main(['rig', 'new', '--out', 'other.yaml', '--unknown', 'law.a9']) == 2
+    assert 'law.a9' in capsys.readouterr().err and not os.path.exists('other.yaml')
+
+
 def test_another_bore_scales_the_force_map_and_says_so():
     rig = new('--bore-mm', '12')
     assert rig.muscle.bore_m == 0.012 and rig.muscle.law == load_rig(

@@ -40,7 +40,7 @@ from pam_sim.gap.fit.candidate import Setting
 from pam_sim.gap.fit.distance import distance_to_none
 from pam_sim.gap.fit.hypothesis import Fit, Hypothesis, Precision, within_reach
 from pam_sim.gap.fit.parallel import parallel_map
-from pam_sim.gap.fit.solver import ROUNDS, simulated_errors, Solver
+from pam_sim.gap.fit.solver import is_refused, ROUNDS, simulated_errors, Solver
 from pam_sim.gap.subsystems.effects import shows
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.rig import Rig
@@ -292,8 +292,11 @@ def _slopes(problem: SubsystemProblem, rig: Rig, known_z: FloatArray) -> FloatAr
     base = simulated_errors(problem, rig, known_z)
 
     def slope(j: int) -> FloatArray:
-        step = problem.known[j].step
-        moved = known_z + step * (np.arange(known_z.size) == j)
-        return (simulated_errors(problem, rig, moved) - base) / step
+        for step in (problem.known[j].step, -problem.known[j].step):
+            moved = known_z + step * (np.arange(known_z.size) == j)
+            errors = simulated_errors(problem, rig, moved)
+            if not is_refused(errors):
+                return (errors - base) / step
+        return np.zeros(base.size)
 
     return np.column_stack(parallel_map(slope, range(known_z.size)))

@@ -247,3 +247,8 @@ def simulated_errors(problem: SubsystemProblem, rig: Rig, known_z: FloatArray) -
         return problem.errors(rig, known_z)
     except InputError:
         return np.full(problem.part.size, REFUSED)
+
+
+def is_refused(errors: FloatArray) -> bool:
+    """Tell whether errors are those of numbers that cannot be simulated."""
+    return bool(np.all(errors == REFUSED))

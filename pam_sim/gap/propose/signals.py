@@ -143,7 +143,7 @@ def force_error(estimator: Estimator, recordings: Sequence[Recording], now: Fit,
     slopes = []
     for known in problem.known:
         if known.of_rig:
-            value, step = rig.parameters[known.name], known.step
+            value, step = rig.number(known.name), known.step
             if value + step * known.sd > known.upper:
                 step = -step
             moved = rig.with_(parameters={known.name: value + step * known.sd})

@@ -53,10 +53,11 @@ def known_numbers(rig: Rig) -> list[Known]:
     """Return the numbers of a rig with a tolerance that act with its valve, as Known."""
     other = {p.name for p in (hsv if rig.valve == 'ppr' else ppr).PARAMETERS}
     found = []
-    for p in rig.parameter_list:
+    of_law = (p for p in rig.law_list if p.name in rig.tolerance)
+    for p in (*rig.parameter_list, *of_law):
         if p.name in other:
             continue
-        value, sd = rig.parameters[p.name], rig.prior_sd(p.name)
+        value, sd = rig.number(p.name), rig.prior_sd(p.name)
         if sd > 0.0:
             unknown = rig.tolerance[p.name] == UNKNOWN
             step = STEP_OF_UNKNOWN * (abs(value) / sd or STEP_OF_UNKNOWN) if unknown else STEP_SD

@@ -1,0 +1,60 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Unknown coefficients of the force law, from recordings of a muscle whose law is another one."""
+
+from made_records import inside, record, RIG
+import numpy as np
+from pam_sim import load_rig
+from pam_sim.identify import identify
+
+ISOMETRIC = load_rig('dmsp_5_300_isometric').with_(parameters={'contraction_m': 0.02})
+
+
+def test_a_coefficient_is_found_from_the_force():
+    true = ISOMETRIC.number('law.a5_n_per_pa') * 1.2
+    run = record(ISOMETRIC.with_(parameters={'law.a5_n_per_pa': true}),
+                 keep=('pressure', 'force'), command=False, hold_s=0.4)
+    found = identify(run, ISOMETRIC, ['law.a5_n_per_pa'], advise=False)
+    assert inside(found['law.a5_n_per_pa'], true)
+    assert found['law.a5_n_per_pa'].status == 'determined'
+    assert found.rig.unknown == () and found.rig.prior_sd('law.a5_n_per_pa') < 0.02 * true
+
+
+def test_coefficients_that_one_length_does_not_tell_apart_are_said_so():
+    """At a held length offset and decaying term are one number; so are the pressure gains."""
+    rig = ISOMETRIC.with_(parameters={'law.a6_n': 0.8 * ISOMETRIC.number('law.a6_n')})
+    run = record(rig, keep=('pressure', 'force'), command=False, hold_s=0.4)
+    found = identify(run, ISOMETRIC, ['law'])
+    assert [one.number.name for one in found.found] == [p.name for p in ISOMETRIC.law_list]
+    assert all(inside(one, rig.number(one.number.name)) for one in found.found)
+    open_ones = {'law.a1_n_per_pa', 'law.a2_n', 'law.a3', 'law.a4_n_per_pa'}
+    assert open_ones <= set(found.open_names) and open_ones <= set(found.rig.unknown)
+    assert 'law.a6_n' in found.combinations[0].weights
+    assert found.signals['force']['rmse_after'] < 0.1 * found.signals['force']['rmse_before']
+
+
+def test_a_muscle_that_moves_is_predicted_better_with_its_law_unknown():
+    law = {'law.a3': 1.2, 'law.a4_n_per_pa': 0.85, 'law.a6_n': 0.9}
+    truth = RIG.with_(parameters={name: by * RIG.number(name) for name, by in law.items()})
+    run, other = (record(truth, gauge_pa=stairs, hold_s=0.6, keep=('pressure', 'contraction'))
+                  for stairs in ((50e3, 250e3, 450e3, 550e3, 300e3, 100e3),
+                                 (150e3, 350e3, 500e3, 200e3)))
+    found = identify(run, RIG, ['law'], advise=False)
+
+    def worst(rig):
+        volts = other['valve_signal']['ppr_voltage']
+        simulated = rig.simulate(np.repeat(volts, 5)).contraction_m[:-1:5]
+        return float(np.max(np.abs(simulated - other['contraction']['contraction_m'][:-1])))
+    assert worst(found.rig) < 0.2 * worst(RIG)
