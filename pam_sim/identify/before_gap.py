@@ -20,8 +20,10 @@ from pam_sim.errors import InputError
 from pam_sim.gap.data.health import check_health, without_dead
 from pam_sim.identify.result import Identification
 from pam_sim.identify.workflow import identify
+from pam_sim.muscle.coefficients import PREFIX
 from pam_sim.rig import Rig
 from pam_sim.run import Run
+from pam_sim.tolerance import UNKNOWN
 
 
 def numbers_first(runs: Sequence[Run], rig: Rig, holds_certify: bool, seed: int = 0,
@@ -31,7 +33,8 @@ def numbers_first(runs: Sequence[Run], rig: Rig, holds_certify: bool, seed: int 
     Return (model, what was identified, remarks): the model with its unknown numbers found.
 
     What the recordings determine gets its value and how well it is known. What they leave open
-    stays unknown. A wrong load is thus no error of a sensor.
+    stays unknown. A wrong load is thus no error of a sensor. Coefficients of the force law are
+    left to the look itself: it fits them along with the effects.
 
     Parameters
     ----------
@@ -47,15 +50,18 @@ def numbers_first(runs: Sequence[Run], rig: Rig, holds_certify: bool, seed: int 
         Told the share that is done, 0 to 1.
 
     """
-    if not rig.unknown or not all(check_health(run, rig.valve).usable for run in runs):
+    law = [name for name in rig.unknown if name.startswith(PREFIX)]
+    others = [name for name in rig.unknown if name not in law]
+    if not others or not all(check_health(run, rig.valve).usable for run in runs):
         return rig, None, []
     try:
-        found = identify([without_dead(run) for run in runs], rig, seed=seed, progress=progress,
-                         spare_certify=holds_certify)
+        found = identify([without_dead(run) for run in runs],
+                         rig.with_(tolerance=dict.fromkeys(law, 0.0)), seed=seed,
+                         progress=progress, spare_certify=holds_certify)
     except InputError as error:
-        return rig, None, [f'The unknown numbers ({", ".join(rig.unknown)}) were not identified '
+        return rig, None, [f'The unknown numbers ({", ".join(others)}) were not identified '
                            f'first: {error}.']
-    return found.rig, found, []
+    return found.rig.with_(tolerance=dict.fromkeys(law, UNKNOWN)), found, []
 
 
 def numbers_block(found: Identification) -> dict[str, object]:

@@ -61,18 +61,20 @@ def possible_effects(rig: Rig, problems: Sequence[SubsystemProblem], numbers: Se
 
     Formulations of the same name, and what stands in the rig or among ``numbers``, are left out.
     So are sensors: they count as calibrated, unless their zero is asked for. An effect that acts
-    as an unknown number does is left to that number.
+    as an unknown number does is left to that number, and a static map to an unknown force law.
     """
     acts_as_unknown = {e.name for e, _ in counted_in(problems, numbers)}
     there = {e.name for e in rig.effects} | {n.effect for n in numbers if n.effect}
     unknown = {n.name for n in numbers if n.unknown}
     if 'spring_n_per_m' in unknown:
         there.add('parallel_spring')
+    free_law = any(n.of_law and n.unknown for n in numbers)
     found = []
     for effect in effects().values():
         if (effect.variant_of or effect.subsystem == 'sensor' or effect.name in there
                 or effect.name in NOT_GRADUAL or rig.valve not in effect.valves
                 or effect.name in acts_as_unknown
+                or free_law and effect.family == 'static_map'
                 or effect.fitting.same_as in unknown):
             continue
         sizes = [p for p in effect.parameters if p.name in effect.amplitude]

@@ -24,6 +24,7 @@ from pam_sim.errors import InputError
 from pam_sim.gap.data.commanded import commanded
 from pam_sim.gap.data.signals import UNIT
 from pam_sim.gap.subsystems.effects import subsystem_of_number
+from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.gap.verify.uncertainty import NORMAL_95
 from pam_sim.identify.advice import next_experiment, where_open
 from pam_sim.identify.fit import fit, NOWHERE, Weighted
@@ -41,6 +42,9 @@ from pam_sim.rig import Rig
 from pam_sim.run import Run
 from pam_sim.tolerance import AbsoluteSd, UNKNOWN
 
+# Without a force, both bend the way from pressure to contraction.
+LAW_AND_EFFECT = ('something is missing from the model, and without a recorded force it is not '
+                  'told from the force law')
 RETURNS = 4                  # to the fit, where a profile met a better solution
 
 
@@ -80,7 +84,8 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
     Raises
     ------
     InputError
-        Nothing is unknown, there is no such number, or a recording offers nothing.
+        Nothing is unknown, there is no such number, or a recording offers nothing. Only the
+        force law is unknown, while no force was recorded and an effect is missing.
 
     """
     runs = [runs] if isinstance(runs, Run) else list(runs)
@@ -106,6 +111,18 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
     x = fit(weighted, seed)
     progress(0.3)
     incomplete = is_incomplete(weighted, x)
+    law = [n.name for n in acting if n.of_law]
+    if law and incomplete and not any('force' in p.signals for p in problems):
+        if len(law) == len(wanted):
+            raise InputError(f'{LAW_AND_EFFECT}; record a force, or let pam gap fit both',
+                             'force law')
+        found = identify(runs, rig.with_(tolerance=dict.fromkeys(law, 0.0)),
+                         [name for name in unknown if name not in law], added_kg, seed, advise,
+                         progress, spare_certify)
+        found.rig = found.rig.with_(tolerance=dict.fromkeys(law, UNKNOWN))
+        found.remarks = [*remarks, *found.remarks, f'{", ".join(law)}: as in the model. '
+                         f'{LAW_AND_EFFECT}; pam gap fits both']
+        return found
     forms: FloatArray = np.zeros(len(acting))       # doubt by the formulation, in coordinates
     if incomplete:
         possible = possible_effects(rig, problems, numbers)
@@ -125,13 +142,14 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
                  for one, n, c, f in zip(intervals, acting, x, forms)]
     information = np.linalg.inv(covariance[:count, :count] + np.diag((forms / NORMAL_95) ** 2))
     statuses, combinations = judge(acting, intervals, x[:count], information)
-    found = [Found(n, n.value(float(c)), i, s)
-             for n, c, i, s in zip(acting, x, intervals, statuses)]
+    numbers_found = [Found(n, n.value(float(c)), i, s)
+                     for n, c, i, s in zip(acting, x, intervals, statuses)]
     result = Identification(
-        _identified(rig, found), found, combinations,
+        _identified(rig, numbers_found), numbers_found, combinations,
         [{'path': one.path, 'kind': one.kind, 'added_kg': one.added_kg} for one in offers],
         _signals(before, _rms(weighted, x)), incomplete)
-    result.remarks += remarks + _starting_values(weighted, x, acting)
+    result.remarks += remarks + _of_one_scale(problems, acting)
+    result.remarks += _starting_values(weighted, x, acting)
     result.remarks += [
         f'{name}: {effect.name} would look the same and counts in; a recorded force tells them '
         'apart' for effect, name in counted_in(problems, acting)]
@@ -165,6 +183,17 @@ def _profiles(weighted: Weighted, x: FloatArray, count: int, progress: Callable[
         else:
             break
     return x, covariance, intervals
+
+
+def _of_one_scale(problems: Sequence[SubsystemProblem], acting: Sequence[Number]) -> list[str]:
+    """Return a sentence where force law and load may grow together without a trace."""
+    if not any(n.of_law and n.unknown for n in acting) or any(
+            'force' in p.signals for p in problems):
+        return []
+    if not any(n.name == 'mass_kg' and n.unknown for n in acting):
+        return []
+    return ['force law and mass are unknown: a stronger muscle with a heavier load moves alike. '
+            'State the mass, or record a force']
 
 
 def _starting_values(weighted: Weighted, x: FloatArray, acting: Sequence[Number]) -> list[str]:

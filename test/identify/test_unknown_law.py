@@ -14,10 +14,18 @@
 
 """Unknown coefficients of the force law, from recordings of a muscle whose law is another one."""
 
+import math
+
 from made_records import inside, record, RIG
 import numpy as np
 from pam_sim import load_rig
+from pam_sim.errors import InputError
 from pam_sim.identify import identify
+from pam_sim.identify.before_gap import numbers_first
+from pam_sim.identify.numbers import unknown_numbers
+from pam_sim.identify.possible import possible_effects
+from pam_sim.identify.records import offer_of, problems_of
+import pytest
 
 ISOMETRIC = load_rig('dmsp_5_300_isometric').with_(parameters={'contraction_m': 0.02})
 
@@ -52,9 +60,48 @@ def test_a_muscle_that_moves_is_predicted_better_with_its_law_unknown():
                   for stairs in ((50e3, 250e3, 450e3, 550e3, 300e3, 100e3),
                                  (150e3, 350e3, 500e3, 200e3)))
     found = identify(run, RIG, ['law'], advise=False)
+    assert not any('State the mass' in remark for remark in found.remarks)
 
     def worst(rig):
         volts = other['valve_signal']['ppr_voltage']
         simulated = rig.simulate(np.repeat(volts, 5)).contraction_m[:-1:5]
         return float(np.max(np.abs(simulated - other['contraction']['contraction_m'][:-1])))
     assert worst(found.rig) < 0.2 * worst(RIG)
+
+
+def test_law_and_mass_without_a_force_are_said_to_grow_together():
+    run = record(RIG, gauge_pa=(50e3, 400e3, 100e3), hold_s=0.6, keep=('pressure', 'contraction'))
+    found = identify(run, RIG, ['law.a5_n_per_pa', 'mass_kg'], advise=False)
+    assert any('State the mass' in remark for remark in found.remarks)
+
+
+def test_a_static_map_is_no_possible_effect_beside_an_unknown_law():
+    run = record(RIG, gauge_pa=(50e3, 400e3), hold_s=0.8, keep=('pressure', 'contraction'))
+    for name, there in (('law.a3', False), ('mass_kg', True)):
+        problems = problems_of(RIG, [offer_of(run, RIG, 0.0)], False)
+        possible = possible_effects(RIG, problems, unknown_numbers(RIG, [name]))
+        names = {number.effect for number in possible}
+        assert ('end_taper' in names) is there and 'creep' in names
+
+
+def test_beside_a_missing_effect_the_law_is_left_to_the_look_for_it():
+    creeping = RIG.with_(effects=['creep', 'coulomb_friction'])
+    run = record(creeping, gauge_pa=(50e3, 400e3, 150e3), hold_s=1.5,
+                 keep=('pressure', 'contraction'))
+    found = identify(run, RIG, ['law.a3', 'spring_n_per_m'], advise=False)
+    assert [one.number.name for one in found.found] == ['spring_n_per_m']
+    assert 'law.a3' in found.rig.unknown
+    assert found.rig.number('law.a3') == RIG.number('law.a3')
+    assert any('law.a3: as in the model' in remark for remark in found.remarks)
+    with pytest.raises(InputError, match='record a force, or let pam gap fit both'):
+        identify(run, RIG, ['law.a3'], advise=False)
+
+
+def test_the_look_begins_with_all_unknown_numbers_but_the_law():
+    run = record(RIG.with_(parameters={'mass_kg': 1.3 * RIG.parameters['mass_kg']}),
+                 gauge_pa=(50e3, 400e3, 150e3), hold_s=2.0, keep=('pressure', 'contraction'))
+    rig = RIG.with_(tolerance={'mass_kg': math.inf, 'law.a3': math.inf})
+    better, found, remarks = numbers_first([run], rig, False)
+    assert not remarks and [one.number.name for one in found.found] == ['mass_kg']
+    assert better.unknown == ('law.a3',)
+    assert numbers_first([run], RIG.with_(tolerance={'law.a3': math.inf}), False)[1] is None
