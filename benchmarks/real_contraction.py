@@ -90,7 +90,7 @@ def fitted(run, ranges, target, part):
     return run(sizes), sizes
 
 
-def loop_table(rig, first, second, found=()):
+def loop_table(rig, first, second, found=None):
     """
     Print how models run from the measured pressure, fitted on one cycle and judged on the other.
 
@@ -100,8 +100,8 @@ def loop_table(rig, first, second, found=()):
         The model before.
     first, second : pam_sim.run.Run
         The two cycles.
-    found : sequence of pam_sim.Rig
-        What `pam gap` made of the first and of the second cycle.
+    found : dict of str -> sequence of pam_sim.Rig
+        Per way to ask: what `pam gap` made of the first and of the second cycle.
 
     """
     recordings = [Recording(one, 'ppr') for one in (first, second)]
@@ -112,10 +112,9 @@ def loop_table(rig, first, second, found=()):
         return [run_from_pressure(changed, one)['contraction'][::READING] for one in recordings]
 
     rows = {'before': [both({})] * 2}
-    if found:
-        rows['`pam gap`, nothing chosen by hand'] = [
-            [run_from_pressure(one, r)['contraction'][::READING] for r in recordings]
-            for one in found]
+    for name, models in (found or {}).items():
+        rows[name] = [[run_from_pressure(one, r)['contraction'][::READING] for r in recordings]
+                      for one in models]
     for name, ranges in LOOP_MODELS.items():
         rows[name] = []
         for k in (0, 1):

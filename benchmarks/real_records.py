@@ -42,7 +42,9 @@ from pam_sim.errors import InputError
 from pam_sim.gap import find_gap
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.subsystems.simulation import run_from_pressure
+from pam_sim.muscle.coefficients import leading
 from pam_sim.run import Run, Series
+from pam_sim.tolerance import UNKNOWN
 from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
 import real_alone
 import real_contraction
@@ -208,8 +210,12 @@ def show_contraction(args):
     zero, slope = calibrated(loop)
     rig, _ = model_of(loop, zero)
     cycles = [cycle(loop, k, zero, slope, seed=k) for k in (1, 2)]
-    found = [load_rig(find_gap(one, rig, other, MUSCLE_NAMES, args.seconds).model_yaml)
-             for one, other in (cycles, cycles[::-1])]
+    free_law = rig.with_(tolerance=dict.fromkeys(leading(rig.muscle.law), UNKNOWN))
+    found = {name: [
+        load_rig(find_gap(one, model, other, MUSCLE_NAMES, args.seconds).model_yaml)
+        for one, other in (cycles, cycles[::-1])] for name, model in (
+            ('`pam gap`, nothing chosen by hand', rig),
+            ('`pam gap`, force law unknown, nothing chosen by hand', free_law))}
     real_contraction.loop_table(rig, *cycles, found)
     real_contraction.chain_table(rig, np.clip(slope * steps['u_V'], 0.0, 6.0),
                                  1e5 * (zero + steps['p_bar']), 1e-3 * steps['s_mm'])
