@@ -38,6 +38,7 @@ from pam_sim.effects.registry import effects
 from pam_sim.joint import model_file as joint_file, parameters as joint
 from pam_sim.load import LOADS
 from pam_sim.muscle import muscle
+from pam_sim.muscle.coefficients import ALL, PREFIX
 from pam_sim.muscle.registry import laws
 from pam_sim.sensors import SENSOR_PARAMETERS, ZEROS
 from pam_sim.tolerance import SD_KEYS
@@ -102,6 +103,11 @@ def rig_page():
     parts += [
         'Zeros of the sensors:', parameters(ZEROS),
         '## `tolerance`', 'Where the tolerance of a number is a mapping:', keys(SD_KEYS),
+        f'Coefficients of the force law are exact, unless their tolerance is stated: `{ALL}` for '
+        'all on which the static force depends, or one of those of the law of the muscle:',
+        _table(('key', 'law', 'meaning'), [
+            (f'`{PREFIX}{p.name}`', f'`{law.NAME}`', plain(p.description))
+            for law in laws().values() for p in law.PARAMETERS]),
         '## `muscle`', 'Where `muscle` is a mapping:', keys(muscle.KEYS),
         parameters(muscle.DIMENSIONS),
         '## `law`', 'Where `law` is a mapping:', keys(muscle.LAW_KEYS),
