@@ -20,8 +20,8 @@ How often the intervals of `pam identify` hold the true numbers: rigs of an inde
 
 The hidden rig is the one of `test/hidden`: its air, friction, memory and creep have other
 formulations than the library. In each case one or two numbers differ from the rig file by up to
-half of the value: mass, spring, gain of the regulator, zero of pressure or contraction. Every
-second case hides an effect as well. The other numbers of the hidden rig are off within their
+half of the value. They are mass, spring, gain of the regulator, zero of pressure or contraction.
+Every second case hides an effect as well. The other numbers of the hidden rig are off within their
 tolerance.
 
 With --undetermined N as many cases follow that cannot determine a number. Examples are a load that

@@ -42,10 +42,10 @@ def coefficients(choice: LawChoice) -> tuple[Parameter, ...]:
     """
     Return the coefficients of a law, named ``law.NAME``; none of a table.
 
-    The default is the value in the set of the law. The bounds are those of an unknown coefficient:
-    within a factor of two of that value, or as far as the force changes by a tenth of the largest
-    one. They stay within those that the law declares. A value beyond them widens them to a factor
-    of two about itself.
+    The default is the value in the set of the law. The bounds are those of an unknown coefficient.
+    It is within a factor of two of that value, or as far as the force changes by a tenth of the
+    largest one. They stay within those that the law declares. A value beyond them widens them to
+    a factor of two about itself.
     """
     if choice.table is not None:
         return ()
