@@ -154,6 +154,11 @@ class Rig:
         """Coefficients of the force law as parameters ``law.NAME``; none of a table."""
         return coefficients(self.muscle.law)
 
+    @property
+    def number_list(self) -> tuple[Parameter, ...]:
+        """Parameters of the rig, then the coefficients of its force law."""
+        return (*self.parameter_list, *self.law_list)
+
     def number(self, name: str) -> float:
         """Return the value of a parameter of the rig or of a coefficient ``law.NAME``."""
         return (own_value(self.muscle.law, name) if name.startswith(PREFIX)
@@ -171,8 +176,7 @@ class Rig:
         That of an unknown one is half of its range, see :func:`pam_sim.tolerance.prior_sd`.
         A coefficient ``law.NAME`` is a parameter, too.
         """
-        among = self.law_list if name.startswith(PREFIX) else self.parameter_list
-        parameter = next(p for p in among if p.name == name)
+        parameter = next(p for p in self.number_list if p.name == name)
         return prior_sd(parameter, self.number(name), self.tolerance[name])
 
     @property

@@ -233,7 +233,7 @@ def _numbers(rig: 'Rig') -> dict[str, Any]:
 
 
 def _numbers_text(rig: 'Rig') -> list[str]:
-    lines = [f'  {p.name}: unknown, {p.allowed}' for p in (*rig.parameter_list, *rig.law_list)
+    lines = [f'  {p.name}: unknown, {p.allowed}' for p in rig.number_list
              if p.name in rig.unknown]
     return lines + [
         f'  {p.name}: {rig.number(p.name):g} ± {rig.prior_sd(p.name):.3g} {p.unit}'
@@ -244,6 +244,6 @@ def _inexact(rig: 'Rig') -> list[Any]:
     """Return the parameters of rig and valve that are neither unknown nor exact."""
     from pam_sim.valve import hsv, ppr
     other = {p.name for p in (hsv if rig.valve == 'ppr' else ppr).PARAMETERS}
-    return [p for p in (*rig.parameter_list, *rig.law_list) if p.name in rig.tolerance
+    return [p for p in rig.number_list if p.name in rig.tolerance
             and p.name not in rig.unknown and p.name not in other
             and rig.prior_sd(p.name) > 0.0]

@@ -45,7 +45,7 @@ from pam_sim import load_rig, preset_names
 from pam_sim.errors import InputError
 from pam_sim.files import check_folder, StrPath, whole_files, write_json, write_text
 from pam_sim.gap import find_gap
-from pam_sim.gap.data.commanded import commanded
+from pam_sim.gap.data.commanded import all_commanded, commanded
 from pam_sim.gap.data.health import check_health, dead_signals, recorded_valve
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.propose.proposal import EFFECT_FILE, MODEL_FILE
@@ -118,8 +118,7 @@ def gap_of(runs: 'Sequence[Run]', model: 'StrPath | Rig', certify: 'Run | None' 
         raise InputError('a gap look needs at least one recording')
     rig = model_for(runs[0], model)
     # Now, for a gain that is unknown is another one after its identification.
-    every, remarks = commanded([*runs, *([certify] if certify else [])], rig)
-    runs, certify = every[:len(runs)], every[-1] if certify else None
+    runs, certify, remarks = all_commanded(runs, certify, rig)
     began, told = time.perf_counter(), options.pop('progress', lambda done: None)
     share = NUMBERS_SHARE if rig.unknown else 0.0
     rig, found, sayings = numbers_first(runs, rig, certify is None, options.get('seed', 0),

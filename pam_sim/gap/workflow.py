@@ -18,7 +18,7 @@ from collections.abc import Callable, Sequence
 import time
 
 from pam_sim.gap.criteria import CRITERIA, Criteria
-from pam_sim.gap.data.commanded import commanded
+from pam_sim.gap.data.commanded import all_commanded
 from pam_sim.gap.data.health import check_health, without_dead
 from pam_sim.gap.data.overlap import check_apart
 from pam_sim.gap.data.recording import Recording
@@ -105,9 +105,9 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     if certify is not None:
         check_apart(runs, certify, criteria)
     driven = rig.load != 'hanging_mass'
-    every, told = commanded([*runs, *([certify] if certify else [])], rig)
-    runs, certify = every[:len(runs)], every[-1] if certify else None
-    health = [check_health(run, rig.valve, criteria, driven) for run in every]
+    runs, certify, told = all_commanded(runs, certify, rig)
+    health = [check_health(run, rig.valve, criteria, driven)
+              for run in [*runs, *([certify] if certify else [])]]
     refusals = list(dict.fromkeys(p for h in health for p in h.problems))
     remarks = told + list(dict.fromkeys(r for h in health for r in h.remarks))
     if refusals:

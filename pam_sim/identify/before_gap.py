@@ -19,11 +19,10 @@ from collections.abc import Callable, Sequence
 from pam_sim.errors import InputError
 from pam_sim.gap.data.health import check_health, without_dead
 from pam_sim.identify.result import Identification
-from pam_sim.identify.workflow import identify
+from pam_sim.identify.workflow import identify_beside
 from pam_sim.muscle.coefficients import PREFIX
 from pam_sim.rig import Rig
 from pam_sim.run import Run
-from pam_sim.tolerance import UNKNOWN
 
 
 def numbers_first(runs: Sequence[Run], rig: Rig, holds_certify: bool, seed: int = 0,
@@ -55,13 +54,12 @@ def numbers_first(runs: Sequence[Run], rig: Rig, holds_certify: bool, seed: int 
     if not others or not all(check_health(run, rig.valve).usable for run in runs):
         return rig, None, []
     try:
-        found = identify([without_dead(run) for run in runs],
-                         rig.with_(tolerance=dict.fromkeys(law, 0.0)), seed=seed,
-                         progress=progress, spare_certify=holds_certify)
+        found = identify_beside(law, [without_dead(run) for run in runs], rig, seed=seed,
+                                progress=progress, spare_certify=holds_certify)
     except InputError as error:
         return rig, None, [f'The unknown numbers ({", ".join(others)}) were not identified '
                            f'first: {error}.']
-    return found.rig.with_(tolerance=dict.fromkeys(law, UNKNOWN)), found, []
+    return found.rig, found, []
 
 
 def numbers_block(found: Identification) -> dict[str, object]:

@@ -23,7 +23,7 @@ from pam_sim.errors import did_you_mean, InputError
 from pam_sim.gap.data.noise import SMALLEST
 from pam_sim.gap.subsystems.effects import acts_on
 from pam_sim.gap.subsystems.problem import SubsystemProblem
-from pam_sim.muscle.coefficients import ALL, PREFIX, stated_names
+from pam_sim.muscle.coefficients import ALL, PREFIX
 from pam_sim.parameters import Parameter
 from pam_sim.rig import EffectSetting, Rig
 from pam_sim.sensors.zeros import ZEROS
@@ -172,8 +172,8 @@ def unknown_numbers(rig: Rig, names: Sequence[str] = ()) -> list[Number]:
     rig : pam_sim.Rig
         Its tolerances say what is unknown, its values where the search begins.
     names : sequence of str
-        A parameter of the rig, a coefficient ``law.NAME`` of its force law, ``law`` for all of
-        them on which the static force depends, or ``EFFECT.PARAMETER``.
+        A parameter of the rig, a coefficient ``law.NAME`` of its force law, or
+        ``EFFECT.PARAMETER``.
 
     Raises
     ------
@@ -181,10 +181,9 @@ def unknown_numbers(rig: Rig, names: Sequence[str] = ()) -> list[Number]:
         There is no such number.
 
     """
-    parameters = {p.name: p for p in (*rig.parameter_list, *rig.law_list)}
+    parameters = {p.name: p for p in rig.number_list}
     found: dict[str, Number] = {}
-    for name in (*rig.unknown, *(n for name in names for n in stated_names(
-            rig.muscle.law, name, 'unknown number'))):
+    for name in (*rig.unknown, *names):
         if name in parameters:
             p = parameters[name]
             value = rig.number(name)

@@ -24,7 +24,6 @@ from pam_sim.errors import InputError
 from pam_sim.gap.data.commanded import commanded
 from pam_sim.gap.data.signals import UNIT
 from pam_sim.gap.subsystems.effects import subsystem_of_number
-from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.gap.verify.uncertainty import NORMAL_95
 from pam_sim.identify.advice import next_experiment, where_open
 from pam_sim.identify.fit import fit, NOWHERE, Weighted
@@ -93,9 +92,8 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
         raise InputError(f'{len(added_kg)} masses for {len(runs)} recordings; give one for each, '
                          '0 for none', 'added mass')
     unknown = [n for name in unknown for n in stated_names(rig.muscle.law, name, 'unknown number')]
-    coefficients = [p.name for p in rig.law_list]
-    rig = rig.with_(tolerance={
-        name: UNKNOWN for name in unknown if name in rig.parameters or name in coefficients})
+    of_rig = {p.name for p in rig.number_list}
+    rig = rig.with_(tolerance={name: UNKNOWN for name in unknown if name in of_rig})
     wanted = unknown_numbers(rig, unknown)
     if not wanted:
         raise InputError('no number is unknown: state `unknown` in `tolerance`, or name numbers',
@@ -111,15 +109,16 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
     x = fit(weighted, seed)
     progress(0.3)
     incomplete = is_incomplete(weighted, x)
+    force_compared = any('force' in p.signals for p in problems)
     law = [n.name for n in acting if n.of_law]
-    if law and incomplete and not any('force' in p.signals for p in problems):
+    if law and incomplete and not force_compared:
         if len(law) == len(wanted):
             raise InputError(f'{LAW_AND_EFFECT}; record a force, or let pam gap fit both',
                              'force law')
-        found = identify(runs, rig.with_(tolerance=dict.fromkeys(law, 0.0)),
-                         [name for name in unknown if name not in law], added_kg, seed, advise,
-                         progress, spare_certify)
-        found.rig = found.rig.with_(tolerance=dict.fromkeys(law, UNKNOWN))
+        found = identify_beside(
+            law, runs, rig, unknown=[name for name in unknown if name not in law],
+            added_kg=added_kg, seed=seed, advise=advise, progress=progress,
+            spare_certify=spare_certify)
         found.remarks = [*remarks, *found.remarks, f'{", ".join(law)}: as in the model. '
                          f'{LAW_AND_EFFECT}; pam gap fits both']
         return found
@@ -148,7 +147,7 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
         _identified(rig, numbers_found), numbers_found, combinations,
         [{'path': one.path, 'kind': one.kind, 'added_kg': one.added_kg} for one in offers],
         _signals(before, _rms(weighted, x)), incomplete)
-    result.remarks += remarks + _of_one_scale(problems, acting)
+    result.remarks += remarks + ([] if force_compared else _of_one_scale(acting))
     result.remarks += _starting_values(weighted, x, acting)
     result.remarks += [
         f'{name}: {effect.name} would look the same and counts in; a recorded force tells them '
@@ -164,6 +163,14 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
             offers, with_force)
     progress(1.0)
     return result
+
+
+def identify_beside(law: Sequence[str], runs: Sequence[Run], rig: Rig, **options: Any
+                    ) -> Identification:
+    """Identify the other numbers with coefficients ``law`` as in the model; unknown they stay."""
+    found = identify(runs, rig.with_(tolerance=dict.fromkeys(law, 0.0)), **options)
+    found.rig = found.rig.with_(tolerance=dict.fromkeys(law, UNKNOWN))
+    return found
 
 
 def _profiles(weighted: Weighted, x: FloatArray, count: int, progress: Callable[[float], object]
@@ -185,12 +192,10 @@ def _profiles(weighted: Weighted, x: FloatArray, count: int, progress: Callable[
     return x, covariance, intervals
 
 
-def _of_one_scale(problems: Sequence[SubsystemProblem], acting: Sequence[Number]) -> list[str]:
+def _of_one_scale(acting: Sequence[Number]) -> list[str]:
     """Return a sentence where force law and load may grow together without a trace."""
-    if not any(n.of_law and n.unknown for n in acting) or any(
-            'force' in p.signals for p in problems):
-        return []
-    if not any(n.name == 'mass_kg' and n.unknown for n in acting):
+    unknown = [n for n in acting if n.unknown]
+    if not (any(n.of_law for n in unknown) and any(n.name == 'mass_kg' for n in unknown)):
         return []
     return ['force law and mass are unknown: a stronger muscle with a heavier load moves alike. '
             'State the mass, or record a force']

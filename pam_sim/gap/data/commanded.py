@@ -49,6 +49,13 @@ def commanded(runs: Sequence[Run], rig: Rig) -> tuple[list[Run], list[str]]:
     return found, [TAKEN.format(1e-3 * rig.parameters['K_m'])] if taken else []
 
 
+def all_commanded(runs: Sequence[Run], certify: Run | None, rig: Rig
+                  ) -> tuple[list[Run], Run | None, list[str]]:
+    """Return (runs, certify, remarks): the same for a question with or without a proof."""
+    every, remarks = commanded([*runs, *([certify] if certify is not None else [])], rig)
+    return every[:len(runs)], None if certify is None else every[-1], remarks
+
+
 def is_commanded(run: Run, valve: str) -> bool:
     """Return whether a pressure command is all that tells what a regulator was given."""
     return (valve == 'ppr' and 'valve_signal' not in run and COMMAND in run

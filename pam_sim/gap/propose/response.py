@@ -15,10 +15,11 @@
 """
 What a term of the valve does to its pressure, to first order, from one simulation of the model.
 
-A term pushes the pressure a little in every step, and of what is there some is lost: a regulator
-follows its set point, and the flow through an open valve falls as the pressure nears that of the
-other side. Along the simulated run both are known, so that the response to many terms costs no
-further simulation. It is near enough to tell which terms are worth one.
+A term changes the pressure a little in every step. In each further step the change decays. Behind
+a regulator it does because the pressure follows the set point. Through an open valve it does
+because the flow falls as the pressure nears that of the other side. A simulated run tells both, so
+the response to many terms costs no further simulation. It is near enough to tell which terms are
+worth one.
 """
 
 from collections.abc import Callable, Sequence
@@ -95,12 +96,10 @@ def follow(kept: FloatArray, pushed: FloatArray, change: FloatArray) -> None:
 def responses_of(estimator: Estimator, problem: SubsystemProblem, now: Fit
                  ) -> list[PressureResponse]:
     """Return the PressureResponse of each recording of the valve's problem at a fit."""
-    z = now.known_z[problem.subsystem]
-    numbers = {k.name: k.value + k.sd * float(v) for k, v in zip(problem.known, z)}
-    rig = estimator.with_effects(now.settings()).with_(
-        parameters={k.name: numbers[k.name] for k in problem.known if k.of_rig})
+    rig, numbers = problem.calibrated(
+        estimator.with_effects(now.settings()), now.known_z[problem.subsystem])
     found = []
-    for index, run in enumerate(problem.responses(rig, z)):
+    for index, run in enumerate(problem.responses(rig, numbers)):
         if rig.valve == 'ppr':
             found.append(_regulated(rig, run))
         else:

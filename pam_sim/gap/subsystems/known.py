@@ -53,9 +53,8 @@ def known_numbers(rig: Rig) -> list[Known]:
     """Return the numbers of a rig with a tolerance that act with its valve, as Known."""
     other = {p.name for p in (hsv if rig.valve == 'ppr' else ppr).PARAMETERS}
     found = []
-    of_law = (p for p in rig.law_list if p.name in rig.tolerance)
-    for p in (*rig.parameter_list, *of_law):
-        if p.name in other:
+    for p in rig.number_list:
+        if p.name in other or p.name not in rig.tolerance:
             continue
         value, sd = rig.number(p.name), rig.prior_sd(p.name)
         if sd > 0.0:

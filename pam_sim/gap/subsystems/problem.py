@@ -178,8 +178,7 @@ class SubsystemProblem:
             found.flags.writeable = False
             return found
 
-        with self._lock:
-            self.asked += len(self._index)
+        self._count()
         return self._kept_errors.get((self._key(rig), known_z.tobytes()), made, rig.muscle)
 
     def _key(self, rig: Rig) -> Hashable:
@@ -189,20 +188,26 @@ class SubsystemProblem:
 
     def values(self, rig: Rig, known_z: FloatArray) -> FloatArray:
         """Return the simulated values of all compared samples, shape (N,)."""
-        with self._lock:
-            self.asked += len(self._index)
+        self._count()
         return self._values(rig, known_z)
 
-    def responses(self, rig: Rig, known_z: FloatArray) -> list[Response]:
-        """Return the simulation of every recording; arguments as of ``errors``."""
-        with self._lock:
-            self.asked += len(self._index)
+    def calibrated(self, rig: Rig, known_z: FloatArray) -> tuple[Rig, dict[str, float]]:
+        """Return (model with its numbers replaced, all numbers); arguments as of ``errors``."""
         numbers = {k.name: k.value + k.sd * float(z) for k, z in zip(self.known, known_z)}
+        return rig.with_(
+            parameters={k.name: numbers[k.name] for k in self.known if k.of_rig}), numbers
+
+    def responses(self, rig: Rig, numbers: Mapping[str, float]) -> list[Response]:
+        """Return the simulation of every recording; arguments as ``calibrated`` returns them."""
+        self._count()
         return [self._run(rig, index, numbers) for index in range(len(self._index))]
 
+    def _count(self) -> None:
+        with self._lock:                     # several threads count at once
+            self.asked += len(self._index)
+
     def _values(self, rig: Rig, known_z: FloatArray) -> FloatArray:
-        numbers = {k.name: k.value + k.sd * float(z) for k, z in zip(self.known, known_z)}
-        rig = rig.with_(parameters={k.name: numbers[k.name] for k in self.known if k.of_rig})
+        rig, numbers = self.calibrated(rig, known_z)
         added = {of_reading(e.name): e for e in rig.effects if of_reading(e.name)}
         if len(added) == 1:                  # nothing else feels it
             rig = rig.with_(effects=[e for e in rig.effects if not of_reading(e.name)])
@@ -223,7 +228,7 @@ class SubsystemProblem:
         return np.concatenate(found)
 
     def _run(self, rig: Rig, index: int, numbers: Mapping[str, float]) -> Response:
-        with self._lock:                     # several threads count at once
+        with self._lock:
             self.simulations += 1
         return self._simulate(rig, index, numbers)
 
