@@ -35,7 +35,8 @@ from typing import Any, ParamSpec, Protocol, TypeGuard, TypeVar
 from numba import njit
 from numba.core.registry import CPUDispatcher
 import numpy as np
-from pam_sim import compile_notice
+from pam_sim import compile_notice, machine_code
+from pam_sim.machine_code import LINKED, stored
 
 P = ParamSpec('P')
 R = TypeVar('R')
@@ -86,7 +87,7 @@ class _Inner:
 
     def __init__(self, **options: bool) -> None:
         self._compile = njit(error_model='numpy', nogil=True, _nrt=False,
-                             no_cpython_wrapper=True, no_cfunc_wrapper=True, **options)
+                             no_cpython_wrapper=True, no_cfunc_wrapper=True, **LINKED, **options)
 
     def __call__(self, function: Callable[P, R], /) -> Compiled[P, R]:
         """Compile a function."""
@@ -96,14 +97,24 @@ class _Inner:
         return made
 
 
+class _EntryPoint:
+    """A compiler of functions that Python calls, their machine code stored on disk."""
+
+    def __init__(self, **options: bool) -> None:
+        self._compile = njit(error_model='numpy', nogil=True, no_cfunc_wrapper=True, **options)
+
+    def __call__(self, function: Callable[P, R], /) -> Compiled[P, R]:
+        """Compile a function."""
+        made: Compiled[P, R] = stored(self._compile(function))
+        return made
+
+
 _python_calls = njit(error_model='numpy', nogil=True, _nrt=False, no_cfunc_wrapper=True)
 compiled: Compiler = _Inner()
 inlined: Compiler = _Inner(forceinline=True)
-# Entry points, their machine code stored on disk; the second one may make arrays.
-entry_point: Compiler = njit(
-    cache=True, error_model='numpy', nogil=True, _nrt=False, no_cfunc_wrapper=True)
-allocating_entry_point: Compiler = njit(
-    cache=True, error_model='numpy', nogil=True, no_cfunc_wrapper=True)
+# The second one may make arrays.
+entry_point: Compiler = _EntryPoint(_nrt=False)
+allocating_entry_point: Compiler = _EntryPoint()
 
 
 def interpreted(function: Callable[P, R]) -> Callable[P, R]:
@@ -170,7 +181,7 @@ def sources(*parts: Callable[..., Any] | types.ModuleType) -> tuple[list[Path], 
 def source_key(*parts: Callable[..., Any] | types.ModuleType) -> int:
     """Return a number made of all that ``sources`` finds, for code stored on disk."""
     files, constants = sources(*parts)
-    digest = hashlib.sha256(Path(__file__).read_bytes())
+    digest = hashlib.sha256(Path(__file__).read_bytes() + Path(machine_code.__file__).read_bytes())
     for file in files:
         digest.update(file.name.encode() + file.read_bytes())
     digest.update('\n'.join(constants).encode())
