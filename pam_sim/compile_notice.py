@@ -67,7 +67,7 @@ def told_of_compilation(tell: Callable[[], object]) -> Iterator[None]:
 def tell_when_compiling(tell: Callable[[], object], after_s: float = AFTER_S) -> None:
     """Call ``tell`` once if this process compiles for longer than ``after_s`` seconds."""
     _asked.append((tell, after_s))
-    if 'pam_sim.compiled' in sys.modules:
+    if 'pam_sim.machine_code' in sys.modules:
         listen()
 
 

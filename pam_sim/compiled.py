@@ -18,6 +18,9 @@ How the small numerical functions of the package are compiled.
 numpy error model: a division by zero gives inf as in NumPy instead of a check
 on every division. No fastmath: compiled and interpreted results stay equal.
 
+numba is imported with the first use of a compiled function. A program that simulates nothing
+starts without it.
+
 Machine code is stored for entry points only. numba keeps it beside the file of the function and
 checks the age of that file only. An entry point built from functions of other files therefore
 takes their ``source_key`` as a constant. A changed source changes the key, and numba compiles
@@ -30,20 +33,15 @@ import hashlib
 import inspect
 from pathlib import Path
 import types
-from typing import Any, ParamSpec, Protocol, TypeGuard, TypeVar
+from typing import Any, Generic, ParamSpec, Protocol, TypeGuard, TypeVar
 
-from numba import njit
-from numba.core.registry import CPUDispatcher
 import numpy as np
-from pam_sim import compile_notice, machine_code
-from pam_sim.machine_code import LINKED, stored
 
 P = ParamSpec('P')
 R = TypeVar('R')
 R_co = TypeVar('R_co', covariant=True)
-
-
-compile_notice.listen()
+# Their texts belong to the key: they say what becomes of a function.
+_MAKERS = ('compiled.py', 'machine_code.py', 'record_parts.py')
 
 
 class Compiled(Protocol[P, R_co]):
@@ -64,57 +62,57 @@ class Compiler(Protocol):
         """Compile a function."""
 
 
-class _Within(CPUDispatcher):     # type: ignore[misc]  # numba has no annotations
-    """
-    A function for other compiled functions, without the code through which Python calls one.
+class _Deferred(Generic[P, R]):
+    """A function that numba gets to see when it is first used."""
 
-    That code is a third of all that is compiled. The first call from Python makes it.
-    """
+    def __init__(self, function: Callable[P, R], way: str, options: dict[str, bool]) -> None:
+        functools.update_wrapper(self, function)
+        self._function, self._way, self._options = function, way, options
 
-    def __call__(self, *args: object, **kwargs: object) -> object:
-        given = inspect.signature(self.py_func).bind(*args, **kwargs)
-        given.apply_defaults()
-        return self._called_from_python(*given.args)
+    @property
+    def py_func(self) -> Callable[P, R]:
+        """Return the function in Python."""
+        return self._function
 
     @functools.cached_property
-    def _called_from_python(self) -> Callable[..., object]:
-        within = self
-        return _python_calls(lambda *args: within(*args))
+    def dispatcher(self) -> Any:
+        """Return the function as numba has it; the Python function with the compiler off."""
+        from pam_sim import machine_code
+        return getattr(machine_code, self._way)(self._function, **self._options)
+
+    @property
+    def _numba_type_(self) -> Any:
+        """Return what numba looks for in the globals of a function it compiles."""
+        return self.dispatcher._numba_type_
+
+    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
+        """Call the machine code."""
+        result: R = self.dispatcher(*args, **kwargs)
+        return result
+
+    def __reduce__(self) -> Any:
+        """Return the name by which another process finds the function, or all that it needs."""
+        name = self._function.__qualname__
+        return self.dispatcher.__reduce__() if '<locals>' in name else name
 
 
-class _Inner:
-    """A compiler of functions for other compiled functions; Python may call them as well."""
+class _Compiler:
+    """A decorator for one way of compiling."""
 
-    def __init__(self, **options: bool) -> None:
-        self._compile = njit(error_model='numpy', nogil=True, _nrt=False,
-                             no_cpython_wrapper=True, no_cfunc_wrapper=True, **LINKED, **options)
+    def __init__(self, way: str, **options: bool) -> None:
+        self._way, self._options = way, options
 
     def __call__(self, function: Callable[P, R], /) -> Compiled[P, R]:
         """Compile a function."""
-        made = self._compile(function)
-        if isinstance(made, CPUDispatcher):     # the function itself with the compiler off
-            made.__class__ = _Within
-        return made
+        return _Deferred(function, self._way, self._options)
 
 
-class _EntryPoint:
-    """A compiler of functions that Python calls, their machine code stored on disk."""
-
-    def __init__(self, **options: bool) -> None:
-        self._compile = njit(error_model='numpy', nogil=True, no_cfunc_wrapper=True, **options)
-
-    def __call__(self, function: Callable[P, R], /) -> Compiled[P, R]:
-        """Compile a function."""
-        made: Compiled[P, R] = stored(self._compile(function))
-        return made
-
-
-_python_calls = njit(error_model='numpy', nogil=True, _nrt=False, no_cfunc_wrapper=True)
-compiled: Compiler = _Inner()
-inlined: Compiler = _Inner(forceinline=True)
-# The second one may make arrays.
-entry_point: Compiler = _EntryPoint(_nrt=False)
-allocating_entry_point: Compiler = _EntryPoint()
+# Functions for other compiled functions; Python may call them as well.
+compiled: Compiler = _Compiler('linked')
+inlined: Compiler = _Compiler('linked', forceinline=True)
+# Functions that Python calls, their machine code stored on disk; the second one may make arrays.
+entry_point: Compiler = _Compiler('kept', _nrt=False)
+allocating_entry_point: Compiler = _Compiler('kept')
 
 
 def interpreted(function: Callable[P, R]) -> Callable[P, R]:
@@ -181,7 +179,9 @@ def sources(*parts: Callable[..., Any] | types.ModuleType) -> tuple[list[Path], 
 def source_key(*parts: Callable[..., Any] | types.ModuleType) -> int:
     """Return a number made of all that ``sources`` finds, for code stored on disk."""
     files, constants = sources(*parts)
-    digest = hashlib.sha256(Path(__file__).read_bytes() + Path(machine_code.__file__).read_bytes())
+    digest = hashlib.sha256()
+    for maker in _MAKERS:
+        digest.update(Path(__file__).with_name(maker).read_bytes())
     for file in files:
         digest.update(file.name.encode() + file.read_bytes())
     digest.update('\n'.join(constants).encode())

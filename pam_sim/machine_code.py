@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Less work for numba: code it makes although nobody calls it, and modules it reads in vain.
+What numba does for the functions of this package, imported with the first one that is used.
 
 Two things that numba does for every function serve functions that Python calls, and are most of
 the time of small ones:
@@ -24,18 +24,22 @@ the time of small ones:
 - Before it loads stored code it reads all it needs to compile, SciPy's linear algebra included.
   ``StoredCode`` loads without that. numba still reads it before it compiles.
 
-Both use parts of numba that may change. With a version that nobody tried, ``LINKED`` is empty and
-``stored`` leaves everything to numba.
+Both use parts of numba that may change. With a version that nobody tried, numba does all of it.
 """
 
+from collections.abc import Callable
+import functools
+import inspect
 import re
 from typing import Any
 
 import numba
+from numba import njit
 from numba.core import caching, codegen, compiler
 from numba.core.compiler_machinery import FunctionPass, register_pass
-from numba.core.registry import CPUDispatcher
+from numba.core.registry import cpu_target, CPUDispatcher
 from numba.core.runtime import rtsys
+from pam_sim import compile_notice, record_parts  # noqa: F401  # numba learns what a part is
 
 # Versions of numba, the first and the first beyond: those between were tried.
 TRIED = ((0, 58), (0, 69))
@@ -119,10 +123,6 @@ class StoredCode(caching.FunctionCache):        # type: ignore[misc]  # numba ha
             return self._load_overload(sig, target_context)
 
 
-# Options of njit for functions that only other compiled functions call.
-LINKED: dict[str, Any] = {'pipeline_class': LinkedCompiler} if tried(numba.__version__) else {}
-
-
 def stored(dispatcher: Any) -> Any:
     """Return a function whose machine code is kept on disk beside its file, and loaded from it."""
     if isinstance(dispatcher, CPUDispatcher):       # the function itself with the compiler off
@@ -131,3 +131,51 @@ def stored(dispatcher: Any) -> Any:
         else:
             dispatcher.enable_caching()
     return dispatcher
+
+
+class _Within(CPUDispatcher):     # type: ignore[misc]  # numba has no annotations
+    """
+    A function for other compiled functions, without the code through which Python calls one.
+
+    That code is a third of all that is compiled. The first call from Python makes it.
+    """
+
+    def __call__(self, *args: object, **kwargs: object) -> object:
+        given = inspect.signature(self.py_func).bind(*args, **kwargs)
+        given.apply_defaults()
+        return self._called_from_python(*given.args)
+
+    @functools.cached_property
+    def _called_from_python(self) -> Callable[..., object]:
+        within = self
+        return entered(lambda *args: within(*args))
+
+
+_OPTIONS: dict[str, Any] = {'error_model': 'numpy', 'nogil': True, 'no_cfunc_wrapper': True}
+_LINKED = {'pipeline_class': LinkedCompiler} if tried(numba.__version__) else {}
+
+
+def linked(function: Callable[..., Any], **options: bool) -> Any:
+    """Compile a function for other compiled functions; Python may call it as well."""
+    made = njit(_nrt=False, no_cpython_wrapper=True, **_LINKED, **_OPTIONS, **options)(function)
+    if isinstance(made, CPUDispatcher):     # the function itself with the compiler off
+        made.__class__ = _Within
+    return made
+
+
+def entered(function: Callable[..., Any]) -> Any:
+    """Compile a function that Python calls, for this process."""
+    return njit(_nrt=False, **_OPTIONS)(function)
+
+
+def kept(function: Callable[..., Any], **options: bool) -> Any:
+    """Compile a function that Python calls, its machine code stored on disk."""
+    return stored(njit(**_OPTIONS, **options)(function))
+
+
+def ready() -> None:
+    """Prepare what loading of stored code needs, for processes that are copied."""
+    rtsys.initialize(cpu_target.target_context)
+
+
+compile_notice.listen()

@@ -28,9 +28,6 @@ import operator
 import types
 from typing import Any
 
-from numba import types as numba_types
-from numba.core import cgutils
-from numba.extending import lower_builtin, type_callable
 import numpy as np
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
@@ -230,6 +227,7 @@ def part(whole: Any, place: int, dtype: np.dtype[Any]) -> Any:
 
     For compiled code, where it is an address and checks nothing: a function with the first
     record of an array reaches what stands behind it. Interpreted code gets the same.
+    ``record_parts`` tells the compiler.
     """
     return fields(whole if isinstance(whole, np.ndarray) else _memory_from(whole), dtype, place)
 
@@ -242,34 +240,3 @@ def _memory_from(seen: Any) -> FloatArray:
     before = (seen.__array_interface__['data'][0] - owner.__array_interface__['data'][0])
     memory: FloatArray = owner.reshape(-1).view(np.float64)[before // _NUMBER:]
     return memory
-
-
-def _type_part(context: Any) -> Any:
-    def typed(whole: Any, place: Any, dtype: Any) -> Any:
-        if (isinstance(whole, (numba_types.Array, numba_types.Record))
-                and isinstance(place, numba_types.Integer)
-                and isinstance(dtype, numba_types.DType)):
-            return dtype.dtype
-        return None
-    return typed
-
-
-def _part_of_array(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-    data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
-    return _address(context, builder, signature, data, arguments[1])
-
-
-def _part_of_record(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-    return _address(context, builder, signature, arguments[0], arguments[1])
-
-
-type_callable(part)(_type_part)
-lower_builtin(part, numba_types.Array, numba_types.Integer, numba_types.DType)(_part_of_array)
-lower_builtin(part, numba_types.Record, numba_types.Integer, numba_types.DType)(_part_of_record)
-
-
-def _address(context: Any, builder: Any, signature: Any, begin: Any, place: Any) -> Any:
-    pointer = context.get_value_type(numba_types.CPointer(numba_types.float64))
-    numbers = builder.bitcast(begin, pointer)
-    found = cgutils.gep_inbounds(builder, numbers, place)
-    return builder.bitcast(found, context.get_value_type(signature.return_type))

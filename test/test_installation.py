@@ -249,7 +249,8 @@ def stored_functions():
             if '.nodes' in info.name:
                 continue
             for name, value in vars(importlib.import_module(info.name)).items():
-                file = getattr(getattr(value, '_cache', None), '_cache_file', None)
+                cache = getattr(getattr(value, 'dispatcher', None), '_cache', None)
+                file = getattr(cache, '_cache_file', None)
                 if file is not None and value.py_func.__module__ == info.name:
                     found[name] = Path(file._index_path)
     return found

@@ -16,16 +16,13 @@
 
 from typing import Any
 
-from numba import njit
 import numpy as np
 from pam_actuation.bags.record_walk import MESSAGE_BYTES, MESSAGE_OPCODE, RECORD_BYTES
 from pam_sim.annotations import ByteArray, IntArray
-from pam_sim.compiled import Compiler
-
-_compiled: Compiler = njit(cache=True, error_model='numpy', nogil=True)
+from pam_sim.compiled import entry_point
 
 
-@_compiled
+@entry_point
 def walk_many_messages(data: ByteArray, begin: int, positions: IntArray) -> tuple[int, int]:
     """Walk as ``record_walk.walk_messages`` does, with the same arguments and results."""
     position, count = begin, 0

@@ -192,8 +192,8 @@ def prepare(names: Sequence[str]) -> None:
                    *(f'{package}.{package}{TYPE_SUPPORT}' for package in MESSAGES)):
         with contextlib.suppress(ImportError):      # the node says so itself
             importlib.import_module(module)
-    from numba import njit
-    njit(lambda number: number + 1.0)(1.0)
+    from pam_sim import machine_code
+    machine_code.ready()
     # The first line that a node logs would look up the files of all modules.
     inspect.getframeinfo(sys._getframe())
     gc.freeze()

@@ -94,9 +94,9 @@ def test_every_stored_function_knows_its_sources():
     stored = 0
     for module in every_module():
         for name, function in vars(module).items():
-            if isinstance(getattr(function, '_cache', None), NullCache) \
-                    or isinstance(function, type) or not hasattr(function, 'py_func') \
-                    or function.py_func.__module__ != module.__name__:
+            if isinstance(function, type) or not hasattr(function, 'py_func') \
+                    or function.py_func.__module__ != module.__name__ \
+                    or isinstance(function.dispatcher._cache, NullCache):
                 continue
             stored += 1
             files, _ = sources(function)

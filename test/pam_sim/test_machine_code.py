@@ -16,6 +16,7 @@
 
 import os
 from pathlib import Path
+import pickle
 import subprocess
 import sys
 
@@ -52,7 +53,16 @@ if __name__ == '__main__':
         except ValueError as error:
             print(error)
     print('numba.cpython.cmathimpl' in sys.modules,
-          sum(solved.stats.cache_hits.values()))
+          sum(solved.dispatcher.stats.cache_hits.values()))
+"""
+USED = """
+import sys
+from pam_actuation.experiments import offline
+from pam_sim import load_rig
+rig = load_rig('dmsp_5_300_hanging_mass')
+print('numba' in sys.modules)
+rig.simulate([0.0, 0.0])
+print('numba' in sys.modules)
 """
 
 
@@ -78,12 +88,23 @@ def test_an_inner_function_is_in_no_machine_code_of_its_own():
         return np.full(3, _twice(number))
 
     assert _filled(1.5).tolist() == [3.0, 3.0, 3.0]
-    inner, = _twice.overloads.values()
+    inner, = _twice.dispatcher.overloads.values()
     assert type(inner.library) is LinkedLibrary
     assert inner.library.get_pointer_to_function(inner.fndesc.mangled_name) == 0
-    outer, = _filled.overloads.values()
+    outer, = _filled.dispatcher.overloads.values()
     assert outer.library.get_pointer_to_function(outer.fndesc.mangled_name) > 0
-    assert type(_filled._cache) is StoredCode
+    assert type(_filled.dispatcher._cache) is StoredCode
+
+
+def test_numba_is_imported_with_the_first_use():
+    done = subprocess.run(
+        [sys.executable, '-c', USED], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ['False', 'True']
+
+
+def test_a_compiled_function_goes_to_another_process_by_its_name():
+    from pam_sim.gap.propose.response import follow
+    assert pickle.loads(pickle.dumps(follow)) is follow
 
 
 def test_a_version_that_nobody_tried_is_left_to_itself(monkeypatch):
