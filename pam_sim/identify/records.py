@@ -20,6 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from pam_sim.errors import InputError
+from pam_sim.gap.data.health import missed_pulses
 from pam_sim.gap.data.noise import noise_sd, SMALLEST
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.signals import VALVE_FIELDS
@@ -114,7 +115,11 @@ def offer_of(run: Run, rig: Rig, added_kg: float = 0.0) -> Offer:
     held = rig.load != 'hanging_mass' or (force and _is_held(run, rig))
     isometric_m = rig.parameters.get('contraction_m') if rig.load == 'isometric' else None
     mechanics = (force and (contraction or isometric_m is not None)) if held else contraction
-    valve = command and (rig.valve == 'ppr' or contraction or isometric_m is not None)
+    missed = missed_pulses(run['valve_signal'].stamp_ns) if command and rig.valve == 'hsv' else ''
+    valve = command and not missed and (
+        rig.valve == 'ppr' or contraction or isometric_m is not None)
+    if missed and not mechanics:
+        raise InputError(missed, where)
     if not (valve or mechanics):
         needs = 'a `force`' if held else 'a `contraction`'
         raise InputError(f'has a pressure alone: {needs} tells of muscle and load, a '
@@ -127,7 +132,8 @@ def offer_of(run: Run, rig: Rig, added_kg: float = 0.0) -> Offer:
     kinds = [word for word, there in (
         ('valve', valve), ('muscle at a held length' if held else 'muscle and load', mechanics))
         if there]
-    return Offer(where, recording, valve, mechanics, ' and '.join(kinds), added_kg)
+    kind = ' and '.join(kinds) + (f'; the valve is left out: {missed}' if missed else '')
+    return Offer(where, recording, valve, mechanics, kind, added_kg)
 
 
 def with_quiet_pressure(recording: Recording) -> Recording:

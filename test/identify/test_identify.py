@@ -17,9 +17,11 @@
 import json
 
 from made_records import inside, record, RIG, spring
+import numpy as np
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.identify import identify
+from pam_sim.identify.records import offer_of
 from pam_sim.run import Run, Series
 import pytest
 
@@ -93,6 +95,22 @@ def test_a_valve_is_identified_from_command_and_pressure_alone():
     assert inside(found['K_m'], 117e3) and inside(found['T_m'], 0.11)
     assert inside(found['pressure_zero_pa'], -6e3)
     assert 'mass_kg' in found.remarks[0] and 'record a contraction' in found.remarks[0]
+
+
+def test_a_log_that_misses_pulses_of_on_off_valves_tells_nothing_of_the_valve():
+    rig = load_rig('dmsp_5_300_hanging_mass', valve='hsv')
+    run = record(RIG, hold_s=0.3)
+    sent = run.topics['valve_signal'].stamp_ns
+    duty = np.zeros(sent.size)
+    for every, heard in ((1, True), (10, False)):
+        run.topics['valve_signal'] = Series(sent[::every], {
+            'fill_duty': duty[::every], 'vent_duty': duty[::every]})
+        offer = offer_of(run, rig)
+        assert (offer.valve, offer.mechanics) == (heard, True)
+    assert 'muscle and load; the valve is left out: valve_signal comes at 20' in offer.kind
+    del run.topics['contraction']
+    with pytest.raises(InputError, match='bag: valve_signal comes at 20 Hz; .* every pulse'):
+        offer_of(run, rig)
 
 
 def test_the_muscle_alone_is_identified_at_a_held_length_without_a_command():

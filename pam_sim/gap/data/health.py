@@ -17,6 +17,7 @@
 from dataclasses import dataclass, field
 
 import numpy as np
+from pam_sim.annotations import IntArray
 from pam_sim.gap.criteria import CRITERIA, Criteria
 from pam_sim.gap.data.commanded import COMMAND
 from pam_sim.gap.data.signals import FIELD, READABLE, SIGNALS, VALVE_FIELDS
@@ -165,6 +166,17 @@ def _check_duration(run: Run, health: Health, criteria: Criteria) -> None:
             f'{criteria.min_duration_s:g} s are needed')
 
 
+def missed_pulses(stamp_ns: IntArray, criteria: Criteria = CRITERIA) -> str:
+    """Return why a signal of on/off valves with these stamps misses pulses, or ''."""
+    periods = np.diff(np.unique(stamp_ns)) * 1e-9
+    rate_hz = 1.0 / float(np.median(periods)) if periods.size else 0.0
+    if rate_hz >= criteria.min_pulse_rate_hz:
+        return ''
+    return (f'valve_signal comes at {rate_hz:.0f} Hz; of on/off valves every pulse counts, so at '
+            'least 100 Hz are needed: record each of its messages as it is sent (the other topics '
+            'may be slow)')
+
+
 def _check_stamps(run: Run, topic: str, health: Health, criteria: Criteria) -> None:
     stamps = np.sort(np.asarray(run.topics[topic].stamp_ns, dtype=np.int64))
     periods = np.diff(stamps) * 1e-9
@@ -177,11 +189,8 @@ def _check_stamps(run: Run, topic: str, health: Health, criteria: Criteria) -> N
     if rate_hz < criteria.min_rate_hz:
         health.problems.append(f'{topic} comes at {rate_hz:.3g} Hz; at least 10 Hz are needed')
     elif topic == 'valve_signal' and health.valve == 'hsv' and (
-            rate_hz < criteria.min_pulse_rate_hz):
-        health.problems.append(
-            f'{topic} comes at {rate_hz:.0f} Hz; of on/off valves every pulse counts, so at least '
-            '100 Hz are needed: record each of its messages as it is sent (the other topics may '
-            'be slow)')
+            missed := missed_pulses(stamps, criteria)):
+        health.problems.append(missed)
     holes = periods[periods > max(criteria.max_hole_s, HOLE_PERIODS / rate_hz)]
     lost = float(holes.sum() / periods.sum())
     if lost > criteria.max_lost_share:
