@@ -14,6 +14,7 @@ ARGS ?=
 BIN := $(VENV)/bin
 STAMP := $(VENV)/installed
 COMPILED := $(VENV)/compiled
+RARELY := plotly|sqlalchemy|debugpy|pip|setuptools|matplotlib|fontTools|mypy|mypyc
 SOURCES := $(shell find pam_actuation pam_sim -name '*.py')
 
 # Nothing of a run leaves this machine, and one thread per process is fastest here.
@@ -55,6 +56,7 @@ clean:
 	rm -rf $(VENV) build install log *.egg-info .pytest_cache
 
 # pip compiles one file after the other, tests of all packages as well; here all cores compile.
+# Large packages of which little is imported are left to the first import.
 # A name on the PATH proves nothing (version managers put stubs there), so each candidate is run.
 # One within the environment would be deleted with it, so the interpreter behind it is used.
 $(STAMP): setup.py pyproject.toml
@@ -77,7 +79,7 @@ $(STAMP): setup.py pyproject.toml
 	     --editable '.[ros,test]' \
 	|| { echo 'The installation failed. Without a network, point pip at a folder of wheels:' >&2; \
 	     echo '  PIP_NO_INDEX=1 PIP_FIND_LINKS=/path/to/wheels make env' >&2; exit 1; }; \
-	'$(BIN)/python' -m compileall -q -j 0 -x 'site-packages/.*/tests/' '$(VENV)/lib' >/dev/null 2>&1; \
+	'$(BIN)/python' -m compileall -q -j 0 -x 'site-packages/(.*/tests|$(RARELY))/' '$(VENV)/lib' >/dev/null 2>&1; \
 	touch '$@'
 
 # Machine code is kept by source file: after a change, or a pull, only what changed is compiled.

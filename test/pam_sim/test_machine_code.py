@@ -41,19 +41,18 @@ def checked(number):
     return np.sqrt(number)
 
 @allocating_entry_point
-def solved(matrix, right, number):
-    noise = np.random.normal() * 0.0
-    return np.linalg.solve(matrix, right) @ right + checked(number) + noise
+def summed(row, number):
+    return np.dot(row, row) + checked(number) + 0.0 * np.random.random()
 
 if __name__ == '__main__':
     print('scipy.linalg' in sys.modules)
     for number in (4.0, -1.0):
         try:
-            print(solved(np.eye(2), np.ones(2), number))
+            print(summed(np.ones(2), number))
         except ValueError as error:
             print(error)
     print('numba.cpython.cmathimpl' in sys.modules,
-          sum(solved.dispatcher.stats.cache_hits.values()))
+          sum(summed.dispatcher.stats.cache_hits.values()))
 """
 USED = """
 import sys
