@@ -83,6 +83,8 @@ def command_line():
                         help='time budget of `pam gap` for one case (default: %(default)g)')
     parser.add_argument('--minutes', type=float, default=float('inf'), metavar='N',
                         help='with --work: begin no case after N minutes; start again to go on')
+    parser.add_argument('--part', default='', metavar='WORD',
+                        help='with --write: the part of the page with this word')
     results_page.add_write(parser, 'everyday_recordings')
     return parser
 
@@ -90,7 +92,7 @@ def command_line():
 def main():
     """Examine; return the exit code."""
     args = command_line().parse_args()
-    results_page.check(args, __file__)
+    results_page.check(args, __file__, args.part)
     args.until = time.time() + 60.0 * args.minutes
     if args.work:
         args.work.mkdir(parents=True, exist_ok=True)
@@ -125,7 +127,7 @@ def examine(work, args):
         answer(case, work / case.name, args)
     answers = {case.name: read(work / case.name / 'answer.json') for case in cases}
     keys = truth_key.open_keys(work, answers, [case.name for case in cases])
-    with results_page.printed(args, __file__):
+    with results_page.printed(args, __file__, args.part):
         return show(cases, keys, answers, too_small)
 
 
