@@ -29,7 +29,7 @@ from pam_sim.gap.select import backward, rerank, size
 from pam_sim.gap.select.backward import eliminated, is_missed
 from pam_sim.gap.select.candidates import candidates
 from pam_sim.gap.select.comparison import preference
-from pam_sim.gap.select.plausibility import is_poor
+from pam_sim.gap.select.plausibility import is_poor, with_wrong_numbers
 from pam_sim.gap.select.rerank import ranked_again
 from pam_sim.gap.select.rival import NamedEffect, Rival
 from pam_sim.gap.select.rivals import best_of_each_name, containing
@@ -75,6 +75,28 @@ def test_a_fit_within_the_noise_goes_on_before_it_counts_as_behind(end, tied):
                   {'parallel_spring': end})
     assert case.names() == ['bladder_stiffness', 'parallel_spring'][:1 + tied]
     assert case.went_on == ['parallel_spring']
+
+
+@pytest.mark.parametrize('matters', [True, False])
+def test_a_number_far_from_its_prior_is_wrong_where_that_moves_a_signal(matters):
+    problem = Blocks(60)
+    problem.known = [k for k in known_numbers(nominal()) if k.name == 'damping_n_s_per_m']
+    base, near, free = (Fit(Hypothesis((), names), np.zeros(0), {'muscle': np.array([z])}, {
+        'muscle': np.zeros(problem.block.size)}, {}) for z, names in (
+            (3.2, ()), (2.0, ()), (4.6, ('damping_n_s_per_m',))))
+    boxes, asked = [], []
+    context = SimpleNamespace(
+        criteria=CRITERIA, seen_gap=CRITERIA.seen_gap, problems=[problem], base=base,
+        estimator=SimpleNamespace(fit=lambda *_: free, polish=lambda found: found,
+                                  base_within=lambda box: boxes.append(box) or near),
+        ranking=SimpleNamespace(shares=lambda found: {'muscle': 1.0}),
+        matters=lambda found, without: asked.append((found, without)) or matters)
+    found, named, _ = with_wrong_numbers(context, base, [], {})
+    assert [w.name for w in named] == ['damping_n_s_per_m'][:matters]
+    assert found is (free if matters else base) and boxes == [CRITERIA.likely_sd]
+    # The same model but for its numbers.
+    (with_it, without), = asked
+    assert with_it is free and without.known_z == near.known_z and not without.hypothesis.names
 
 
 @pytest.mark.parametrize('elsewhere, sure', [(True, True), (False, False)])

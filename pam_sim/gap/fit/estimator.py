@@ -183,6 +183,10 @@ class Estimator:
         own = self._own(box=box)
         return own.polish(own.fit(found.hypothesis, found.theta, found))
 
+    def base_within(self, box: float) -> Fit:
+        """Return the baseline with all numbers of the rig within ``box`` deviations."""
+        return self._own(box=box).fit_base()
+
     def cost(self, found: Fit) -> float:
         """Return the mean squared error over the fitted parts, all subsystems."""
         return sum(float(np.mean(found.errors[c.subsystem][np.isin(c.part, self.use)] ** 2))

@@ -15,6 +15,7 @@
 """Whether named effects explain enough, without parameters of the model far from their prior."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from pam_sim.gap.criteria import Criteria
@@ -99,9 +100,10 @@ def with_wrong_numbers(context: SearchContext, current: Fit, named: list[NamedEf
     Return the same with numbers named that hide a gap by themselves.
 
     A subsystem without a gap has none to explain; where that takes a number far from its
-    prior, the number is what is wrong.
+    prior, the number is what is wrong. Unless numbers near their priors move no signal by enough
+    for a name: then a small error of a sensor or a stamp may be what moved it.
     """
-    limit = context.criteria.certain_sd
+    limit, near = context.criteria.certain_sd, None
     for problem in context.problems:
         s = problem.subsystem
         if (any(w.subsystem == s for w in named)
@@ -114,6 +116,10 @@ def with_wrong_numbers(context: SearchContext, current: Fit, named: list[NamedEf
             free = context.estimator.polish(context.estimator.fit(
                 Hypothesis(h.effects, (*h.numbers, known.name)), current.theta, current))
             if abs(free.known_z[s][place]) > limit:
+                near = near or context.estimator.base_within(context.criteria.likely_sd)
+                held = replace(current, known_z={**current.known_z, s: near.known_z[s]})
+                if not context.matters(free, held):
+                    continue
                 rival = Rival(known.name, free, context.ranking.shares(free))
                 current, named = free, [*named, NamedEffect(
                     known.name, s, [rival], (known.name,), [rival])]
