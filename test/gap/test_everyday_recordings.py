@@ -24,7 +24,10 @@ from pam_sim.gap.data.given_motion import given_motion
 from pam_sim.gap.data.health import check_health
 from pam_sim.gap.data.pulses import openings, Pulses
 from pam_sim.gap.data.recording import Recording
+from pam_sim.gap.data.split import FIT
 from pam_sim.gap.subsystems.pulses_seen import shows_pulses
+from pam_sim.gap.subsystems.unseen import jump_shares
+from pam_sim.gap.subsystems.valve import ValveProblem
 from pam_sim.model_file import load_rig
 from pam_sim.run import Run, Series
 from pam_sim.units import P_ATM_PA
@@ -70,6 +73,27 @@ def test_a_slow_log_names_an_effect():
     result = find_gap(recorded(rig, voltages(12.0), rate_hz=50), nominal(),
                       effects=['bladder_stiffness', 'parallel_spring', 'coulomb_friction'])
     assert [effect['name'] for effect in result.effects] == ['bladder_stiffness'], result.reason
+
+
+def test_a_jump_between_two_messages_of_a_slow_log_leaves_no_gap_and_a_dead_time_does():
+    jumps = np.repeat(np.random.default_rng(2).uniform(2.5, 5.5, 20), 611)[:12000]
+    for dead_time_s, least, most in ((0.0, 0.3, 1.1), (0.03, 10.0, np.inf)):
+        rig = nominal().with_(effects=[
+            {'name': 'valve_dead_time', 'parameters': {'delay_s': dead_time_s}}])
+        run = recorded(rig, jumps, rate_hz=1000)
+        slow = Run({topic: Series(s.stamp_ns[::20], {f: v[::20] for f, v in s.values.items()})
+                    for topic, s in run.topics.items()})
+        valve = ValveProblem(nominal(), [Recording(slow, 'ppr')])
+        left = valve.errors(nominal(), np.zeros(len(valve.known)))
+        assert least < valve.chi2(left, FIT) < most
+        # Without what is known of jumps, their errors are far above the floor.
+        plain = (valve.values(nominal(), np.zeros(len(valve.known))) - valve.measured)
+        assert np.mean((plain / valve.floor['pressure']) ** 2) > 10.0
+
+
+def test_only_what_neighbours_do_not_foretell_is_a_jump():
+    even = np.concatenate([np.full(5, 2.0), 2.0 + 0.1 * np.arange(6), np.full(5, 4.0)])
+    assert np.flatnonzero(jump_shares(even) > 0.5).tolist() == [11]
 
 
 def test_of_a_regulator_the_commanded_pressure_is_the_input():

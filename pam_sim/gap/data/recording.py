@@ -147,6 +147,11 @@ class Recording:
         return self._valve[0][0]
 
     @property
+    def valve_values(self) -> FloatArray:
+        """Return the values of the valve signal, of on/off valves how far they fill."""
+        return self._valve[0][1]
+
+    @property
     def messages(self) -> int:
         """Return the number of valve messages."""
         return self._valve[0][0].size if self._valve else 0

@@ -223,9 +223,11 @@ def _simulated(estimator: Estimator, problem: SubsystemProblem, now: Fit, stand_
                        1.0 - float(rest @ rest) / float(left @ left))
 
     if stand_in.subsystem == 'valve':
+        rig = estimator.with_effects(now.settings())
         library_terms = worth_a_run(
             library_terms, [one.symbol for one in stand_in.inputs], problem,
-            responses_of(estimator, problem, now), free, left)
+            responses_of(estimator, problem, now),
+            lambda change: free(problem.whitened(change, rig)), left)
     return [p for p in parallel_map(promise, library_terms) if p is not None]
 
 

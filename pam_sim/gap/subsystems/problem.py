@@ -174,12 +174,20 @@ class SubsystemProblem:
 
         """
         def made() -> FloatArray:
-            found = (self._values(rig, known_z) - self.measured) / self._scale
+            found = self.whitened((self._values(rig, known_z) - self.measured) / self._scale, rig)
             found.flags.writeable = False
             return found
 
         self._count()
         return self._kept_errors.get((self._key(rig), known_z.tobytes()), made, rig.muscle)
+
+    def whitened(self, errors: FloatArray, rig: Rig) -> FloatArray:
+        """
+        Return errors in noise floors, shape (N,), less what noise with a memory foretells.
+
+        For those of a model, or for differences of them.
+        """
+        return errors
 
     def _key(self, rig: Rig) -> Hashable:
         """Return what tells a rig from others that differ here; its muscle is held meanwhile."""

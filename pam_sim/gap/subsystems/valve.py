@@ -19,14 +19,17 @@ from functools import lru_cache
 
 import numpy as np
 from pam_sim.annotations import FloatArray
+from pam_sim.effects.registry import get_effect
 from pam_sim.gap.criteria import CRITERIA, Criteria
 from pam_sim.gap.data.noise import noise_sd, SMALLEST
 from pam_sim.gap.data.recording import Recording, smoothed
 from pam_sim.gap.subsystems.effects import acts_on, true_value
-from pam_sim.gap.subsystems.known import Known, known_numbers, latency, of_run
+from pam_sim.gap.subsystems.known import (
+    Known, known_numbers, latency, LATENCY_MAX_S, of_run)
 from pam_sim.gap.subsystems.problem import KEPT, SubsystemProblem
 from pam_sim.gap.subsystems.pulses import on_openings, pulses_of
 from pam_sim.gap.subsystems.simulation import simulate_driven
+from pam_sim.gap.subsystems.unseen import UnseenJumps
 from pam_sim.response import Response
 from pam_sim.rig import Rig
 from pam_sim.valve import hsv, ppr
@@ -45,7 +48,11 @@ class ValveProblem(SubsystemProblem):
         self._signal = lru_cache(maxsize=KEPT)(
             lambda index, late_s, pulses: recordings[index].valve_signal(late_s, None, pulses))
         self._motion = [smoothed(r, 'contraction') for r in recordings]
+        self._jumps: dict[int, UnseenJumps] = {}
+        self._stamps_only, self._given_s = False, delay_and_lag_s(rig)
         super().__init__(rig, recordings, holds_certify, seed, criteria)
+        self._jumps = {index: self._jumps_of(rig, index)
+                       for index, r in enumerate(recordings) if r.unseen_s > 0.0}
 
     @staticmethod
     def outputs(recording: Recording) -> tuple[str, ...]:
@@ -68,10 +75,47 @@ class ValveProblem(SubsystemProblem):
                                    -START_MAX_SD * sd, START_MAX_SD * sd, False))
         return found
 
+    def _floors(self, rig: Rig, seed: int) -> dict[str, float]:
+        self._stamps_only = True
+        floor = super()._floors(rig, seed)
+        self._stamps_only = False
+        return floor
+
+    def _jumps_of(self, rig: Rig, index: int) -> UnseenJumps:
+        """Return what unseen instants of jumps in a recording do to the pressure."""
+        recording, floor_pa = self.recordings[index], self.floor['pressure']
+        rig, numbers = self.calibrated(rig, np.zeros(len(self.known)))
+        numbers[of_run('latency', index)] = -self._given_s[0]
+
+        def simulated(shift_s: FloatArray | None) -> FloatArray:
+            self._shift_s = None if shift_s is None else [shift_s] * len(self.recordings)
+            found = self._run(rig, index, numbers)
+            self._shift_s = None
+            return found.pressure_pa / floor_pa
+
+        return UnseenJumps(
+            recording.valve_stamps_s, recording.valve_values, -recording.unseen_s, LATENCY_MAX_S,
+            self.time_s[self.run == index], simulated)
+
+    def whitened(self, errors: FloatArray, rig: Rig) -> FloatArray:
+        """Return errors in noise floors, less what those before foretell behind unseen jumps."""
+        if not self._jumps:
+            return errors
+        found, late = errors.copy(), delay_and_lag_s(rig)
+        more = [max(s - given_s, 0.0) for s, given_s in zip(late, self._given_s)]
+        for index, jumps in self._jumps.items():
+            mine = self.run == index
+            found[mine] = jumps.whitened(errors[mine], *more)
+        return found
+
     def _disturb(self, random: np.random.Generator | None) -> None:
-        self._shift_s = None if random is None else [
-            r.stamp_sd_s(self._stamp_sd_s) * random.standard_normal(r.messages)
-            for r in self.recordings]
+        if random is None:
+            self._shift_s = None
+            return
+        own_s = self._stamp_sd_s
+        self._shift_s = [
+            (own_s if self._stamps_only else r.stamp_sd_s(own_s))
+            * random.standard_normal(r.messages) for r in self.recordings]
 
     def _simulate(self, rig: Rig, index: int, numbers: Mapping[str, float]) -> Response:
         recording = self.recordings[index]
@@ -85,3 +129,12 @@ class ValveProblem(SubsystemProblem):
             self._signal(index, late_s, pulses) if shift is None else
             recording.valve_signal(late_s, shift, pulses),
             true_value('pressure', rig, p, 0.0))
+
+
+def delay_and_lag_s(rig: Rig) -> tuple[float, float]:
+    """Return by how much effects delay a command as it is, and by how much they smooth it [s]."""
+    found = [e.parameters for e in rig.effects if acts_on(e.name, 'valve') and (
+        get_effect(e.name).family == 'transport'
+        or get_effect(e.name).fitting.sensor_change == 'lag')]
+    return (sum(p.get('delay_s', 0.0) for p in found),
+            sum(p.get('time_constant_s', 0.0) for p in found))
