@@ -216,13 +216,30 @@ def test_beside_another_effect_the_better_of_two_sensor_causes_takes_the_place(
 def test_a_number_and_the_effect_that_is_another_name_of_it_are_one(
         monkeypatch, effect, number):
     given = SimpleNamespace(
-        problems=['muscle'], estimator=None, matters=lambda current, without: True)
+        problems=[SimpleNamespace(is_dealt_short=False)], estimator=None,
+        matters=lambda current, without: True)
     monkeypatch.setattr(backward, 'is_missed', lambda *judged: True)
     monkeypatch.setattr(
         backward, 'fit_without', lambda estimator, current, name: (*current, name))
     named = [NamedEffect(n, 'muscle', [], (n,)) for n in (number, 'creep', effect)]
     assert eliminated(given, (), named) == ((number,), named[1:])
     assert eliminated(given, (), named[:2]) == ((), named[:2])
+
+
+@pytest.mark.parametrize('short, left', [(True, 'creep'), (False, 'hysteresis')])
+def test_of_what_a_short_record_does_not_miss_the_one_that_costs_least_goes(
+        monkeypatch, short, left):
+    share = {('creep', 'hysteresis'): 0.99, ('creep',): 0.976, ('hysteresis',): 0.938}
+    given = SimpleNamespace(
+        problems=[SimpleNamespace(is_dealt_short=short)], estimator=None,
+        matters=lambda current, without: True, ranking=SimpleNamespace(shares=None),
+        explained=lambda fit: {'muscle': share[fit]})
+    monkeypatch.setattr(backward, 'is_missed', lambda *judged: False)
+    monkeypatch.setattr(backward, 'fit_without', lambda estimator, current, name: tuple(
+        n for n in current if n != name))
+    named = [NamedEffect(n, 'muscle', [], (n,)) for n in ('creep', 'hysteresis')]
+    found, kept = eliminated(given, ('creep', 'hysteresis'), named)
+    assert found == (left,) and [w.name for w in kept] == [left]
 
 
 def test_an_effect_that_gave_way_to_its_limit_is_tried_beside_it():

@@ -86,17 +86,49 @@ def eliminated(context: SearchContext, current: Fit, named: list[NamedEffect]
     for w in [w for w in named if w.name in {same_as(o.name) for o in named}]:
         current = fit_without(context.estimator, current, w.name)
         named = [o for o in named if o is not w]
+    if any(p.is_dealt_short for p in context.problems):
+        return _eliminated_by_loss(context, current, named)
     for w in list(named):
         if len(named) < 2:
             break
         if w not in named:
             continue
         without = fit_without(context.estimator, current, w.name)
-        missed = any(is_missed(context, p, current, without) for p in context.problems)
-        if not missed or not context.matters(current, without):
+        if not _is_needed(context, current, without):
             w, without = _simpler(context, current, w, without, named)
             current, named = without, [o for o in named if o is not w]
     return current, named
+
+
+def _eliminated_by_loss(context: SearchContext, current: Fit, named: list[NamedEffect]
+                        ) -> tuple[Fit, list[NamedEffect]]:
+    """
+    Drop what is not missed, each time the one whose absence costs least.
+
+    Where few blocks judge, the test may miss none of two effects that stand for each other in
+    part. In the order of their selection the better one would go.
+    """
+    while len(named) > 1:
+        tried = [(w, fit_without(context.estimator, current, w.name)) for w in named]
+        idle = [(w, f) for w, f in tried if not _is_needed(context, current, f)]
+        if not idle:
+            break
+        w, without = min(idle, key=lambda one: _loss(context, current, one[1]))
+        w, current = _simpler(context, current, w, without, named)
+        named = [o for o in named if o is not w]
+    return current, named
+
+
+def _loss(context: SearchContext, current: Fit, without: Fit) -> float:
+    """Return by how much the shares of the gaps fall without an effect, the largest fall."""
+    now, then = context.explained(current), context.explained(without)
+    return max((now[s] - then[s] for s in now), default=0.0)
+
+
+def _is_needed(context: SearchContext, current: Fit, without: Fit) -> bool:
+    """Return whether some subsystem is explained worse without an effect, and by enough."""
+    return (any(is_missed(context, p, current, without) for p in context.problems)
+            and context.matters(current, without))
 
 
 def is_missed(context: SearchContext, problem: SubsystemProblem, current: Fit, without: Fit
