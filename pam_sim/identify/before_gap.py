@@ -19,10 +19,12 @@ from collections.abc import Callable, Sequence
 from pam_sim.errors import InputError
 from pam_sim.gap.data.health import check_health, without_dead
 from pam_sim.identify.result import Identification
+from pam_sim.identify.settled import ZERO
 from pam_sim.identify.workflow import identify_beside
 from pam_sim.muscle.coefficients import PREFIX
 from pam_sim.rig import Rig
 from pam_sim.run import Run
+from pam_sim.tolerance import UNKNOWN
 
 
 def numbers_first(runs: Sequence[Run], rig: Rig, holds_certify: bool, seed: int = 0,
@@ -59,7 +61,22 @@ def numbers_first(runs: Sequence[Run], rig: Rig, holds_certify: bool, seed: int 
     except InputError as error:
         return rig, None, [f'The unknown numbers ({", ".join(others)}) were not identified '
                            f'first: {error}.']
-    return found.rig, found, []
+    return left_open(rig, found), found, []
+
+
+def left_open(given: Rig, found: Identification) -> Rig:
+    """
+    Return the identified rig for the look: starting values stay unknown, as they were given.
+
+    What is missing has bent them, and an interval about a bent value would forbid the true one.
+    The zero of the pressure sensor acts in valve and muscle alike, so none of them moves it.
+    """
+    names = [name for name in found.starting if name in given.unknown and name != ZERO]
+    rig = found.rig.with_(parameters={name: given.number(name) for name in names},
+                          tolerance=dict.fromkeys(names, UNKNOWN))
+    if ZERO in given.unknown and ZERO in found.starting:
+        rig = rig.with_(parameters={ZERO: found[ZERO].value}, tolerance={ZERO: 0.0})
+    return rig
 
 
 def numbers_block(found: Identification) -> dict[str, object]:

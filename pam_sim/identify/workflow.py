@@ -24,6 +24,7 @@ from pam_sim.errors import InputError
 from pam_sim.gap.data.commanded import commanded
 from pam_sim.gap.data.signals import UNIT
 from pam_sim.gap.subsystems.effects import subsystem_of_number
+from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.gap.verify.uncertainty import NORMAL_95
 from pam_sim.identify.advice import next_experiment, where_open
 from pam_sim.identify.fit import fit, NOWHERE, Weighted
@@ -36,6 +37,7 @@ from pam_sim.identify.profile import Interval, profile
 from pam_sim.identify.records import offer_of, problems_of
 from pam_sim.identify.result import Found, half_width, Identification
 from pam_sim.identify.secant import settle, solve_from
+from pam_sim.identify.settled import with_settled_zero
 from pam_sim.muscle.coefficients import stated_names
 from pam_sim.rig import Rig
 from pam_sim.run import Run
@@ -143,12 +145,18 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
     statuses, combinations = judge(acting, intervals, x[:count], information)
     numbers_found = [Found(n, n.value(float(c)), i, s)
                      for n, c, i, s in zip(acting, x, intervals, statuses)]
+    left = [(p, name, square) for p, name, square in weighted.mean_squares(x)
+            if square > SEEN_FLOORS2]
+    numbers_found, at_rest = with_settled_zero(rig, [p for p, _, _ in left], numbers_found)
+    starting = [n.name for n in acting if any(n.acts_in(p) for p, _, _ in left)]
     result = Identification(
         _identified(rig, numbers_found), numbers_found, combinations,
         [{'path': one.path, 'kind': one.kind, 'added_kg': one.added_kg} for one in offers],
-        _signals(before, _rms(weighted, x)), incomplete)
+        _signals(before, _rms(weighted, x)), incomplete, starting=starting)
     result.remarks += remarks + ([] if force_compared else _of_one_scale(acting))
-    result.remarks += _starting_values(weighted, x, acting)
+    result.remarks += _starting_values(left, [name for name in starting if name not in at_rest])
+    result.remarks += [f'{name}: from the holds, where the regulator has settled; no effect of '
+                       'the library explains its edges' for name in at_rest]
     result.remarks += [
         f'{name}: {effect.name} would look the same and counts in; a recorded force tells them '
         'apart' for effect, name in counted_in(problems, acting)]
@@ -201,11 +209,9 @@ def _of_one_scale(acting: Sequence[Number]) -> list[str]:
             'State the mass, or record a force']
 
 
-def _starting_values(weighted: Weighted, x: FloatArray, acting: Sequence[Number]) -> list[str]:
+def _starting_values(left: Sequence[tuple[SubsystemProblem, str, float]], names: Sequence[str]
+                     ) -> list[str]:
     """Return a sentence on the numbers whose signals are not explained even with effects."""
-    left = [(p, name, square) for p, name, square in weighted.mean_squares(x)
-            if square > SEEN_FLOORS2]
-    names = [n.name for n in acting if any(n.acts_in(p) for p, _, _ in left)]
     if not names:
         return []
     rests = ' and '.join(f'{name} {math.sqrt(square):.1f} noise floors (rms)'

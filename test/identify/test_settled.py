@@ -1,0 +1,70 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The zero of the pressure sensor where the edges of a regulator are not those of the model."""
+
+from made_records import inside, record, RIG
+import numpy as np
+from pam_sim.identify.before_gap import left_open, numbers_first
+from pam_sim.identify.records import offer_of, problems_of
+from pam_sim.identify.settled import settled_zero
+from pam_sim.tolerance import UNKNOWN
+import pytest
+
+ZERO_PA = -20e3
+LEVELS_PA = 0.0, 240e3, 120e3
+GIVEN = RIG.with_(parameters={'mass_kg': 1.5}, tolerance={'pressure_zero_pa': UNKNOWN, 'T_m': 0.5})
+
+
+@pytest.fixture(scope='module')
+def steps():
+    """Return what is read behind a regulator that is late, slow, and closes its vent early."""
+    rig = GIVEN.with_(parameters={'T_m': 0.03}, effects=[
+        {'name': 'valve_dead_time_by_direction', 'parameters': {
+            'delay_s': 0.09, 'vent_later_s': -0.03}},
+        {'name': 'flow_limit', 'parameters': {
+            'fill_rate_at_400kpa_pa_per_s': 5.5e5, 'vent_rate_at_400kpa_pa_per_s': 6.0e5}},
+        {'name': 'vent_bleed', 'parameters': {
+            'closing_pressure_pa': 15e3, 'bleed_rate_pa_per_s': 8e3}}])
+    return record(rig, LEVELS_PA, 2.5, ('pressure', 'contraction'), zero_pa=ZERO_PA)
+
+
+def test_holds_tell_the_zero(steps):
+    (valve, _) = problems_of(GIVEN, [offer_of(steps, GIVEN)])
+    zero, interval = settled_zero(GIVEN, valve)
+    assert interval.low < ZERO_PA < interval.high and abs(zero - ZERO_PA) < 4e3
+    assert interval.high - interval.low < 20e3
+    # Without the gain there is less to go by.
+    _, wider = settled_zero(GIVEN.with_(tolerance={'K_m': UNKNOWN}), valve)
+    assert wider.high - wider.low > interval.high - interval.low
+    # The regulator's own zero looks the same.
+    assert settled_zero(GIVEN.with_(tolerance={'ppr_zero_pa': UNKNOWN}), valve) is None
+    moving = record(RIG, voltage=1.0 + np.sin(np.arange(4000) / 300.0))
+    (valve, _) = problems_of(GIVEN, [offer_of(moving, GIVEN)])
+    assert settled_zero(GIVEN, valve) is None
+
+
+def test_numbers_bent_by_what_no_effect_explains_stay_open_for_the_look(steps):
+    first, found, remarks = numbers_first([steps], GIVEN, False)
+    assert inside(found['pressure_zero_pa'], ZERO_PA) and not remarks
+    assert any('where the regulator has settled' in remark for remark in found.remarks)
+    # The muscle alone would move it away from what the valve says.
+    assert first.tolerance['pressure_zero_pa'] == 0.0
+    assert first.number('pressure_zero_pa') == found['pressure_zero_pa'].value
+    open_ = GIVEN.with_(parameters={'mass_kg': 4.0}, tolerance={'mass_kg': UNKNOWN})
+    found.starting.append('mass_kg')
+    found.rig = found.rig.with_(parameters={'mass_kg': 7.0}, tolerance={'mass_kg': 0.01})
+    left = left_open(open_, found)
+    assert left.number('mass_kg') == 4.0 and left.unknown == ('mass_kg',)
