@@ -27,6 +27,7 @@ from pam_sim.tolerance import AbsoluteSd, Tolerance
 from pam_sim.valve.regulator_presets import get_regulator
 
 BY_BORE_TOLERANCE = 0.2      # of a force map taken from a muscle of another bore
+LAG_TOLERANCE = 0.5          # of the lag of a regulator that nobody stated
 REGULATOR_NUMBERS = ('K_m', 'ppr_lowest_v', 'ppr_highest_v', 'ppr_zero_pa')
 
 
@@ -152,6 +153,9 @@ class Description:
             unsure = AbsoluteSd(abs(low_pa)) if (
                 self.regulator and name == 'ppr_zero_pa' and low_pa != 0.0) else None
             self._add(name, value, unsure, source)
+        if 'T_m' not in self.numbers:
+            self._add('T_m', nominal['T_m'], LAG_TOLERANCE,
+                      'not stated: that of the nominal regulator, yours may differ by half')
 
     def _add(self, name: str, value: float, tolerance: Tolerance | None, note: str) -> None:
         """Add a number that follows from others; how well it is known may be said beside it."""
