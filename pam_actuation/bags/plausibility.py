@@ -271,10 +271,12 @@ def _pressure(finite: FloatArray, low: float, high: float, length_m: Length) -> 
         return (
             f'mostly below atmospheric pressure (median {1e-3 * usual:.1f} kPa): is it gauge '
             'pressure? Add 101325 Pa then; the topic is absolute, in Pa.'), True
-    hint = (' They are likely gauge pressure: add 101325 Pa.'
-            if abs(float(np.quantile(finite, 0.01))) < ATMOSPHERE_MARGIN_PA else '')
+    is_gauge = abs(float(np.quantile(finite, 0.01))) < ATMOSPHERE_MARGIN_PA
+    hint = ('They are likely gauge pressure: add 101325 Pa.' if is_gauge else
+            'If the muscle was vented then, the sensor has a zero: state '
+            '`pressure_zero_pa: unknown` in the rig file.')
     return (f'{below} values below atmospheric pressure, down to {gauge_kpa(low):.1f} kPa '
-            f'gauge.{hint}'), bool(hint)
+            f'gauge. {hint}'), is_gauge
 
 
 def _supply(finite: FloatArray, low: float, high: float, length_m: Length) -> tuple[str, bool]:
