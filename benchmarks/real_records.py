@@ -19,6 +19,7 @@
     python benchmarks/real_records.py FOLDER --pressure --write    # the table of the valve alone
     python benchmarks/real_records.py FOLDER --contraction --write # contraction and black boxes
     python benchmarks/real_records.py FOLDER --alone --write       # steps: `pam gap`, black boxes
+    python benchmarks/real_records.py FOLDER --csv OUT             # the cycles, for `pam import`
 
 FOLDER holds ``steps_100hz.csv`` and ``quasi_static_loop.csv``, transcribed from
 github.com/tbazina/pam_lqi_pid; they are no part of this project. Another muscle than the one of
@@ -176,6 +177,8 @@ def command_line():
                         help='the tables of contraction and black boxes alone')
     parser.add_argument('--alone', action='store_true',
                         help='the table of what `pam gap` makes of the steps alone')
+    parser.add_argument('--csv', metavar='DIR', default=None,
+                        help='write the two cycles of the loop at 100 Hz, and nothing else')
     results_page.add_write(parser, 'real_records')
     return parser
 
@@ -183,6 +186,9 @@ def command_line():
 def main():
     """Look at the loop, at the steps, and for what was injected."""
     args = command_line().parse_args()
+    if args.csv:
+        write_cycles(args)
+        return
     is_all = not (args.pressure or args.contraction or args.alone)
     for part, is_asked, tables in (('pressure', args.pressure, show_pressure),
                                    ('contraction', args.contraction, show_contraction),
@@ -191,6 +197,22 @@ def main():
         if is_all or is_asked:
             with results_page.printed(args, __file__, part):
                 tables(args)
+
+
+def write_cycles(args):
+    """Write cycle_1.csv and cycle_2.csv: time [s], voltage, gauge pressure, contraction."""
+    loop = read_table(args.folder, 'quasi_static_loop.csv')
+    zero, slope = calibrated(loop)
+    Path(args.csv).mkdir(parents=True, exist_ok=True)
+    for number in (1, 2):
+        topics = cycle(loop, number, zero, slope, seed=number).topics
+        stamps = topics['pressure'].stamp_ns
+        columns = (1e-9 * (stamps - stamps[0]),
+                   topics['valve_signal'].values['ppr_voltage'] / slope,
+                   1e-3 * (topics['pressure'].values['pressure_pa'] - P_ATM_PA),
+                   1e3 * topics['contraction'].values['contraction_m'])
+        np.savetxt(Path(args.csv) / f'cycle_{number}.csv', np.column_stack(columns), '%.6f', ',',
+                   header='time_s,voltage_V,pressure_kPa_gauge,contraction_mm', comments='')
 
 
 def show_pressure(args):
