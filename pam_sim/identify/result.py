@@ -99,8 +99,8 @@ class Identification:
     next_experiment : dict or None
         ``why``, ``determines`` (names), ``experiment`` (for ``pam run``) and ``added_kg``.
     remarks : list of str
-    starting : list of str
-        Numbers in whose signals something is left that no effect explains.
+    bent : list of str
+        Numbers in whose signals no effect explains a clear rest (``Criteria.clear_rest``).
 
     """
 
@@ -112,7 +112,7 @@ class Identification:
     incomplete: bool
     next_experiment: dict[str, Any] | None = None
     remarks: list[str] = field(default_factory=list)
-    starting: list[str] = field(default_factory=list)
+    bent: list[str] = field(default_factory=list)
 
     def __getitem__(self, name: str) -> Found:
         """Return one number by its name."""

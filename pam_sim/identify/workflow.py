@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
+from pam_sim.gap.criteria import CRITERIA
 from pam_sim.gap.data.commanded import commanded
 from pam_sim.gap.data.signals import UNIT
 from pam_sim.gap.subsystems.effects import subsystem_of_number
@@ -147,12 +148,15 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
                      for n, c, i, s in zip(acting, x, intervals, statuses)]
     left = [(p, name, square) for p, name, square in weighted.mean_squares(x)
             if square > SEEN_FLOORS2]
-    numbers_found, at_rest = with_settled_zero(rig, [p for p, _, _ in left], numbers_found)
     starting = [n.name for n in acting if any(n.acts_in(p) for p, _, _ in left)]
+    # A small rest of another formulation bends little; a clear one bends the fit of every edge.
+    clear = [p for p, _, square in left if square > CRITERIA.clear_rest]
+    bent = [n.name for n in acting if any(n.acts_in(p) for p in clear)]
+    numbers_found, at_rest = with_settled_zero(rig, clear, numbers_found)
     result = Identification(
         _identified(rig, numbers_found), numbers_found, combinations,
         [{'path': one.path, 'kind': one.kind, 'added_kg': one.added_kg} for one in offers],
-        _signals(before, _rms(weighted, x)), incomplete, starting=starting)
+        _signals(before, _rms(weighted, x)), incomplete, bent=bent)
     result.remarks += remarks + ([] if force_compared else _of_one_scale(acting))
     result.remarks += _starting_values(left, [name for name in starting if name not in at_rest])
     result.remarks += [f'{name}: from the holds, where the regulator has settled; no effect of '
