@@ -179,6 +179,32 @@ def test_exchanged_path_rules_make_no_step_in_the_command(inverse):
     assert controller.step(*standing) == pytest.approx(command, abs=200.0)
 
 
+def found_inertia(inverse, contraction_m, pressure_pa, **settings):
+    """Return the inertia [Pa s2/m] that a model finds in a motion."""
+    controller = controller_with(
+        inverse, path_learning=0.0, acceleration_feedforward_pa_s2_per_m=17000.0,
+        model_noise_pa=18800.0, model_filter_s=0.0203, **settings)
+    par, st = fields(controller.parameters, PARAMETERS), fields(zeros(MODEL), MODEL)
+    for x, p in zip(contraction_m, pressure_pa):
+        muscle_model.observe(par, inverse, controller.rules.path, st, x, p)
+        muscle_model.find_numbers(par, st, False)
+    return float(muscle_model.inertia_pa_s2_per_m(par, st))
+
+
+def test_noise_of_the_contraction_does_not_hide_the_inertia(inverse):
+    t, true = np.arange(0.0, 20.0, PERIOD_S), 23000.0
+    parts = ((0.004, 1.3), (0.002, 2.9), (7e-4, 6.1))
+    x = 0.014 + sum(size * np.sin(rate * t) for size, rate in parts)
+    acceleration = sum(-size * rate ** 2 * np.sin(rate * t) for size, rate in parts)
+    p = np.array([inverse_pressure_pa(inverse, one) for one in x]) + true * acceleration
+    seen = x + 1e-5 * np.random.default_rng(2).standard_normal(t.size)
+    without = found_inertia(inverse, seen, p)
+    behind = found_inertia(inverse, seen, p, number_filter_s=0.01)
+    assert abs(behind - true) < 0.7 * abs(without - true)
+    bounded = found_inertia(inverse, seen, p, number_filter_s=0.01, inertia_range=1.1)
+    assert bounded == pytest.approx(17000.0 / 1.1)
+
+
 @pytest.mark.parametrize('valve', ['ppr', 'hsv'])
 def test_a_motion_nobody_announced_is_followed_from_the_first_seconds(valve):
     nominal = load_rig('dmsp_5_300_realistic', valve=valve)

@@ -64,8 +64,10 @@ MODEL = record(
     'acceleration_m_per_s2',
     ('number_pa', NUMBERS),           # the numbers of the model
     ('covariance_pa2', NUMBERS * NUMBERS),
-    ('gain', NUMBERS),                # work space: of the update, and what the numbers multiply
-    ('regressor', NUMBERS),
+    ('gain', NUMBERS),                # work space of the update
+    ('now', NUMBERS),                 # what the numbers multiply
+    ('regressor', NUMBERS),           # the same behind a further low pass
+    'unexplained_pa',                 # innovation behind that low pass
     ('path', MOST_SETS),              # degrees of the measured path
     ('lead_path', MOST_SETS),         # the same of the reference one preview ahead
     ('predicted_path', MOST_SETS),
@@ -137,7 +139,7 @@ def inertia_pa_s2_per_m(par: np.record, st: np.record) -> float:
     """Return the pressure per acceleration: the setting and what the model found."""
     setting: float = par.acceleration_feedforward_pa_s2_per_m
     found = setting + st.number_pa[_ACCELERATION] / _ACCELERATION_M_PER_S2
-    return min(max(found, 0.5 * setting), 2.0 * setting)
+    return min(max(found, setting / par.inertia_range), par.inertia_range * setting)
 
 
 @compiled
@@ -146,18 +148,28 @@ def find_numbers(par: np.record, st: np.record, surprised: bool) -> None:
     Correct the numbers of the model by the innovation: recursive least squares.
 
     In the form of a Kalman filter whose numbers drift: one that the motion does not tell keeps its
-    value, and its variance ends at that of the start.
+    value, and its variance ends at that of the start. Noise of the acceleration makes the inertia
+    too small, so innovation and regressor pass one low pass more.
     """
     if not par.model_noise_pa > 0.0 or st.contraction_m < _LIFTED_M or st.known < 0.5:
         return
     middle = 0.5 * (par.reference_lower_m + par.reference_upper_m)
-    phi, gain, cov = st.regressor, st.gain, st.covariance_pa2
-    phi[0] = 1.0
-    phi[1] = (st.contraction_m - middle) / _SPAN_M
+    now, phi, gain, cov = st.now, st.regressor, st.gain, st.covariance_pa2
+    now[0] = 1.0
+    now[1] = (st.contraction_m - middle) / _SPAN_M
     for q in range(1, MOST_SETS):
-        phi[1 + q] = st.path[q] if q < par.path_sets else 0.0
-    phi[_RATE] = st.rate_m_per_s / _RATE_M_PER_S
-    phi[_ACCELERATION] = st.acceleration_m_per_s2 / _ACCELERATION_M_PER_S2
+        now[1 + q] = st.path[q] if q < par.path_sets else 0.0
+    now[_RATE] = st.rate_m_per_s / _RATE_M_PER_S
+    now[_ACCELERATION] = st.acceleration_m_per_s2 / _ACCELERATION_M_PER_S2
+    if par.number_filter_s > 0.0:
+        part = par.period_s / (par.number_filter_s + par.period_s)
+        for i in range(NUMBERS):
+            phi[i] = _low_pass(phi[i], now[i], part)
+        st.unexplained_pa = _low_pass(st.unexplained_pa, st.innovation_pa, part)
+    else:
+        for i in range(NUMBERS):
+            phi[i] = now[i]
+        st.unexplained_pa = st.innovation_pa
     first = _UNKNOWN_PA * _UNKNOWN_PA
     drift = par.model_drift_pa * par.model_drift_pa * par.period_s
     if surprised:
@@ -181,7 +193,7 @@ def find_numbers(par: np.record, st: np.record, surprised: bool) -> None:
             gain[i] += cov[i * NUMBERS + j] * phi[j]
         power += gain[i] * phi[i]
     for i in range(NUMBERS):
-        st.number_pa[i] += gain[i] * st.innovation_pa / power
+        st.number_pa[i] += gain[i] * st.unexplained_pa / power
         for j in range(NUMBERS):
             cov[i * NUMBERS + j] -= gain[i] * gain[j] / power
 
