@@ -33,7 +33,7 @@ from pam_actuation.experiments.experiment import Experiment, load_experiment
 from pam_actuation.experiments.separating import (
     HIGHEST_GAUGE_PA, LOWEST_GAUGE_PA, sensors_for, simulated)
 from pam_sim.errors import InputError
-from pam_sim.gap.data.health import check_health
+from pam_sim.gap.data.health import check_for
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.signals import READABLE
 from pam_sim.gap.plan.outlook import in_proportion, least_factors, Outlook, outlooks, score
@@ -291,7 +291,7 @@ def sensitivities(plain: dict[str, Any], rig: Rig, with_force: bool = True,
     run = simulated(plain, rig, controller)
     if not with_force:
         run.topics.pop('force', None)
-    problems = check_health(run, rig.valve).problems
+    problems = check_for(run, rig).problems
     if problems:
         raise InputError(f'nothing can be read from it: {"; ".join(problems)}', experiment.name)
     return Sensitivities(rig, Recording(run, rig.valve, rig.load != 'hanging_mass'), only)

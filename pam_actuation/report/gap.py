@@ -46,7 +46,7 @@ from pam_sim.errors import InputError
 from pam_sim.files import check_folder, StrPath, whole_files, write_json, write_text
 from pam_sim.gap import find_gap
 from pam_sim.gap.data.commanded import all_commanded, commanded
-from pam_sim.gap.data.health import check_health, dead_signals, recorded_valve
+from pam_sim.gap.data.health import check_for, dead_signals, recorded_valve
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.propose.proposal import EFFECT_FILE, MODEL_FILE
 from pam_sim.gap.select.memory import memories
@@ -241,7 +241,7 @@ def free_run_overlay(run: 'Run', rig: Rig) -> list[Overlay]:
     For the section "Simulated against recorded" of a report.
     """
     (run,), _ = commanded([run], rig)
-    if not check_health(run, rig.valve).usable:
+    if not check_for(run, rig).usable:
         return []
     recording = Recording(run, rig.valve, driven=rig.load != 'hanging_mass')
     simulated = free_run(rig, recording)

@@ -19,7 +19,7 @@ import time
 
 from pam_sim.gap.criteria import CRITERIA, Criteria
 from pam_sim.gap.data.commanded import all_commanded
-from pam_sim.gap.data.health import check_health, without_dead
+from pam_sim.gap.data.health import check_for, without_dead
 from pam_sim.gap.data.overlap import check_apart
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.speeds import moves_at_one_speed
@@ -106,7 +106,7 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
         check_apart(runs, certify, criteria)
     driven = rig.load != 'hanging_mass'
     runs, certify, told = all_commanded(runs, certify, rig)
-    health = [check_health(run, rig.valve, criteria, driven)
+    health = [check_for(run, rig, criteria)
               for run in [*runs, *([certify] if certify else [])]]
     refusals = list(dict.fromkeys(p for h in health for p in h.problems))
     remarks = told + list(dict.fromkeys(r for h in health for r in h.remarks))

@@ -17,7 +17,7 @@
 from collections.abc import Callable, Sequence
 
 from pam_sim.errors import InputError
-from pam_sim.gap.data.health import check_health, without_dead
+from pam_sim.gap.data.health import check_for, without_dead
 from pam_sim.identify.result import Identification
 from pam_sim.identify.settled import ZERO
 from pam_sim.identify.workflow import identify_beside
@@ -53,7 +53,7 @@ def numbers_first(runs: Sequence[Run], rig: Rig, holds_certify: bool, seed: int 
     """
     law = [name for name in rig.unknown if name.startswith(PREFIX)]
     others = [name for name in rig.unknown if name not in law]
-    if not others or not all(check_health(run, rig.valve).usable for run in runs):
+    if not others or not all(check_for(run, rig).usable for run in runs):
         return rig, None, []
     try:
         found = identify_beside(law, [without_dead(run) for run in runs], rig, seed=seed,

@@ -21,6 +21,7 @@ import numpy as np
 from pam_actuation.report.gap import free_run_overlay, write_gap
 from pam_sim import load_rig
 from pam_sim.gap import find_gap
+from pam_sim.gap.data.health import check_for
 from pam_sim.gap.data.recording import held_mean, Recording
 from pam_sim.gap.data.split import CERTIFY, FIT, long_split, SELECT, UNUSED
 from pam_sim.gap.result import SignalGap
@@ -151,6 +152,14 @@ def test_what_cannot_be_compared_is_refused_with_a_reason(spoil, word):
     assert result.verdict == 'refused' and word in result.reason
     assert_form(result)
     json.dumps(result.to_dict(), allow_nan=False)
+
+
+def test_the_limit_of_the_signal_is_that_of_the_regulator():
+    """One of 0 to 10 V may be above 6 V most of the time."""
+    rig = nominal().with_(parameters={'ppr_highest_v': 10.0, 'K_m': 72e3})
+    run = recorded(rig, 7.5 + 0.5 * voltages(12.0) / 6.0)
+    assert check_for(run, rig).usable
+    assert any('at its limit' in problem for problem in check_for(run, nominal()).problems)
 
 
 def test_another_valve_is_refused():

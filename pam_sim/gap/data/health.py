@@ -21,7 +21,9 @@ from pam_sim.annotations import IntArray
 from pam_sim.gap.criteria import CRITERIA, Criteria
 from pam_sim.gap.data.commanded import COMMAND
 from pam_sim.gap.data.signals import FIELD, READABLE, SIGNALS, VALVE_FIELDS
+from pam_sim.rig import Rig
 from pam_sim.run import Run
+from pam_sim.valve.ppr import MAX_VOLTAGE_V
 
 HOLE_PERIODS = 3.0           # of a slow log, from which on messages are missing
 OPTIONAL = ('force',)        # signals without which a comparison is possible
@@ -49,8 +51,14 @@ class Health:
         return not self.problems
 
 
+def check_for(run: Run, rig: Rig, criteria: Criteria = CRITERIA) -> Health:
+    """Check a recording that shall be compared with a rig; see ``check_health``."""
+    return check_health(run, rig.valve, criteria, driven=rig.load != 'hanging_mass',
+                        highest_v=rig.parameters.get('ppr_highest_v', MAX_VOLTAGE_V))
+
+
 def check_health(run: Run, valve: str, criteria: Criteria = CRITERIA,
-                 driven: bool = False) -> Health:
+                 driven: bool = False, highest_v: float = MAX_VOLTAGE_V) -> Health:
     """
     Check a recording before anything is computed from it.
 
@@ -64,6 +72,8 @@ def check_health(run: Run, valve: str, criteria: Criteria = CRITERIA,
         Decision thresholds.
     driven : bool
         Whether the contraction is given, as in an isometric rig or a joint.
+    highest_v : float
+        Voltage above which the regulator gives no more pressure.
 
     Returns
     -------
@@ -101,7 +111,7 @@ def check_health(run: Run, valve: str, criteria: Criteria = CRITERIA,
         for topic in health.signals + ('valve_signal',):
             _check_stamps(run, topic, health, criteria)
         _check_motion(run, health, criteria)
-        _check_saturation(run, health, criteria)
+        _check_saturation(run, health, criteria, highest_v)
     return health
 
 
@@ -212,10 +222,10 @@ def _check_motion(run: Run, health: Health, criteria: Criteria) -> None:
                 f'the {signal} hardly moves, so the recording says nothing about the model')
 
 
-def _check_saturation(run: Run, health: Health, criteria: Criteria) -> None:
+def _check_saturation(run: Run, health: Health, criteria: Criteria, highest_v: float) -> None:
     values = run.topics['valve_signal'].values
     full = [float(np.mean(values[name] >= limit)) for name, limit in (
-        ('ppr_voltage', 6.0 - 1e-6), ('fill_duty', 0.999), ('vent_duty', 0.999))
+        ('ppr_voltage', highest_v - 1e-6), ('fill_duty', 0.999), ('vent_duty', 0.999))
         if name in values]
     share = max(full)
     if share > criteria.greater_part:
