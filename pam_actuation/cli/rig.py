@@ -66,13 +66,16 @@ def add_arguments(parser: Parser) -> None:
                         help='range of its input, V; 4-20 mA through 500 ohm is 2:10')
     parser.add_argument('--regulator-kpa', type=source, default=None, metavar='LOW:HIGH',
                         help='gauge pressures at the ends of that range, kPa')
-    parser.add_argument('--known', action='append', default=[], metavar='NAME=VALUE',
-                        help='a number, SI, that is exact; may be repeated')
-    parser.add_argument('--about', action='append', default=[], metavar='NAME=VALUE±SD',
-                        help='a number with one standard deviation: mass_kg=1.2±0.3, 1.2±10%% or '
+    parser.add_argument('--known', action='extend', nargs='+', default=[],
+                        metavar='NAME=VALUE',
+                        help='numbers, SI, that are exact; may be repeated')
+    parser.add_argument('--about', action='extend', nargs='+', default=[],
+                        metavar='NAME=VALUE±SD',
+                        help='numbers with one standard deviation: mass_kg=1.2±0.3, 1.2±10%% or '
                         '1.2+-0.3; may be repeated')
-    parser.add_argument('--unknown', action='append', default=[], metavar='NAME[=VALUE]',
-                        help='a number that may be anywhere in its range; with a value where the '
+    parser.add_argument('--unknown', action='extend', nargs='+', default=[],
+                        metavar='NAME[=VALUE]',
+                        help='numbers that may be anywhere in their range; with a value where the '
                         'search begins; law.NAME is a coefficient of the force law, law stands '
                         'for all on which its force depends; may be repeated')
     add_overwrite_option(parser, 'the file that is there')
