@@ -67,18 +67,13 @@ class _Deferred(Generic[P, R]):
 
     def __init__(self, function: Callable[P, R], way: str, options: dict[str, bool]) -> None:
         functools.update_wrapper(self, function)
-        self._function, self._way, self._options = function, way, options
-
-    @property
-    def py_func(self) -> Callable[P, R]:
-        """Return the function in Python."""
-        return self._function
+        self.py_func, self._way, self._options = function, way, options
 
     @functools.cached_property
     def dispatcher(self) -> Any:
         """Return the function as numba has it; the Python function with the compiler off."""
         from pam_sim import machine_code
-        return getattr(machine_code, self._way)(self._function, **self._options)
+        return getattr(machine_code, self._way)(self.py_func, **self._options)
 
     @property
     def _numba_type_(self) -> Any:
@@ -92,7 +87,7 @@ class _Deferred(Generic[P, R]):
 
     def __reduce__(self) -> Any:
         """Return the name by which another process finds the function, or all that it needs."""
-        name = self._function.__qualname__
+        name = self.py_func.__qualname__
         return self.dispatcher.__reduce__() if '<locals>' in name else name
 
 

@@ -41,7 +41,7 @@ from numba.core.registry import cpu_target, CPUDispatcher
 from numba.core.runtime import rtsys
 from pam_sim import compile_notice, record_parts  # noqa: F401  # numba learns what a part is
 
-# Versions of numba, the first and the first beyond: those between were tried.
+# From this version of numba to before that one. Tried were 0.58.1, 0.61.2, 0.64.0 and 0.68.1.
 TRIED = ((0, 58), (0, 69))
 
 

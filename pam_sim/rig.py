@@ -180,6 +180,11 @@ class Rig:
         return prior_sd(parameter, self.number(name), self.tolerance[name])
 
     @property
+    def is_driven(self) -> bool:
+        """Whether the contraction is given, as at a held length or in a joint."""
+        return self.load != 'hanging_mass'
+
+    @property
     def signal_names(self) -> tuple[str, ...]:
         """Names of the valve signals, in order."""
         return ppr.SIGNAL_NAMES if self.valve == 'ppr' else hsv.SIGNAL_NAMES

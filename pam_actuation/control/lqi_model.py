@@ -244,7 +244,7 @@ def _ticks_of_driver(rig: Rig, driver: DriverLoop, rate_hz: float) -> int:
 def identify_on_rig(rig: Rig, rate_hz: float, contraction_m: float = 0.014,
                     seed: int = 0) -> LinearModel:
     """Return the linear model of a rig with a hanging mass, see ``identification_record``."""
-    if rig.load != 'hanging_mass':
+    if rig.is_driven:
         raise InputError(f'load `{rig.load}` does not move with the pressure', rig.name)
     return _identified(rig.to_yaml(), rate_hz, contraction_m, seed)
 

@@ -123,7 +123,7 @@ def identify_behind_inverse(rig: Rig, table: FloatArray, rate_hz: float,
         The load does not move with the pressure, or nothing stable explains the record.
 
     """
-    if rig.load != 'hanging_mass':
+    if rig.is_driven:
         raise InputError(f'load `{rig.load}` does not move with the pressure', rig.name)
     found = _identified(rig.to_yaml(), table.tobytes(), rate_hz, contraction_m)
     return LinearModel(rate_hz, found.delay_ticks, found.denominator, found.numerator,

@@ -103,7 +103,7 @@ def _effect(rig: 'Rig', name: str, parameter: str) -> float:
 
 def _load(rig: 'Rig') -> dict[str, float]:
     """Return volume and swing of the load on the muscle, from the statics of the rig."""
-    if rig.load != 'hanging_mass':
+    if rig.is_driven:
         # The contraction is prescribed: nothing swings with the pressure.
         volume_m3 = float(rig.volume_m3(rig.parameters.get('contraction_m', 0.0)))
         return {'hsv.volume_m3': volume_m3, 'hsv.volume_at_600kpa_m3': volume_m3,

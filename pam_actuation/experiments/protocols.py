@@ -294,7 +294,7 @@ def sensitivities(plain: dict[str, Any], rig: Rig, with_force: bool = True,
     problems = check_for(run, rig).problems
     if problems:
         raise InputError(f'nothing can be read from it: {"; ".join(problems)}', experiment.name)
-    return Sensitivities(rig, Recording(run, rig.valve, rig.load != 'hanging_mass'), only)
+    return Sensitivities(rig, Recording(run, rig.valve, rig.is_driven), only)
 
 
 def _judged(plain: dict[str, Any], looks: Sensitivities, materiality: float) -> Planned:

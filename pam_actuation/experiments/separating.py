@@ -208,7 +208,7 @@ def separation(run: Run, rig: Rig, rivals: Sequence[Rival],
     """
     topics = {k: v for k, v in run.topics.items() if with_force or k != 'force'}
     recording = Recording(type(run)(topics, run.metadata, run.namespace, run.path), rig.valve,
-                          rig.load != 'hanging_mass')
+                          rig.is_driven)
     estimator = Estimator(rig, subsystem_problems(rig, [recording], holds_certify=False))
     first, *others = (estimator.fit(hypothesis, theta) for _, _, hypothesis, theta in rivals)
     for problem in estimator.problems:

@@ -94,7 +94,7 @@ def replay_plant(run: 'Run') -> PlantReplay:
         raise InputError('the recording does not say which rig it is', str(run.path))
     rig = load_rig(text)
     _check(run, rig)
-    recording = Recording(run, rig.valve, driven=rig.load != 'hanging_mass')
+    recording = Recording(run, rig.valve, driven=rig.is_driven)
     simulated = free_run(rig, recording)
     return PlantReplay(
         rig.name, {s: recording.time_s[s] for s in recording.signals},

@@ -243,7 +243,7 @@ def free_run_overlay(run: 'Run', rig: Rig) -> list[Overlay]:
     (run,), _ = commanded([run], rig)
     if not check_for(run, rig).usable:
         return []
-    recording = Recording(run, rig.valve, driven=rig.load != 'hanging_mass')
+    recording = Recording(run, rig.valve, driven=rig.is_driven)
     simulated = free_run(rig, recording)
     offset = (recording.start_ns - start_ns(run)) * 1e-9
     return [Overlay(s, recording.time_s[s] + offset, np.asarray(recording.measured[s]),

@@ -104,7 +104,7 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     runs = [runs] if isinstance(runs, Run) else list(runs)
     if certify is not None:
         check_apart(runs, certify, criteria)
-    driven = rig.load != 'hanging_mass'
+    driven = rig.is_driven
     runs, certify, told = all_commanded(runs, certify, rig)
     health = [check_for(run, rig, criteria)
               for run in [*runs, *([certify] if certify else [])]]

@@ -112,7 +112,7 @@ def offer_of(run: Run, rig: Rig, added_kg: float = 0.0) -> Offer:
         name in run['valve_signal'].values for name in VALVE_FIELDS[rig.valve])
     contraction, force = (
         name in run and len(run[name]) >= LEAST_SAMPLES for name in ('contraction', 'force'))
-    held = rig.load != 'hanging_mass' or (force and _is_held(run, rig))
+    held = rig.is_driven or (force and _is_held(run, rig))
     isometric_m = rig.parameters.get('contraction_m') if rig.load == 'isometric' else None
     mechanics = (force and (contraction or isometric_m is not None)) if held else contraction
     missed = missed_pulses(run['valve_signal'].stamp_ns) if command and rig.valve == 'hsv' else ''

@@ -17,7 +17,7 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from pam_sim.annotations import IntArray
+from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.gap.criteria import CRITERIA, Criteria
 from pam_sim.gap.data.commanded import COMMAND
 from pam_sim.gap.data.signals import FIELD, READABLE, SIGNALS, VALVE_FIELDS
@@ -53,8 +53,8 @@ class Health:
 
 def check_for(run: Run, rig: Rig, criteria: Criteria = CRITERIA) -> Health:
     """Check a recording that shall be compared with a rig; see ``check_health``."""
-    return check_health(run, rig.valve, criteria, driven=rig.load != 'hanging_mass',
-                        highest_v=rig.parameters.get('ppr_highest_v', MAX_VOLTAGE_V))
+    return check_health(run, rig.valve, criteria, rig.is_driven,
+                        rig.parameters.get('ppr_highest_v', MAX_VOLTAGE_V))
 
 
 def check_health(run: Run, valve: str, criteria: Criteria = CRITERIA,
@@ -178,8 +178,8 @@ def _check_duration(run: Run, health: Health, criteria: Criteria) -> None:
 
 def missed_pulses(stamp_ns: IntArray, criteria: Criteria = CRITERIA) -> str:
     """Return why a signal of on/off valves with these stamps misses pulses, or ''."""
-    periods = np.diff(np.unique(stamp_ns)) * 1e-9
-    rate_hz = 1.0 / float(np.median(periods)) if periods.size else 0.0
+    periods_s = _periods_s(stamp_ns)
+    rate_hz = 1.0 / float(np.median(periods_s)) if periods_s.size else 0.0
     if rate_hz >= criteria.min_pulse_rate_hz:
         return ''
     return (f'valve_signal comes at {rate_hz:.0f} Hz; of on/off valves every pulse counts, so at '
@@ -187,10 +187,15 @@ def missed_pulses(stamp_ns: IntArray, criteria: Criteria = CRITERIA) -> str:
             'may be slow)')
 
 
+def _periods_s(stamp_ns: IntArray) -> FloatArray:
+    """Return the times between stamps that differ [s]."""
+    stamps: IntArray = np.unique(stamp_ns)
+    return np.diff(stamps) * 1e-9
+
+
 def _check_stamps(run: Run, topic: str, health: Health, criteria: Criteria) -> None:
-    stamps = np.sort(np.asarray(run.topics[topic].stamp_ns, dtype=np.int64))
-    periods = np.diff(stamps) * 1e-9
-    periods = periods[periods > 0.0]
+    stamps = run.topics[topic].stamp_ns
+    periods = _periods_s(stamps)
     if periods.size < 10:
         health.problems.append(f'{topic} has {stamps.size} messages, too few')
         return

@@ -62,7 +62,7 @@ def look_alikes(run: Run, rig: Rig, name: str) -> dict[str, Any]:
     """
     effect = get_effect(name)
     name = effect.variant_of or effect.name
-    recording = Recording(run, rig.valve, rig.load != 'hanging_mass')
+    recording = Recording(run, rig.valve, rig.is_driven)
     estimator = Estimator(rig, subsystem_problems(rig, [recording]))
     outputs = sum((problem.signals for problem in estimator.problems), ())
     pool = [c for c in candidates(rig, outputs, effects()) if c.effect == c.name]

@@ -148,7 +148,7 @@ def force_errors(rig: Rig, recording: Recording) -> ForceErrors | None:
     What a scale of each side and a skew of the stamps explain is no error. None without
     a load cell or where the mass never leaves its stop.
     """
-    if 'force' not in recording.signals or rig.load != 'hanging_mass':
+    if 'force' not in recording.signals or rig.is_driven:
         return None
     measured = {s: (recording.time_s[s], recording.measured[s])
                 for s in ('pressure', 'contraction', 'force')}

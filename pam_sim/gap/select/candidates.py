@@ -72,7 +72,7 @@ def candidates(rig: Rig, outputs: Sequence[str], only: Iterable[str] | None = No
             continue
         if only is not None and name not in only and candidate.name not in only:
             continue
-        if effect.subsystem == 'load' and rig.load != 'hanging_mass':
+        if effect.subsystem == 'load' and rig.is_driven:
             continue
         if effect.subsystem == 'sensor' and effect.fitting.sensor_signal not in outputs:
             continue
