@@ -23,8 +23,6 @@ import importlib
 import sys
 
 from pam_actuation import interrupts
-from pam_actuation.nodes import arguments
-from pam_actuation.ros_missing import ros_missing
 
 
 def start(name: str) -> int:
@@ -38,6 +36,9 @@ def start(name: str) -> int:
 
     """
     interrupts.leave_at_once(name, 0, interrupts.ENDING)
+    # Here and not above: an early Ctrl-C finds the handler in place.
+    from pam_actuation.nodes import arguments
+    from pam_actuation.ros_missing import ros_missing
     answered = arguments.answer(name, sys.argv[1:])
     if answered is not None:
         return answered

@@ -58,8 +58,10 @@ LIVE_VERBS = (
 NODES = ('valve_driver', 'valve_watchdog', 'plant_simulator', 'sofc_controller', 'pid_controller',
          'joint_simulator', 'joint_controller', 'reference_generator', 'hardware_sensors',
          'experiment_recorder')
-# As the script that pip or colcon writes; the line tells that the interpreter itself is up.
-SCRIPT = 'print(flush=True); import sys; from {} import {} as main; sys.exit(main())'
+# As the script that pip or colcon writes. The line tells that main() is about to start. Before it
+# does, nothing of ours can answer: there a signal ends the process without a word.
+SCRIPT = ('import sys, signal; signal.signal(signal.SIGINT, signal.SIG_DFL); '
+          'from {} import {} as main; print(flush=True); sys.exit(main())')
 # How long they work on a quiet machine [s]; a node does the same for ever after its first seconds.
 # A signal that comes later tells nothing.
 WORKS_S = {'simulate': 2.2, 'replay': 1.3, 'tune': 1.8, 'gap': 1.1, 'report': 0.9, 'info': 0.6,
@@ -68,6 +70,7 @@ WORKS_S = {'simulate': 2.2, 'replay': 1.3, 'tune': 1.8, 'gap': 1.1, 'report': 0.
 NODE_WORKS_S = 4.0
 # A node that compiles, a session that ends all its nodes in order, at a low priority.
 ENDED_AFTER_S = 40.0
+RIGHT = 'interrupted', 'done', 'too early'
 MARK = 'PAM_INTERRUPTED_BY_TEST'
 
 
@@ -118,7 +121,7 @@ def cases(number, of, live, seed=0):
 
 
 def interrupt(one, folder, environment):
-    """Run a Case; return ``interrupted`` or ``done``, or a sentence on what was wrong."""
+    """Run a Case; return ``interrupted``, ``done`` or ``too early``, or what was wrong."""
     mark = uuid.uuid4().hex
     process = subprocess.Popen(
         one.command(), cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
@@ -144,6 +147,8 @@ def interrupt(one, folder, environment):
     if left:
         return f'left processes behind: {left}'
     code, lines = process.returncode, errors.splitlines()
+    if code == -signal.SIGINT and not lines:
+        return 'too early'
     if one.is_node:
         told = [line for line in lines if not line.startswith('[')]
         return 'interrupted' if code == 0 and len(told) <= 1 else f'exit code {code}: {errors}'
@@ -191,7 +196,7 @@ def run(rounds, of, live=False, jobs=2, seed=0):
     Returns
     -------
     outcomes : Counter
-        How often a verb or node was ``interrupted`` or ``done``.
+        How often a verb or node was ``interrupted`` or ``done``, or the signal ``too early``.
     bad : list of str
         The others: what was started, when, and what was wrong.
 
@@ -207,9 +212,8 @@ def run(rounds, of, live=False, jobs=2, seed=0):
     with ThreadPoolExecutor(jobs) as pool:
         results = list(pool.map(
             one, [case for number in rounds for case in cases(number, of, live, seed)]))
-    outcomes = Counter(what for _, what in results if what in ('interrupted', 'done'))
-    return outcomes, [f'{chosen}\n    {what}' for chosen, what in results
-                      if what not in ('interrupted', 'done')]
+    outcomes = Counter(what for _, what in results if what in RIGHT)
+    return outcomes, [f'{chosen}\n    {what}' for chosen, what in results if what not in RIGHT]
 
 
 def main():
