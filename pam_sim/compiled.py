@@ -128,7 +128,8 @@ def sources(*parts: Callable[..., Any] | types.ModuleType) -> tuple[list[Path], 
 
     Parameters
     ----------
-    parts : compiled functions, or modules for all the compiled functions in them
+    *parts : function or module
+        Compiled functions, or modules for all the compiled functions in them.
 
     Returns
     -------

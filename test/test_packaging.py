@@ -234,7 +234,7 @@ def test_only_nodes_import_ros():
 
 def test_pyproject_leaves_everything_to_setup_py():
     said = tomllib.loads((ROOT / 'pyproject.toml').read_text(encoding='utf-8'))
-    assert set(said) == {'build-system', 'tool'} and set(said['tool']) == {'mypy'}
+    assert set(said) == {'build-system', 'tool'} and set(said['tool']) == {'mypy', 'ruff'}
 
 
 @pytest.mark.parametrize('topic', RECORDED)

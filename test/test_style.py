@@ -14,13 +14,13 @@
 
 """Style: the rules of the ROS 2 linters, the licence header, the size of files."""
 
-import configparser
-from importlib.metadata import distribution, PackageNotFoundError
+import ast
+import json
 from pathlib import Path
-import re
 import statistics
 import subprocess
 import sys
+import tomllib
 
 import pytest
 
@@ -31,13 +31,13 @@ SOURCES = sorted(
     if not any(part.startswith('.') or part in HIDDEN for part in path.relative_to(ROOT).parts))
 HEADER = ''.join(
     f'{line}\n' for line in (ROOT / 'setup.py').read_text(encoding='utf-8').splitlines()[:13])
-QUICK_FLAKE8 = 'test/quick_flake8.py'
-# What ament_flake8 and ament_pep257 of ROS 2 Jazzy leave out; its linters read no setup.cfg.
-FLAKE8_IGNORED = 'B902,C816,D100,D101,D102,D103,D104,D105,D106,D107,D203,D212,D404,I202'
-PEP257_IGNORED = 'D100,D101,D102,D103,D104,D105,D106,D107,D203,D212,D404'
-PLUG_INS = (
-    'flake8-blind-except', 'flake8-builtins', 'flake8-class-newline', 'flake8-comprehensions',
-    'flake8-deprecated', 'flake8-docstrings', 'flake8-import-order', 'flake8-quotes')
+# What ament_flake8 and ament_pep257 of ROS 2 Jazzy leave out, of the rules that Ruff has.
+IGNORED_BY_AMENT = {
+    'D100', 'D101', 'D102', 'D103', 'D104', 'D105', 'D106', 'D107', 'D203', 'D212', 'D404',
+    'E226', 'E241', 'E242', 'E704'}
+NO_RULES_OF_AMENT = {'A005', 'C420', 'D420', 'D421'}     # younger than Ubuntu 24.04
+# E121, E123 and E126 are left out by pycodestyle itself; Ruff has no rules on such lines.
+CONTINUATION_LINES = ['E122', 'E124', 'E125', 'E127', 'E128', 'E129', 'E131']
 BAD_DOCSTRINGS = '''"""summary without a capital"""
 
 
@@ -93,80 +93,101 @@ class Two():
 """
 
 
-def checked(*command):
-    """Run a linter on everything it would look at in this repository; fail with what it says."""
+# What flake8 7.3 with the plug-ins of ament_flake8 says of these, line by line; it adds I100 of
+# the second and third line of the source, and names the twelfth D001.
+FOUND_IN_SOURCE = [
+    (1, 'E401'), (1, 'F401'), (1, 'F401'), (2, 'F403'), (7, 'Q000'), (8, 'A002'), (8, 'E202'),
+    (8, 'E251'), (8, 'E251'), (8, 'E301'), (9, 'C404'), (11, 'F405'), (11, 'Q000'), (12, 'C411'),
+    (12, 'C416'), (12, 'E301'), (12, 'E702'), (12, 'UP005')]
+FOUND_IN_DOCSTRINGS = [
+    (1, 'D400'), (1, 'D415'), (5, 'D205'), (5, 'D209'), (5, 'D213'), (5, 'D400'), (5, 'D401'),
+    (5, 'D415'), (11, 'D200'), (11, 'D204'), (11, 'D400'), (11, 'D415'), (15, 'D210'),
+    (18, 'D401'), (18, 'D402'), (22, 'D201'), (22, 'D202'), (27, 'D213'), (27, 'D400'),
+    (30, 'D409'), (32, 'D413'), (39, 'D419')]
+
+
+def ruff(*arguments):
+    """Run Ruff with the rules of this project; return what it found as a list of dict."""
     done = subprocess.run(
-        [sys.executable, *command], cwd=ROOT, capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout[-5000:] + done.stderr[-5000:]
+        [sys.executable, '-m', 'ruff', 'check', '--no-cache', '--output-format', 'json',
+         '--config', str(ROOT / 'pyproject.toml'), *arguments],
+        cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode in (0, 1), done.stderr
+    return json.loads(done.stdout)
+
+
+def out_of_order(file, style):
+    """Return the mistakes in the order of the imports of a file, as ament_flake8 names them."""
+    from flake8_import_order.checker import ImportOrderChecker
+    text = file.read_text(encoding='utf-8')
+    # It looks at no import in a function or class: without those it is ten times as fast.
+    imports = [node for node in ast.parse(text).body
+               if isinstance(node, (ast.Import, ast.ImportFrom, ast.If))]
+    checker = ImportOrderChecker(str(file), ast.Module(imports, []))
+    checker.lines = text.splitlines(keepends=True)
+    checker.options = {
+        'import_order_style': style, 'application_import_names': [],
+        'application_package_names': []}
+    return [(error.lineno, error.code) for error in checker.check_order()
+            if error.code != 'I202']
+
+
+def test_ruff_finds_nothing():
+    """The sources, the launch files, the examples, the benchmarks and the tests, all of them."""
+    pytest.importorskip('ruff')
+    looked_at = subprocess.run(
+        [sys.executable, '-m', 'ruff', 'check', '--show-files'], cwd=ROOT, capture_output=True,
+        text=True, check=True).stdout.splitlines()
+    assert {str(path) for path in SOURCES} <= set(looked_at)
+    found = ruff()
+    assert [f"{one['filename']}:{one['location']['row']}: {one['code']} {one['message']}"
+            for one in found] == []
 
 
 @pytest.mark.slow
-def test_linters_find_nothing():
-    """
-    The sources, the launch files, the examples, the benchmarks and the tests, all of them.
-
-    The plug-in for docstrings is pydocstyle, with the convention ``all`` every rule of it.
-    """
-    pytest.importorskip('flake8')
-    checked(QUICK_FLAKE8, '--config', 'setup.cfg', '--docstring-convention', 'all',
-            *map(str, SOURCES))
+def test_continuation_lines_are_indented():
+    pycodestyle = pytest.importorskip('pycodestyle')
+    guide = pycodestyle.StyleGuide(select=CONTINUATION_LINES, max_line_length=99)
+    assert guide.check_files(map(str, SOURCES)).total_errors == 0
 
 
-def test_flake8_says_of_a_docstring_what_pydocstyle_says(tmp_path):
-    """One run of a linter over all files is enough."""
-    pytest.importorskip('flake8')
-    pytest.importorskip('pydocstyle')
-    file = tmp_path / 'bad.py'
-    file.write_text(BAD_DOCSTRINGS, encoding='utf-8')
-    found = []
-    for module, *options in (('pydocstyle',), ('flake8', '--docstring-convention', 'all')):
-        done = subprocess.run(
-            [sys.executable, '-m', module, '--config', str(ROOT / 'setup.cfg'), *options,
-             str(file)], cwd=ROOT, capture_output=True, text=True)
-        found.append(sorted(re.findall(r'\bD\d{3}\b', done.stdout)))
-    assert found[0] == found[1] and len(set(found[0])) > 10
+@pytest.fixture(scope='module')
+def google():
+    styles = pytest.importorskip('flake8_import_order.styles')
+    return styles.lookup_entry_point('google')
 
 
-def test_quick_flake8_says_what_flake8_says(tmp_path):
-    pytest.importorskip('flake8')
-    files = [tmp_path / name for name in ('one.py', 'two.py', 'three.py')]
-    for file, text in zip(files, (BAD_SOURCE, BAD_DOCSTRINGS, f'{BAD_SOURCE}def three(:\n')):
+def test_imports_have_the_order_of_google(google):
+    assert {str(path): found for path in SOURCES if (found := out_of_order(path, google))} == {}
+
+
+def test_the_linters_say_what_flake8_with_its_plug_ins_says(google, tmp_path):
+    pytest.importorskip('ruff')
+    for text, wanted, mistakes in (
+            (BAD_SOURCE, FOUND_IN_SOURCE, [(2, 'I100'), (3, 'I100')]),
+            (BAD_DOCSTRINGS, FOUND_IN_DOCSTRINGS, [])):
+        file = tmp_path / 'bad.py'
         file.write_text(text, encoding='utf-8')
-    said = [subprocess.run(
-        [sys.executable, *linter, '-j1', '--config', str(ROOT / 'setup.cfg'),
-         '--docstring-convention', 'all', *map(str, files)], cwd=ROOT, capture_output=True,
-        text=True).stdout for linter in (('-m', 'flake8'), (QUICK_FLAKE8,))]
-    assert said[0] == said[1]
-    codes = set(re.findall(r': ([A-Z]\d{3}) ', said[0]))
-    assert {code[0] for code in codes} >= set('ACDEFQ') and len(codes) > 25
+        found = sorted((one['location']['row'], one['code']) for one in ruff(str(file)))
+        # Of sections of a docstring Ruff finds more than pydocstyle.
+        assert [one for one in found if one not in ((29, 'D410'), (32, 'D411'))] == wanted
+        assert out_of_order(file, google) == mistakes
 
 
-def test_setup_cfg_holds_the_rules_of_the_ament_linters():
-    config = configparser.ConfigParser()
-    config.read(ROOT / 'setup.cfg')
-    flake8, pydocstyle = config['flake8'], config['pydocstyle']
-    assert set(flake8) == {'max-line-length', 'import-order-style', 'extend-ignore'}
-    assert flake8['extend-ignore'] == f'A005,{FLAKE8_IGNORED}'
-    assert (flake8['max-line-length'], flake8['import-order-style']) == ('99', 'google')
-    assert dict(pydocstyle) == {'ignore': PEP257_IGNORED}
-
-
-def test_the_plug_ins_of_ament_flake8_are_installed():
-    missing = []
-    for name in PLUG_INS:
-        try:
-            distribution(name)
-        except PackageNotFoundError:
-            missing.append(name)
-    if missing:
-        pytest.skip(f'not installed: {", ".join(missing)}; make env brings them')
+def test_pyproject_holds_the_rules_of_the_ament_linters():
+    rules = tomllib.loads((ROOT / 'pyproject.toml').read_text(encoding='utf-8'))['tool']['ruff']
+    assert (rules['line-length'], rules['lint']['flake8-quotes']['inline-quotes']) == (
+        99, 'single')
+    assert set(rules['lint']['ignore']) == IGNORED_BY_AMENT | NO_RULES_OF_AMENT
 
 
 @pytest.mark.parametrize('linter', ['ament_copyright', 'ament_flake8', 'ament_pep257'])
 def test_the_linters_of_ros_2_find_nothing(linter):
     """Where they are installed, which is on a machine with ROS 2."""
     pytest.importorskip(linter)
-    checked('-m', f'{linter}.main')
+    done = subprocess.run(
+        [sys.executable, '-m', f'{linter}.main'], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout[-5000:] + done.stderr[-5000:]
 
 
 def test_every_source_begins_with_the_licence_header():

@@ -120,9 +120,8 @@ def test_nothing_is_worked_on_twice(done, lab, capsys):
 
 def test_a_table_has_a_row_for_each_size(done, lab, tmp_path, monkeypatch):
     out, _ = done
-    pyarrow = pytest.importorskip('pyarrow')
-    import pyarrow.parquet
-    table = pyarrow.parquet.read_table(out / 'results.parquet').to_pylist()
+    parquet = pytest.importorskip('pyarrow.parquet')
+    table = parquet.read_table(out / 'results.parquet').to_pylist()
     assert [(one['rig'], one['name']) for one in table] == [
         ('rig_1', 'coulomb_friction'), ('rig_2', None)]
     rows = [{**row, 'case': Case('p', row['rig'], row['day'], row['time'])}

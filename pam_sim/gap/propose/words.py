@@ -39,7 +39,7 @@ def equation_of(stand_in: StandIn, found: Sequence[Term], values: Mapping[str, f
 
     """
     if found[0].one.kind == terms.SWING:
-        return (f"p\'\' = w^2 (s - p) - 2 zeta w p\', w = 2 pi / {values['shape_1_of_1']:.3g} s, "
+        return (f"p'' = w^2 (s - p) - 2 zeta w p', w = 2 pi / {values['shape_1_of_1']:.3g} s, "
                 f"zeta = {values['first_of_1']:.3g}")
     parts = []
     for channel in dict.fromkeys(term.channel for term in found):
