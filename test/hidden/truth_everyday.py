@@ -19,7 +19,7 @@ A case is drawn from (seed of the examination, kind, place in the list) alone. O
 everyday size is hidden in it, or nothing. ``build`` records it and returns its key.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import truth_bags as bags
@@ -164,7 +164,8 @@ def _closed(case, folder, drawn, chain, rng, closed_loop):
         truth = runs.Truth(runs.replay(drawn.numbers, case.valve, start), sent_s, sent, sent_s,
                            wanted)
         runs.record(folder / part, truth, case.valve, chain, rng)
-        truths.append(truth)
+        # A refit starts as the rig did, before the first message of the controller.
+        truths.append(replace(start, rows=truth.rows))
     return truths, {}
 
 
