@@ -22,11 +22,11 @@ from pam_sim.gap import find_gap
 from pam_sim.gap.data.commanded import commanded
 from pam_sim.gap.data.given_motion import given_motion
 from pam_sim.gap.data.health import check_health
+from pam_sim.gap.data.jumps import jump_shares
 from pam_sim.gap.data.pulses import openings, Pulses
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.split import FIT
 from pam_sim.gap.subsystems.pulses_seen import shows_pulses
-from pam_sim.gap.subsystems.unseen import jump_shares
 from pam_sim.gap.subsystems.valve import ValveProblem
 from pam_sim.model_file import load_rig
 from pam_sim.run import Run, Series
@@ -94,6 +94,16 @@ def test_a_jump_between_two_messages_of_a_slow_log_leaves_no_gap_and_a_dead_time
 def test_only_what_neighbours_do_not_foretell_is_a_jump():
     even = np.concatenate([np.full(5, 2.0), 2.0 + 0.1 * np.arange(6), np.full(5, 4.0)])
     assert np.flatnonzero(jump_shares(even) > 0.5).tolist() == [11]
+
+
+def test_the_stamp_of_a_slow_message_is_in_doubt_where_its_signal_jumps_alone():
+    ramp = np.repeat(np.linspace(1.0, 5.0, 200), 20)
+    ramp[2000:] += 1.0
+    slow, quick = (Recording(recorded(nominal(), ramp, rate_hz=hz), 'ppr') for hz in (50, 500))
+    doubt_s = slow.stamp_sd_s(1e-4)
+    assert doubt_s.max() == pytest.approx(slow.unseen_s / np.sqrt(12.0), rel=0.1)
+    assert np.median(doubt_s) == pytest.approx(1e-4, rel=0.01)
+    assert np.all(quick.stamp_sd_s(1e-4) == 1e-4)
 
 
 def test_of_a_regulator_the_commanded_pressure_is_the_input():

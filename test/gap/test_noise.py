@@ -15,7 +15,8 @@
 """Noise read from data: white, quantised, with motion in it."""
 
 import numpy as np
-from pam_sim.gap.data.noise import autocorrelation_time, noise_sd, quantisation_step, rms_rate
+from pam_sim.gap.data.noise import (
+    autocorrelation_time, noise_of, noise_sd, quantisation_step, rms_rate)
 import pytest
 
 
@@ -52,3 +53,12 @@ def test_memory_of_white_and_smooth_residuals():
     smooth = np.convolve(white, np.ones(50) / 50, mode='same')
     assert autocorrelation_time(smooth) == pytest.approx(50, rel=0.3)
     assert autocorrelation_time(np.zeros(100)) == 1.0
+
+
+def test_noise_of_a_slow_log_is_found_in_quick_motion_and_at_uneven_instants():
+    random = np.random.default_rng(0)
+    t = 0.02 * np.arange(1500) + random.uniform(0.0, 1.5e-3, 1500)
+    motion = 0.01 * np.sin(2 * np.pi * 0.5 * t) + 0.002 * np.sin(2 * np.pi * 4.0 * t)
+    read = motion + 1e-5 * random.standard_normal(t.size)
+    assert noise_of(t, read).sd == pytest.approx(1e-5, rel=0.1)
+    assert noise_sd(read) > 3e-5             # third differences of even samples hold the motion

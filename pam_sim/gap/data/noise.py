@@ -17,7 +17,8 @@ What sensors, quantisation and stamps explain: the floor below which no gap is s
 
 Noise is read from third differences, which take the motion out: for white noise
 of standard deviation s they have sqrt(20) s. The median makes it blind to steps
-and outliers.
+and outliers. A slow log moves too far between two samples for that. There divided
+differences of a higher order take the motion out, at the instants as they are.
 """
 
 from dataclasses import dataclass
@@ -26,6 +27,8 @@ import numpy as np
 from pam_sim.annotations import FloatArray
 
 THIRD_DIFFERENCE_GAIN = np.sqrt(20.0)      # 1, 3, 3, 1 squared and summed
+SLOW_S = 1.0 / 90.0          # between samples: a log is slow above that
+SLOW_ORDER = 8               # of the differences of a slow log
 MAD_TO_SD = 1.4826                          # of a normal distribution
 QUIET_S, MEAN_S, LAG_S = 0.4, 0.05, 0.01    # windows at rest, means in them, autocovariance
 QUIET_MEANS = 1.2            # scatter of the means, in standard deviations of the white noise
@@ -49,6 +52,25 @@ def noise_sd(values: FloatArray) -> float:
     third = np.diff(values, 3)
     spread = MAD_TO_SD * float(np.median(np.abs(third - np.median(third))))
     return max(spread / THIRD_DIFFERENCE_GAIN, quantisation_step(values) / np.sqrt(12.0))
+
+
+def slow_noise_sd(time_s: FloatArray, values: FloatArray) -> float:
+    """
+    Return the same of the samples of a slow log at rising instants.
+
+    Each difference is a weighted sum that is zero for every polynomial of lower order. Its
+    weights have the length 1, so that it scatters as the noise does.
+    """
+    values, count = np.asarray(values, dtype=float), SLOW_ORDER + 1
+    if values.size < 2 * count:
+        return noise_sd(values)
+    at, near = (np.lib.stride_tricks.sliding_window_view(v, count) for v in (time_s, values))
+    apart = (at[:, :, np.newaxis] - at[:, np.newaxis, :]) / np.median(np.diff(time_s))
+    apart[:, np.arange(count), np.arange(count)] = 1.0
+    weights = 1.0 / apart.prod(axis=2)
+    difference = (weights * near).sum(axis=1) / np.linalg.norm(weights, axis=1)
+    return max(MAD_TO_SD * float(np.median(np.abs(difference))),
+               quantisation_step(values) / np.sqrt(12.0))
 
 
 @dataclass(frozen=True)
@@ -93,8 +115,8 @@ def noise_of(time_s: FloatArray, values: FloatArray) -> Noise:
     The slow part shows where the signal rests: windows in which means over 50 ms
     scatter no more than noise does. Without such windows the noise is taken for white.
     """
-    white = noise_sd(values)
     period = float(np.median(np.diff(time_s)))
+    white = slow_noise_sd(time_s, values) if period > SLOW_S else noise_sd(values)
     window, part = int(QUIET_S / period), max(int(MEAN_S / period), 1)
     lag = max(int(round(LAG_S / period)), 1)
     if white <= 0.0 or window < 4 * part or window <= 2 * lag:

@@ -16,12 +16,13 @@
 
 from collections.abc import Mapping
 from functools import cached_property
-import math
 from typing import Protocol
 
 import numpy as np
 from pam_sim.annotations import BoolArray, FloatArray, IntArray
 from pam_sim.gap.data.given_motion import given_motion
+from pam_sim.gap.data.jumps import jump_shares
+from pam_sim.gap.data.noise import SLOW_S
 from pam_sim.gap.data.pulses import openings, Pulses
 from pam_sim.gap.data.signals import FIELD, SIGNALS, VALVE_FIELDS
 from pam_sim.response import Response
@@ -31,7 +32,6 @@ GRID_S = 0.001
 START_S = 0.05               # the state at the start is read from this stretch
 SMOOTH_STEPS = 21            # of a measured signal whose rate is needed
 START_SAMPLES = 3            # or from so many samples of a slow log
-SLOW_S = 1.0 / 90.0          # a valve signal that comes less often may have changed unseen
 
 
 class Measured(Protocol):
@@ -111,6 +111,7 @@ class Recording:
             _ordered(command, name) for name in VALVE_FIELDS[valve]]
         self._valve = [((s - self.start_ns) * 1e-9, v) for s, v in stamped]
         period_s = float(np.median(np.diff(self._valve[0][0]))) if self.messages > 1 else 0.0
+        # A valve signal that comes less often may have changed unseen.
         self.unseen_s = period_s if period_s > SLOW_S else 0.0
         self.supply: tuple[FloatArray, FloatArray] | None = None
         if 'supply_pressure' in run and 'pressure_pa' in run.topics['supply_pressure'].values:
@@ -179,9 +180,19 @@ class Recording:
         place = np.clip((time_s / GRID_S).astype(int), 0, self.grid_s.size - 1)
         return ~self._given[1][place]
 
-    def stamp_sd_s(self, own_s: float) -> float:
-        """Return how far the instants of the valve signal scatter [s], given their stamps."""
-        return math.hypot(own_s, self.unseen_s / math.sqrt(12.0))
+    def stamp_sd_s(self, own_s: float) -> FloatArray:
+        """
+        Return how far the instant of each message of the valve scatters [s], shape (M,).
+
+        ``own_s`` is what its stamp scatters. A jump of a slow log came unseen as well.
+        """
+        return np.hypot(own_s, self._unseen_sd_s)
+
+    @cached_property
+    def _unseen_sd_s(self) -> FloatArray:
+        if self.unseen_s == 0.0:
+            return np.zeros(self.messages)
+        return jump_shares(self.valve_values) * self.unseen_s / np.sqrt(12.0)
 
     def start(self, signal: str) -> float:
         """

@@ -30,6 +30,7 @@ from functools import lru_cache
 
 import numpy as np
 from pam_sim.annotations import FloatArray, IntArray
+from pam_sim.gap.data.jumps import jump_shares
 from pam_sim.gap.data.recording import GRID_S
 
 WINDOW_S = 0.5               # after a jump, when the response of a valve is over
@@ -121,16 +122,6 @@ def lagged(responses: FloatArray, lag_s: float) -> FloatArray:
     from scipy.signal import lfilter       # slow to import
     keep = np.exp(-GRID_S / lag_s) if lag_s > 0.0 else 0.0
     return lfilter([1.0 - keep], [1.0, -keep], responses, axis=1) if keep else responses
-
-
-def jump_shares(signal: FloatArray) -> FloatArray:
-    """Return which share of its change, 0 to 1, each message has more than those beside it."""
-    change = np.diff(signal, prepend=signal[:1])
-    before, after = np.roll(change, 1), np.roll(change, -1)
-    even = np.median([before, change, after], axis=0)
-    found = np.zeros(change.size)
-    np.divide(np.abs(change - even), np.abs(change), out=found, where=change != 0.0)
-    return np.minimum(found, 1.0)
 
 
 def _responses(stamps_s: FloatArray, share: FloatArray, simulated: Simulated
