@@ -14,7 +14,7 @@
 
 """The verdict of a search and its validation, and the numbers that go with it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 import math
 
@@ -93,9 +93,7 @@ def judge(result: GapResult, outcome: Outcome, estimator: Estimator, validation:
          't': _tested(r, w.subsystem)} for w in named for r in w.rivals]
     wrong = [c for c in result.parameters if abs(c.prior_deviation) > criteria.max_prior_sd]
     if not outcome.share or not (material or wrong):
-        # A gap without a name must be likely, however small an effect matters.
-        least = criteria.likely_sd * max(materiality, 1.0)
-        is_left = _is_left(result, estimator, validation, base, least, whole)
+        is_left = _is_left(result, estimator, validation, base, max(materiality, 1.0), whole)
         result.noticed = _noticed(estimator, validation, base, materiality,
                                   None if is_left else runs)
         result.verdict, result.effects, result.parameters = 'no_gap', [], []
@@ -142,16 +140,29 @@ def _noticed(estimator: Estimator, validation: Validation, base: Fit, materialit
 
 def _is_left(result: GapResult, estimator: Estimator, validation: Validation, base: Fit,
              least: float, whole: bool) -> bool:
-    """Return whether calibration leaves more than noise and the doubt about the numbers may."""
-    def left(spread: Mapping[str, float]) -> float:
-        return max((_beyond(s.rmse_refit, math.hypot(
-            estimator.criteria.floor_error * validation.highest_floor[name],
-            NORMAL_95 * spread.get(name, 0.0))) / max(validation.noise[name], 1e-12)
-            for name, s in result.signals.items()), default=0.0)
+    """
+    Return whether calibration leaves a gap that matters and that is no noise.
 
+    It matters by the floor as it was found. Half of that must be left by a floor that is too low,
+    and by numbers at the end of their interval.
+    """
+    criteria, noise = estimator.criteria, validation.noise
+
+    def left(name: str, floor: float, spread: float = 0.0) -> float:
+        beyond = _beyond(result.signals[name].rmse_refit, math.hypot(floor, NORMAL_95 * spread))
+        return beyond / max(noise[name], 1e-12)
+
+    def surely(name: str, spread: float = 0.0) -> float:
+        return left(name, criteria.floor_error * validation.highest_floor[name], spread)
+
+    sure = criteria.greater_part * least
+    large = [name for name, s in result.signals.items()
+             if left(name, s.noise_floor) > least and surely(name) > sure]
     # What the searched data show clearly is no doubt about numbers, however wide their priors.
-    return left({}) > least and (_is_clear(estimator, base) or left(
-        spread_of_numbers(validation, estimator, base, whole)) > least)
+    if not large or _is_clear(estimator, base):
+        return bool(large)
+    spread = spread_of_numbers(validation, estimator, base, whole)
+    return any(surely(name, spread.get(name, 0.0)) > sure for name in large)
 
 
 def _is_clear(estimator: Estimator, base: Fit) -> bool:

@@ -167,16 +167,21 @@ def test_a_valve_that_opens_as_late_as_it_closes_only_delays(form, open_s, close
         Fit(Hypothesis((effect,)), np.array(theta), {}, {}, {}), 0, CRITERIA) == delays
 
 
-@pytest.mark.parametrize('off, materiality, verdict', [
-    (0.9, 0.3, 'no_gap'), (2.0, 0.3, 'unknown'), (2.0, 1.0, 'unknown'), (2.0, 1.5, 'no_gap')])
-def test_a_gap_without_a_name_must_be_clear(monkeypatch, off, materiality, verdict):
-    signal = SimpleNamespace(rmse_refit=np.hypot(1.0, off))
+@pytest.mark.parametrize('off, materiality, highest, spread, verdict', [
+    (0.9, 0.3, 1.0, 0.0, 'no_gap'), (1.3, 0.3, 1.0, 0.0, 'unknown'),
+    (1.3, 1.0, 1.0, 0.0, 'unknown'), (1.3, 1.5, 1.0, 0.0, 'no_gap'),
+    (1.3, 1.0, 1.4, 0.0, 'no_gap'),             # the drift of a valve may be half of it
+    (1.3, 1.0, 1.0, 0.6, 'no_gap')])            # or the doubt about its numbers
+def test_a_gap_without_a_name_must_be_clear(
+        monkeypatch, off, materiality, highest, spread, verdict):
+    signal = SimpleNamespace(rmse_refit=np.hypot(1.0, off), noise_floor=1.0)
     result = SimpleNamespace(parameters=[], signals={'pressure': signal})
-    validation = SimpleNamespace(noise={'pressure': 1.0}, highest_floor={'pressure': 0.8},
+    validation = SimpleNamespace(noise={'pressure': 1.0}, highest_floor={'pressure': highest},
                                  unexplained=lambda: 1.0)
     monkeypatch.setattr(verdict_module, 'is_material', lambda *given: False)
     monkeypatch.setattr(verdict_module, '_noticed', lambda *given: [])
-    monkeypatch.setattr(verdict_module, 'spread_of_numbers', lambda *given: {})
+    monkeypatch.setattr(
+        verdict_module, 'spread_of_numbers', lambda *given: {'pressure': spread})
     validation.moved = validation.fall = lambda *given: (0.0, 0.0)
     validation.refit = validation.after = None
     found = SimpleNamespace(hypothesis=Hypothesis(), theta=())
