@@ -74,7 +74,7 @@ def judge(result: GapResult, outcome: Outcome, estimator: Estimator, validation:
     named, criteria = outcome.named, estimator.criteria
     result.moved = validation.moved(base, whole) if named else {}
     own = validation.moved(held_without(final), whole) if named else {}
-    again = validation.fall(validation.refit, validation.after)[0] > criteria.greater_part
+    again = bool(named) and validation.finds_again()
 
     def is_worth_a_name(least: float) -> bool:
         return is_material(own, result.moved, least, again, criteria)

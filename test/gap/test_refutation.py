@@ -191,3 +191,21 @@ def test_an_effect_is_missed_in_whichever_cut_gets_worse_without_it(harm):
                             least_gap=0.01, base=errors(5.0))
     missed = [c.subsystem for c in problems if is_missed(given, c, errors(0.0), errors(3.0))]
     assert missed == [harm] * (harm is not None)
+
+
+@pytest.mark.parametrize('explained, drift, found', [
+    (1.0, 0.1, True), (0.1, 0.1, False),        # a fall of 1, and of -0.8
+    (1.0, 2.0, False)])                         # which the drift of a valve may make as well
+def test_an_effect_is_found_again_where_the_drift_of_a_valve_cannot_make_the_errors_fall(
+        explained, drift, found):
+    time_s = np.arange(SAMPLES) * 0.005
+    noise = np.random.default_rng(5).standard_normal(SAMPLES)
+    validation = Validation.__new__(Validation)
+    validation.estimator = SimpleNamespace(criteria=CRITERIA)
+    validation.recording = SimpleNamespace(
+        signals=('pressure',), measured={'pressure': explained * np.sin(time_s) + noise})
+    validation.part = {'pressure': np.ones(SAMPLES, dtype=bool)}
+    validation.noise = {'pressure': 1.0}
+    validation.refit, validation.after = {'pressure': 0.0 * time_s}, {'pressure': np.sin(time_s)}
+    validation.drift = [{'pressure': sign * drift * np.sin(time_s)} for sign in (-1.0, 1.0)]
+    assert validation.finds_again() is found

@@ -182,8 +182,6 @@ def test_a_gap_without_a_name_must_be_clear(
     monkeypatch.setattr(verdict_module, '_noticed', lambda *given: [])
     monkeypatch.setattr(
         verdict_module, 'spread_of_numbers', lambda *given: {'pressure': spread})
-    validation.moved = validation.fall = lambda *given: (0.0, 0.0)
-    validation.refit = validation.after = None
     found = SimpleNamespace(hypothesis=Hypothesis(), theta=())
     monkeypatch.setattr(verdict_module, 'held_without', lambda found: found)
     outcome = SimpleNamespace(named=[], share={'valve': 0.0})
@@ -283,8 +281,8 @@ def test_an_effect_is_too_small_for_a_name_only_where_that_is_certain(
         monkeypatch, certainty, verdict):
     result = SimpleNamespace(parameters=[], effects=['creep'], signals={})
     validation = SimpleNamespace(
-        noise={}, unexplained=lambda: 0.0, fall=lambda *given: (1.0, 0.8),
-        moved=lambda *given: {'contraction': 0.8}, refit=None, after=None)
+        noise={}, unexplained=lambda: 0.0, finds_again=lambda: True,
+        moved=lambda *given: {'contraction': 0.8})
     monkeypatch.setattr(verdict_module, 'held_without', lambda found: found)
     monkeypatch.setattr(verdict_module, '_noticed', lambda *given: [])
     creep = SimpleNamespace(name='creep')
@@ -304,8 +302,8 @@ def test_what_leaves_much_of_the_gap_is_a_part_only(monkeypatch, found, left, ve
     result = SimpleNamespace(**{'parameters': [], 'effects': [], 'signals': {}} | {
         found: [SimpleNamespace(prior_deviation=9.0)]})
     validation = SimpleNamespace(
-        noise={}, unexplained=lambda: left, fall=lambda *given: (1.0, 9.0),
-        moved=lambda *given: {'contraction': 9.0}, refit=None, after=None)
+        noise={}, unexplained=lambda: left, finds_again=lambda: True,
+        moved=lambda *given: {'contraction': 9.0})
     monkeypatch.setattr(verdict_module, 'held_without', lambda found: found)
     outcome = SimpleNamespace(share={'muscle': 1.0}, named=[
         NamedEffect('creep', 'muscle', [], ('creep',))])

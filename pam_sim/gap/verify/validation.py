@@ -182,6 +182,16 @@ class Validation:
                         for d in self.drift]
         return float(np.sqrt(np.mean(by_draw ** 2))) / apart ** 2 if apart > 0.0 else 0.0
 
+    def finds_again(self) -> bool:
+        """
+        Return whether the errors fall with the final model as they do for true effects.
+
+        And by more than they may where none is there, a fall of -1, by stamps and the start.
+        """
+        criteria, (fell, _) = self.estimator.criteria, self.fall(self.refit, self.after)
+        return fell > criteria.greater_part and (
+            fell + 1.0 > criteria.certain_sd * self.doubt(self.refit, self.after))
+
     def worse(self) -> list[str]:
         """
         Return the signals of which the final model leaves more than the calibrated one.
