@@ -55,6 +55,7 @@ env: $(COMPILED)
 clean:
 	rm -rf $(VENV) build install log *.egg-info .pytest_cache
 
+# The pip of Python 3.11 takes twice as long to find what fits together as a present one.
 # pip compiles one file after the other, tests of all packages as well; here all cores compile.
 # Large packages of which little is imported are left to the first import.
 # A name on the PATH proves nothing (version managers put stubs there), so each candidate is run.
@@ -75,7 +76,8 @@ $(STAMP): setup.py pyproject.toml
 	found="$$("$$found" -c 'import sys; print(sys._base_executable)')"; \
 	echo "Creating the environment $(VENV) with $$("$$found" --version) (once; needs a network or a pip cache)"; \
 	rm -rf '$(VENV)' && "$$found" -m venv '$(VENV)' \
-	&& '$(BIN)/python' -m pip install --quiet --disable-pip-version-check --no-compile \
+	&& { '$(BIN)/python' -m pip install --quiet --no-compile --retries 0 --upgrade pip >/dev/null 2>&1 || true; } \
+	&& PYTHONWARNINGS=ignore '$(BIN)/python' -m pip install --quiet --disable-pip-version-check --no-compile \
 	     --editable '.[ros,test]' \
 	|| { echo 'The installation failed. Without a network, point pip at a folder of wheels:' >&2; \
 	     echo '  PIP_NO_INDEX=1 PIP_FIND_LINKS=/path/to/wheels make env' >&2; exit 1; }; \

@@ -144,7 +144,7 @@ def test_a_file_in_a_folder_is_listed_loaded_and_simulated(tmp_path):
         path = tmp_path / name
         path.parent.mkdir(exist_ok=True)
         path.write_text(content)
-    np.save(tmp_path / 'volts.npy', 4.0 + np.sin(np.arange(120) * 50e-3))
+    np.save(tmp_path / 'volts.npy', 4.0 + np.sin(np.arange(80) * 75e-3))
     environment = {
         **os.environ, 'PAM_EFFECTS_PATH': str(tmp_path / 'effects'),
         'PAM_MUSCLE_LAWS_PATH': str(tmp_path / 'laws'), 'PAM_CACHE_DIR': str(tmp_path / 'cache'),
