@@ -43,7 +43,7 @@ from pam_sim.gap.verify.harm import without_harm
 from pam_sim.gap.verify.materiality import is_material, moved
 from pam_sim.gap.verify.model import free_run_of, held_without
 from pam_sim.gap.verify.own_runs import OwnRuns
-from pam_sim.gap.verify.refutation import refute, unconfirmed
+from pam_sim.gap.verify.refutation import refute, refuted_alone, unconfirmed
 from pam_sim.gap.verify.validation import Validation
 from pam_sim.rig import Rig
 from pam_sim.run import Run
@@ -168,6 +168,9 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     while outcome.named:
         name, final = unconfirmed(
             outcome.named, estimator, base, final, validation, certify is not None)
+        if name is None and held_out.unseen_s > 0.0:
+            name, final = refuted_alone(outcome.named, estimator, base, final, OwnRuns(
+                validation, certify is not None, estimator, base, final, seed))
         if name is None:
             break
         result.remarks.append(f'What {name} would explain of the recordings is not found '

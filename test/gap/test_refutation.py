@@ -27,7 +27,7 @@ from pam_sim.gap.select.rival import NamedEffect, Rival
 from pam_sim.gap.subsystems.known import SKEW_MAX_S
 from pam_sim.gap.verify.materiality import is_material
 from pam_sim.gap.verify.model import held_without
-from pam_sim.gap.verify.refutation import refute, unconfirmed
+from pam_sim.gap.verify.refutation import refute, refuted_alone, unconfirmed
 from pam_sim.gap.verify.validation import Validation
 import pytest
 
@@ -209,3 +209,25 @@ def test_an_effect_is_found_again_where_the_drift_of_a_valve_cannot_make_the_err
     validation.refit, validation.after = {'pressure': 0.0 * time_s}, {'pressure': np.sin(time_s)}
     validation.drift = [{'pressure': sign * drift * np.sin(time_s)} for sign in (-1.0, 1.0)]
     assert validation.finds_again() is found
+
+
+@pytest.mark.parametrize('told, gone', [
+    ((-1.0, 0.5, 0.1), True), ((0.9, 0.5, 0.1), False),       # a fall of none, of a true effect
+    ((-1.0, 0.5, 0.9), False), ((-1.0, 0.1, 0.1), False)])    # in the noise; too small to be seen
+def test_of_a_slow_log_the_run_of_the_valve_alone_refutes_its_names(told, gone):
+    named = [NamedEffect(name, subsystem, [], (name,)) for name, subsystem in (
+        ('tube_lag', 'valve'), ('creep', 'muscle'))]
+    asked = []
+
+    def fall(subsystem, worse, better):
+        asked.append((subsystem, worse.hypothesis.names))
+        return told
+
+    refitted = SimpleNamespace(
+        criteria=CRITERIA, fit=lambda left, theta, near: found_of(*left.names))
+    final = found_of('tube_lag', 'creep')
+    name, left = refuted_alone(
+        named, refitted, found_of(), final, SimpleNamespace(fall=fall))
+    assert asked == [('valve', ('creep',))]
+    assert (name, left.hypothesis.names) == (
+        ('tube_lag', ('creep',)) if gone else (None, ('tube_lag', 'creep')))

@@ -21,6 +21,7 @@ its own.
 """
 
 from collections.abc import Mapping
+import math
 
 import numpy as np
 from pam_sim.annotations import BoolArray, FloatArray
@@ -85,6 +86,23 @@ class OwnRuns:
         """Return (instants [s], errors of the calibrated model, SI) on the certify data."""
         p = next(p for p in self._problems if p.subsystem == subsystem)
         return p.time_s[self.chosen(p, signal)], self._refit[subsystem, signal]
+
+    def fall(self, subsystem: str, worse: Fit, better: Fit) -> tuple[float, float, float]:
+        """
+        Return by how much the squared errors of a subsystem fall from one fit to another.
+
+        In what the two are apart, squared, as of ``Validation.fall``; how far they are apart
+        (rms, in floors); and the standard deviation of the fall by noise.
+        """
+        place = next(i for i, p in enumerate(self._problems) if p.subsystem == subsystem)
+        first, last = (p.errors(rig, known)[np.logical_or.reduce(
+            [self.chosen(p, s) for s in p.signals])] for p, rig, known in (
+            self.at(found)[place] for found in (worse, better)))
+        apart = _rms(first - last)
+        if apart <= 0.0:
+            return 1.0, 0.0, 0.0
+        fell = float(np.mean(first ** 2 - last ** 2)) / apart ** 2
+        return fell, apart, 2.0 / (apart * math.sqrt(first.size))
 
     def _given(self) -> dict[tuple[str, str], FloatArray]:
         """Return the errors of the given model, by subsystem and signal."""

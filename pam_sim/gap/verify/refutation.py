@@ -30,6 +30,7 @@ from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
 from pam_sim.gap.select.rival import NamedEffect
 from pam_sim.gap.verify.model import held_without
+from pam_sim.gap.verify.own_runs import OwnRuns
 from pam_sim.gap.verify.validation import Validation
 
 
@@ -116,6 +117,42 @@ def unconfirmed(named: Sequence[NamedEffect], estimator: Estimator, base: Fit, f
                if fell < 0.0 and apart > least
                and 1.0 - fell > criteria.certain_sd * validation.doubt(
                    runs[name], validation.after)}
+    if not against:
+        return None, final
+    name = min(against, key=lambda name: against[name])
+    return name, fits[name]
+
+
+def refuted_alone(named: Sequence[NamedEffect], estimator: Estimator, base: Fit, final: Fit,
+                  runs: OwnRuns) -> tuple[str | None, Fit]:
+    """
+    Return the name of the valve that its own run on the certify data speaks against most.
+
+    Jumps that a slow log did not see take the whole chain far away, and its errors tell little.
+    Those of the valve are free of them.
+
+    Parameters
+    ----------
+    named, estimator, base, final
+        As of ``refute``.
+    runs : OwnRuns
+        Of the final model.
+
+    Returns
+    -------
+    name, without
+        As of ``unconfirmed``.
+
+    """
+    criteria = estimator.criteria
+    fits = {w.name: less([w.name], estimator, base, final)
+            for w in named if w.subsystem == 'valve'}
+    against = {}
+    for name, fit in fits.items():
+        fell, apart, doubt = runs.fall('valve', fit, final)
+        if (fell < 0.0 and apart > criteria.visible_sd
+                and 1.0 - fell > criteria.certain_sd * doubt):
+            against[name] = fell
     if not against:
         return None, final
     name = min(against, key=lambda name: against[name])
