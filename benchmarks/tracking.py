@@ -328,10 +328,15 @@ def show(args):
                  'change': show_changes}[part](valve, chosen, args.hidden)
 
 
+def part_of_page(args):
+    """Return the part of the page that a run writes: one for each choice of controllers."""
+    return ' '.join(['hidden'] * args.hidden + args.controller.lower().split())
+
+
 def main():
     """Print the tables."""
     args = command_line().parse_args()
-    with results_page.printed(args, __file__, 'hidden' * args.hidden):
+    with results_page.printed(args, __file__, part_of_page(args)):
         show(args)
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What happens after a jump nobody announced: whose rules act, and on which path it ends."""
+"""What happens after a jump of the reference: whose rules act, and on which path it ends."""
 
 import numpy as np
 from pam_actuation.control.config import load_controller
@@ -70,6 +70,28 @@ def test_rules_of_the_index_stand_back_from_a_jump_until_the_reference_moves(inv
     stepped(200, 0.014, 1e-4)
     assert told[-1] == (8e3, 4e3)
     assert np.abs(np.diff(np.array(told)[:, 0])).max() < 1.1 * 8e3 * 0.005 / MOVE_S
+
+
+@pytest.mark.parametrize('announced, rules_pa, held', [(0, 8e3, 0.0), (1, 0.0, 0.8)])
+def test_what_acts_after_an_announced_jump_and_after_another(inverse, announced, rules_pa, held):
+    controller = SelfOrganizingFuzzyController(
+        inverse, {'jump_rules': 0.0, 'jump_disturbance': 0.2, 'disturbance_time_s': 0.1,
+                  'jump_announced': announced,
+                  'jump_time_s': MOVE_S, 'lead_s': 0.05}, rig_name='a/ppr')
+    controller.rules.feedforward[:] = 8e3
+    out, state = fields(controller._outputs, OUTPUT), fields(controller._state, STATE)
+
+    def stepped(count, reference_m, lead_m):
+        for _ in range(count):
+            controller.step(0.010, reference_m, 0.0, lead_m, 0.0, False, pressure_pa=2e5)
+        return out.feedforward_rules_pa, state.model.held
+
+    stepped(20, 0.010, 0.010)
+    stepped(10, 0.010, 0.014)
+    assert stepped(10, 0.014, 0.014)[1] == pytest.approx(held)
+    assert stepped(190, 0.014, 0.014) == pytest.approx((rules_pa, 0.0))
+    assert stepped(10, 0.010, 0.010)[1] == pytest.approx(0.8)
+    assert stepped(190, 0.010, 0.010)[0] == pytest.approx(0.0)
 
 
 def test_the_path_of_a_reference_at_rest_goes_over_to_that_of_the_muscle(inverse):

@@ -118,20 +118,24 @@ def smooth_jump(par: np.record, move: np.record, jump_m: float,
 
 
 @compiled
-def note_jump(par: np.record, st: np.record, rate_m_per_s: float) -> None:
+def note_jump(par: np.record, st: np.record, rate_m_per_s: float, jump_m: float,
+              lead_jump_m: float) -> None:
     """
     Remember a jump until the reference moves by itself.
 
     Feed-forward and motion rules go over to the share they have for so long, and back, in the
-    time of a move.
+    time of a move. Nobody announced a jump that comes at once in the reference and in that of one
+    preview ahead; ``jump_announced`` says whether the share holds after the others too.
     """
+    if lead_jump_m != 0.0:
+        st.surprising = 1.0 if jump_m != 0.0 else par.jump_announced
     if st.move.left_s > 0.0 or st.lead_move.left_s > 0.0:
         st.jumped = 1.0
     elif rate_m_per_s != 0.0:
         st.jumped = 0.0
     if par.jump_rules < 1.0 and par.jump_time_s > 0.0:
         step = par.period_s / par.jump_time_s
-        wanted = par.jump_rules if st.jumped > 0.0 else 1.0
+        wanted = par.jump_rules if st.jumped > 0.0 and st.surprising > 0.5 else 1.0
         st.rules_share += min(max(wanted - st.rules_share, -step), step)
 
 

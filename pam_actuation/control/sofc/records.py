@@ -80,6 +80,7 @@ STATE = record(
     ('move', MOVE),                   # of the reference
     ('lead_move', MOVE),              # of the lead reference
     'jumped',                         # 1 from a jump until the reference moves by itself
+    'surprising',                     # 1 where that jump is one as if nobody had announced it
     'rules_share',                    # of feed-forward and motion rules that acts
     'settling_left_s',
     'freeze_left_s',

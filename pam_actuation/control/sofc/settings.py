@@ -133,6 +133,8 @@ SETTINGS = (
             'share of feed-forward and motion rules that acts and learns for that long'),
     setting('jump_disturbance', '-', 1.0, 0.0, 1.0,
             'share with which the disturbance follows its residual while such a move lasts'),
+    setting('jump_announced', '-', 1.0, 0.0, 1.0,
+            'whether both hold after an announced jump too: 0 no, 1 yes'),
     setting('path_sets', '-', 0.0, 0.0, float(MOST_SETS),
             'path rules: sets of the path, the first for any path; 0 = none'),
     setting('path_shortest_m', 'm', 1.4e-4, 1e-6, 0.1, 'shortest path they tell apart'),

@@ -222,7 +222,7 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
         st.history_ticks > 0.0)
     st.change_m_per_s = change
     st.contraction_m = inp.contraction_m
-    dynamics.note_jump(par, st, inp.reference_rate_m_per_s)
+    dynamics.note_jump(par, st, inp.reference_rate_m_per_s, jump, lead_jump)
     lags = valve_lag.falls_behind(par, ring, st, inp)
     held_back = inp.held_back
     stays_behind = lags or held_back != 0.0
@@ -269,7 +269,8 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
     inertia = par.acceleration_feedforward_pa_s2_per_m
     if par.has_model > 0.5:
         predictor.engage(par, model, error)
-        model.held = 1.0 - par.jump_disturbance if st.move.left_s > 0.0 else 0.0
+        surprising_move = st.move.left_s > 0.0 and st.surprising > 0.5
+        model.held = 1.0 - par.jump_disturbance if surprising_move else 0.0
         muscle_model.observe(par, inverse, path_rules, model, inp.contraction_m, measured)
         muscle_model.go(par, model.lead_path, way)
         path = (muscle_model.rules_pa(par, path_rules, model.lead_path, lead)
