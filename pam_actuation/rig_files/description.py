@@ -20,6 +20,7 @@ from typing import Any
 
 from pam_actuation.rig_files.numbers import Stated
 from pam_sim.errors import InputError
+from pam_sim.muscle.geometry import BORE_M as NOMINAL_BORE_M
 from pam_sim.muscle.muscle import DIMENSIONS, get_muscle, muscle_names
 from pam_sim.parameters import Parameter
 from pam_sim.rig_parameters import rig_parameters
@@ -28,6 +29,8 @@ from pam_sim.valve.regulator_presets import get_regulator
 
 BY_BORE_TOLERANCE = 0.2      # of a force map taken from a muscle of another bore
 LAG_TOLERANCE = 0.5          # of the lag of a regulator that nobody stated
+DAMPING_TOLERANCE = 0.5      # of the damping of a muscle of another bore that nobody stated
+DAMPING = 'damping_n_s_per_m'
 REGULATOR_NUMBERS = ('K_m', 'ppr_lowest_v', 'ppr_highest_v', 'ppr_zero_pa')
 
 
@@ -95,6 +98,7 @@ class Description:
         if self.muscle is None:
             self.muscle = self._nearest()
         self._scale_force_map()
+        self._scale_damping()
         if self.valve == 'ppr':
             self._regulator()
         elif self.regulator or self.volts or self.gauge_pa:
@@ -126,6 +130,19 @@ class Description:
                              f'with the force map of {self.muscle}', '--bore-mm')
         self._add('force_map_gain', round(gain, 6), BY_BORE_TOLERANCE,
                   f'(bore / bore of {self.muscle})^2: a first guess, measure it')
+
+    def _scale_damping(self) -> None:
+        """Take the damping of the nominal muscle by cross-section, where the bore is another."""
+        assert self.muscle is not None
+        nominal = next(p for p in self.parameters if p.name == DAMPING)
+        ratio = self.dimensions.get('bore_m', get_muscle(self.muscle).bore_m) / NOMINAL_BORE_M
+        said = self.numbers.get(DAMPING)
+        if ratio == 1.0 or self.load == 'isometric' or said and said.value is not None:
+            return
+        value = min(max(nominal.default * ratio ** 2, nominal.lower), nominal.upper)
+        self._add(DAMPING, float(f'{value:.3g}'), DAMPING_TOLERANCE,
+                  'not stated: that of the nominal muscle by cross-section, yours may differ by '
+                  'half')
 
     def _regulator(self) -> None:
         volts, gauge_pa, source = self.volts, self.gauge_pa, 'as stated'
@@ -165,6 +182,6 @@ class Description:
                              'one of them out', f'{name}={said.value:g}')
         parameter = next(p for p in self.parameters if p.name == name)
         known = tolerance if said is None else said.tolerance
-        where = 'muscle' if name == 'force_map_gain' else 'regulator'
+        where = 'muscle' if name in ('force_map_gain', DAMPING) else 'regulator'
         self.numbers[name] = Stated(parameter.check(value, where), known)
         self.notes[name] = note

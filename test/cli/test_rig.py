@@ -100,6 +100,20 @@ def test_another_bore_scales_the_force_map_and_says_so():
     assert 'first guess' in open('made.yaml', encoding='utf-8').read()
 
 
+def test_the_damping_of_another_bore_goes_by_cross_section_and_is_hardly_known():
+    rig = new('--muscle', 'dmsp_10_250')
+    assert rig.parameters['damping_n_s_per_m'] == 100.0
+    assert rig.tolerance['damping_n_s_per_m'] == 0.5
+    rig = new('--bore-mm', '20', '--unknown', 'damping_n_s_per_m', '--overwrite')
+    assert rig.parameters['damping_n_s_per_m'] == 400.0
+    assert rig.unknown == ('damping_n_s_per_m',)
+    # What is stated stays, and the nominal muscle is known.
+    rig = new('--muscle', 'dmsp_40_300', '--known', 'damping_n_s_per_m=7', '--overwrite')
+    assert rig.parameters['damping_n_s_per_m'] == 7.0
+    nominal = new('--muscle', 'dmsp_5_300', '--overwrite')
+    assert nominal.tolerance['damping_n_s_per_m'] == 0.02
+
+
 def test_a_force_map_is_found_from_another_folder(folder, monkeypatch):
     from pam_sim.muscle.laws.lookup import SHIPPED
     (folder / 'maps').mkdir()
