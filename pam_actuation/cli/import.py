@@ -57,6 +57,9 @@ def add_arguments(parser: Parser) -> None:
                         help='show columns and what they are read as; write nothing')
     parser.add_argument('--every', type=count(1, 10**6), default=1, metavar='N',
                         help='keep one row of N')
+    parser.add_argument('--resample', type=number(1.0, 1e4, 'Hz'), default=None, metavar='HZ',
+                        help='take slow readings as straight between them, at this rate, with '
+                             'noise of their resolution; for pam gap of a slow loop')
     parser.add_argument('--from', type=number(0.0, None, 's'), default=0.0, metavar='S',
                         dest='begin_s', help='leave out what was before, in s after the start')
     parser.add_argument('--to', type=number(0.0, None, 's'), default=float('inf'), metavar='S',
@@ -83,6 +86,7 @@ def run(args: argparse.Namespace) -> int:
     from pam_actuation.cli.common import check_outputs
     from pam_actuation.tables.importer import digest_of, recording_of, write_bag
     from pam_actuation.tables.preview import unread
+    from pam_actuation.tables.resample import hint, resampled
     from pam_sim import load_rig
     from pam_sim.files import write_text
     rig = load_rig(args.rig) if args.rig else None
@@ -98,6 +102,10 @@ def run(args: argparse.Namespace) -> int:
         length_m=MUSCLE_LENGTH_M if rig is None else rig.muscle.length_m)
     if args.begin_s > 0.0 or args.end_s < float('inf'):
         recording = recording.between(args.begin_s, args.end_s)
+    if args.resample is not None:
+        recording = resampled(recording, args.resample)
+    elif said := hint(recording):
+        recording.told.append(said)
     recording.sources = {Path(file).name: digest_of(file) for file in args.files}
     with progress(args, 1.0, '', 'writing') as bar:
         counts = write_bag(recording, out, rig=rig, namespace=args.namespace,

@@ -58,6 +58,8 @@ class Recording:
         How the time was read, one sentence a table.
     found : list of Doubt
         What is doubtful.
+    resampled_hz : float, optional
+        Rate at which values were put between the readings (``tables/resample.py``).
 
     """
 
@@ -66,6 +68,7 @@ class Recording:
     sources: dict[str, str] = field(default_factory=dict)
     told: list[str] = field(default_factory=list)
     found: list[Doubt] = field(default_factory=list)
+    resampled_hz: float | None = None
 
     @property
     def valve(self) -> str:
@@ -212,6 +215,7 @@ def write_bag(recording: Recording, path: StrPath, *, rig: Any = None, namespace
         rig=rig, valve=recording.valve, origin='imported',
         experiment_name=Path(next(iter(recording.sources), 'table')).stem,
         mapping=recording.mapping.to_yaml(),
+        resampled_hz='' if recording.resampled_hz is None else f'{recording.resampled_hz:g}',
         sources='\n'.join(f'{name} sha256 {digest}'
                           for name, digest in recording.sources.items()))
     space = namespace_of(namespace)
