@@ -29,7 +29,7 @@ DATA = ROOT.parent / 'shared' / 'data'
 PAGE = ROOT / 'docs' / 'guides' / 'measurements_of_others.md'
 FILES = re.compile(r'\$DATA/(\S+\.csv)')
 REPORTS = {
-    'steps_100hz': 'others_gap/report.html', 'quasi_static_loop': 'others_loop.html',
+    'steps_100hz': 'others_gap/report.html', 'quasi_static_loop': 'others_loop_gap/report.html',
     'contraction_00': 'others_00.html', 'contraction_25': 'others_identified/identify.json',
     'contraction_50': 'others_50.html', 'contraction_75': 'others_75.html',
     'A1_DMSP-20-300': 'others_map20/report.html', 'A2_DMSP-10-250': 'others_map10/report.html'}
