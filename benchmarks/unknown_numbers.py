@@ -223,6 +223,8 @@ def command_line():
     """Return the parser of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
     parser.add_argument('--number', type=int, default=60, help='cases (default: 60)')
+    parser.add_argument('--first', type=int, default=0, metavar='N',
+                        help='case that is the first of --number (default: 0)')
     parser.add_argument('--undetermined', type=int, default=40, metavar='N',
                         help='cases that determine nothing (default: 40)')
     parser.add_argument('--gap', type=int, default=0, metavar='N',
@@ -252,7 +254,7 @@ def main():
 def show_covered(args, until):
     """Print whether the intervals hold the true numbers."""
     rows = []
-    for place in range(args.number):
+    for place in range(args.first, args.first + args.number):
         if time.time() > until:
             break
         rows += covered(args.seed, place)
