@@ -18,6 +18,10 @@ How well each number is known: the interval in which its profile likelihood stay
 The profile of a number is the least cost that the others reach while it is held. Its 95 % interval
 ends where that cost is 3.84 above the least one (Raue et al. 2009, Bioinformatics 25(15), 1923).
 An end that lies at the end of the range is open: the data do not exclude what is beyond.
+
+With effects fitted along, many numbers end at a bound and the least cost of the others is hardly
+found: the profile then rises too soon. So there an end is no nearer than that of the slopes at the
+solution, all numbers within their bounds.
 """
 
 from dataclasses import dataclass, replace
@@ -35,8 +39,9 @@ RISE_95 = 3.841              # 95 % of chi squared with one degree of freedom
 FARTHER = 2.0                # next try, where the cost has not risen enough
 FLAT, FLAT_FARTHER = 0.1, 10.0       # the same, where it has hardly risen
 TRIES = 9
-BETTER = 0.1                 # of the cost
+BETTER = RISE_95             # of the cost; what is less lies within the interval
 CLOSE = 0.15                 # of the wanted rise
+HALVINGS, ROUNDING = 8, 1e-9         # of a shift; least room of a number, and its information
 
 
 @dataclass(frozen=True)
@@ -69,6 +74,43 @@ class Interval:
         low, high = (number.coordinate(end) for end in (self.low, self.high))
         return replace(self, low=number.value(at - math.hypot(at - low, doubt)),
                        high=number.value(at + math.hypot(high - at, doubt)))
+
+
+def straight_end(weighted: Weighted, x: FloatArray, place: int, slopes: FloatArray, most: float
+                 ) -> float:
+    """
+    Return the shift of a number, without its sign, at which the cost rises enough by the slopes.
+
+    Parameters
+    ----------
+    weighted, x, place, slopes
+        As of ``profile``.
+    most : float
+        The shift without bounds of the other numbers, with its sign.
+
+    """
+    from scipy.optimize import lsq_linear       # slow to import
+
+    free = np.arange(x.size) != place
+    root = np.linalg.cholesky(slopes.T @ slopes + ROUNDING * np.eye(x.size)).T
+    target = np.linalg.solve(root.T, -slopes.T @ weighted.residuals(x))
+    low = np.minimum(weighted.low - x, -ROUNDING)[free]
+    high = np.maximum(weighted.high - x, ROUNDING)[free]
+
+    def cost(shift: float) -> float:
+        return 2.0 * float(lsq_linear(
+            root[:, free], target - shift * root[:, place], (low, high)).cost)
+
+    least, near, far = cost(0.0), 0.0, 1.0
+    if cost(most) - least <= RISE_95:
+        return abs(most)
+    for _ in range(HALVINGS):
+        middle = 0.5 * (near + far)
+        if cost(middle * most) - least > RISE_95:
+            far = middle
+        else:
+            near = middle
+    return far * abs(most)
 
 
 def profile(weighted: Weighted, x: FloatArray, place: int, covariance: FloatArray,
@@ -112,7 +154,9 @@ def profile(weighted: Weighted, x: FloatArray, place: int, covariance: FloatArra
     for sign, limit in ((-1.0, weighted.low[place]), (1.0, weighted.high[place])):
         room = abs(limit - x[place])
         shift = min(NORMAL_95 * float(np.sqrt(covariance[place, place])), room)
-        inner, inner_rise, outer = 0.0, 0.0, None
+        if weighted.incomplete:
+            shift = straight_end(weighted, x, place, slopes, sign * shift)
+        inner, inner_rise, outer, first = 0.0, 0.0, None, len(points) + 1
         near, end, is_open = x, room, True
         for _ in range(TRIES):
             if shift <= 1e-9:
@@ -129,6 +173,9 @@ def profile(weighted: Weighted, x: FloatArray, place: int, covariance: FloatArra
                 end, is_open = room, True
             else:
                 outer = (shift, height)
+                if weighted.incomplete and len(points) == first and shift < room:
+                    end, is_open = shift, False
+                    break
             if outer is None:
                 shift = min(shift * (FLAT_FARTHER if height < FLAT else FARTHER), room)
                 continue

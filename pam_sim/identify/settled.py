@@ -22,21 +22,24 @@ the command:
     reading = zero + p_zero + K_m (u - u_low)
 
 So where no effect of the library explains the valve, this line gives the zero. The gain keeps its
-prior, or is found along where it is unknown.
+prior, or is found along where it is unknown. The zero acts in muscle and load, too: a bent one
+bends a mass. So the numbers of muscle and load are then fitted without the valve, with this zero.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 import math
 
 import numpy as np
 from pam_sim.annotations import FloatArray
+from pam_sim.gap.data.noise import SMALLEST
 from pam_sim.gap.data.recording import GRID_S, Recording, START_S
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.gap.verify.uncertainty import NORMAL_95
-from pam_sim.identify.fit import used
+from pam_sim.identify.fit import used, Weighted
 from pam_sim.identify.judgement import DETERMINED, is_narrow, UNDETERMINED
 from pam_sim.identify.profile import Interval
-from pam_sim.identify.result import Found
+from pam_sim.identify.result import Found, half_width
 from pam_sim.rig import Rig
 from pam_sim.tolerance import UNKNOWN
 from pam_sim.units import P_ATM_PA
@@ -116,6 +119,40 @@ def with_settled_zero(rig: Rig, unexplained: Sequence[SubsystemProblem], found: 
     number, (value, interval) = found[place].number, settled
     status = DETERMINED if is_narrow(number, interval.low, interval.high) else UNDETERMINED
     return [*found[:place], Found(number, value, interval, status), *found[place + 1:]], [ZERO]
+
+
+def beside_settled_zero(weighted: Weighted, x: FloatArray, found: Sequence[Found]
+                        ) -> tuple[Weighted, FloatArray, int] | None:
+    """
+    Return (problem, start, how many numbers are sought) of muscle and load without the valve.
+
+    The sought ones come first. The zero has what its holds say as prior, and effects begin at
+    none. None where only the valve was recorded, or nothing else is sought.
+
+    Parameters
+    ----------
+    weighted : Weighted
+        Of all subsystems, its first numbers those of ``found``.
+    x : numpy.ndarray
+        Its solution.
+    found : list of Found
+        With the settled zero.
+
+    """
+    rest = [p for p in weighted.problems if p.subsystem != 'valve']
+    zero = next(k for k, one in enumerate(found) if one.number.name == ZERO)
+    inside = [k for k, n in enumerate(weighted.numbers) if any(n.acts_in(p) for p in rest)]
+    sought = [k for k in inside if k < len(found) and k != zero]
+    if not rest or not sought:
+        return None
+    known = replace(found[zero].number, start=found[zero].value,
+                    sd=max(half_width(found[zero]), SMALLEST['pressure']) / NORMAL_95)
+    order = [*sought, *(k for k in inside if k not in sought)]
+    numbers = [known if k == zero else weighted.numbers[k] for k in order]
+    start = np.array([0.0 if k == zero or k >= len(found) and weighted.numbers[k].effect
+                      else float(x[k]) for k in order])
+    return Weighted(weighted.rig, rest, numbers, incomplete=weighted.incomplete), start, len(
+        sought)
 
 
 def _holds(valve: SubsystemProblem, index: int, recording: Recording) -> list[tuple[float, float]]:

@@ -29,7 +29,7 @@ from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.gap.verify.uncertainty import NORMAL_95
 from pam_sim.identify.advice import next_experiment, where_open
 from pam_sim.identify.fit import fit, NOWHERE, Weighted
-from pam_sim.identify.judgement import DETERMINED, judge
+from pam_sim.identify.judgement import Combination, DETERMINED, judge
 from pam_sim.identify.numbers import (
     known_numbers_of, Number, unknown_numbers, with_values)
 from pam_sim.identify.possible import (
@@ -38,7 +38,7 @@ from pam_sim.identify.profile import Interval, profile
 from pam_sim.identify.records import offer_of, problems_of
 from pam_sim.identify.result import Found, half_width, Identification
 from pam_sim.identify.secant import settle, solve_from
-from pam_sim.identify.settled import with_settled_zero
+from pam_sim.identify.settled import beside_settled_zero, with_settled_zero
 from pam_sim.muscle.coefficients import stated_names
 from pam_sim.rig import Rig
 from pam_sim.run import Run
@@ -47,6 +47,7 @@ from pam_sim.tolerance import AbsoluteSd, UNKNOWN
 # Without a force, both bend the way from pressure to contraction.
 LAW_AND_EFFECT = ('something is missing from the model, and without a recorded force it is not '
                   'told from the force law')
+Squares = list[tuple[SubsystemProblem, str, float]]
 RETURNS = 4                  # to the fit, where a profile met a better solution
 
 
@@ -108,7 +109,7 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
     acting = [n for n in wanted if any(n.acts_in(p) for p in problems)]
     numbers = [*acting, *known_numbers_of(problems, acting)]
     weighted = Weighted(rig, problems, numbers)
-    before = _rms(weighted, np.zeros(len(numbers)))
+    before = _rms(weighted.mean_squares(np.zeros(len(numbers))))
     x = fit(weighted, seed)
     progress(0.3)
     incomplete = is_incomplete(weighted, x)
@@ -137,26 +138,26 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
         weighted, x, forms = in_other_forms(weighted, x, len(acting))
         x = settle(weighted, x)
     progress(0.6)
-    count = len(acting)
-    x, covariance, intervals = _profiles(
-        weighted, x, count, lambda done: progress(0.6 + 0.3 * done))
-    intervals = [one.wider(n, n.value(float(c)), float(f))
-                 for one, n, c, f in zip(intervals, acting, x, forms)]
-    information = np.linalg.inv(covariance[:count, :count] + np.diag((forms / NORMAL_95) ** 2))
-    statuses, combinations = judge(acting, intervals, x[:count], information)
-    numbers_found = [Found(n, n.value(float(c)), i, s)
-                     for n, c, i, s in zip(acting, x, intervals, statuses)]
-    left = [(p, name, square) for p, name, square in weighted.mean_squares(x)
-            if square > SEEN_FLOORS2]
+    x, information, numbers_found, combinations = _judged(
+        weighted, x, acting, forms, lambda done: progress(0.6 + 0.3 * done))
+    first, squares = numbers_found, weighted.mean_squares(x)
+    numbers_found, at_rest = with_settled_zero(
+        rig, [p for p, _, square in squares if square > CRITERIA.clear_rest], first)
+    beside = beside_settled_zero(weighted, x, numbers_found) if at_rest else None
+    if beside is not None:
+        more, joined, own = _without_valve(*beside)
+        numbers_found = [more.get(one.number.name, one) for one in numbers_found]
+        combinations = joined + [c for c in combinations if not set(more) & set(c.weights)]
+        squares = own + [one for one in squares if one[0].subsystem == 'valve']
+    left = [(p, name, square) for p, name, square in squares if square > SEEN_FLOORS2]
     starting = [n.name for n in acting if any(n.acts_in(p) for p, _, _ in left)]
     # A small rest of another formulation bends little; a clear one bends the fit of every edge.
-    clear = [p for p, _, square in left if square > CRITERIA.clear_rest]
-    bent = [n.name for n in acting if any(n.acts_in(p) for p in clear)]
-    numbers_found, at_rest = with_settled_zero(rig, clear, numbers_found)
+    bent = [n.name for n in acting if any(
+        n.acts_in(p) for p, _, square in left if square > CRITERIA.clear_rest)]
     result = Identification(
         _identified(rig, numbers_found), numbers_found, combinations,
         [{'path': one.path, 'kind': one.kind, 'added_kg': one.added_kg} for one in offers],
-        _signals(before, _rms(weighted, x)), incomplete, bent=bent)
+        _signals(before, _rms(squares)), incomplete, bent=bent)
     result.remarks += remarks + ([] if force_compared else _of_one_scale(acting))
     result.remarks += _starting_values(left, [name for name in starting if name not in at_rest])
     result.remarks += [f'{name}: from the holds, where the regulator has settled; no effect of '
@@ -169,7 +170,8 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
         for n in wanted if n not in acting]
     if advise and (result.open_names or len(acting) < len(wanted)):
         with_force = any('force' in one.recording.signals for one in offers)
-        x, information = where_open(acting, intervals, statuses, x, information)
+        x, information = where_open(acting, [one.interval for one in first],
+                                    [one.status for one in first], x, information)
         result.next_experiment = next_experiment(
             with_values(rig, numbers, weighted.values(x)), wanted, acting, information,
             offers, with_force)
@@ -183,6 +185,36 @@ def identify_beside(law: Sequence[str], runs: Sequence[Run], rig: Rig, **options
     found = identify(runs, rig.with_(tolerance=dict.fromkeys(law, 0.0)), **options)
     found.rig = found.rig.with_(tolerance=dict.fromkeys(law, UNKNOWN))
     return found
+
+
+def _judged(weighted: Weighted, x: FloatArray, acting: Sequence[Number], forms: FloatArray,
+            progress: Callable[[float], object] = lambda done: None
+            ) -> tuple[FloatArray, FloatArray, list[Found], list[Combination]]:
+    """Return (solution, information, what is known of each first number, and of several)."""
+    count = len(acting)
+    x, covariance, intervals = _profiles(weighted, x, count, progress)
+    intervals = [one.wider(n, n.value(float(c)), float(f))
+                 for one, n, c, f in zip(intervals, acting, x, forms)]
+    information = np.linalg.inv(covariance[:count, :count] + np.diag((forms / NORMAL_95) ** 2))
+    statuses, combinations = judge(acting, intervals, x[:count], information)
+    found = [Found(n, n.value(float(c)), i, s)
+             for n, c, i, s in zip(acting, x, intervals, statuses)]
+    return x, information, found, combinations
+
+
+def _without_valve(weighted: Weighted, x: FloatArray, count: int
+                   ) -> tuple[dict[str, Found], list[Combination], Squares]:
+    """Return (numbers by name, combinations, mean squares) of muscle and load alone."""
+    acting = weighted.numbers[:count]
+    forms: FloatArray = np.zeros(count)
+    for _ in range(2):          # full weights first, as in the fit
+        x, _, _ = solve_from(weighted, x)
+    if weighted.incomplete:
+        weighted.retemper(x)
+        weighted, x, forms = in_other_forms(weighted, x, count)
+    x = settle(weighted, x)
+    x, _, found, combinations = _judged(weighted, x, acting, forms)
+    return ({one.number.name: one for one in found}, combinations, weighted.mean_squares(x))
 
 
 def _profiles(weighted: Weighted, x: FloatArray, count: int, progress: Callable[[float], object]
@@ -213,8 +245,7 @@ def _of_one_scale(acting: Sequence[Number]) -> list[str]:
             'State the mass, or record a force']
 
 
-def _starting_values(left: Sequence[tuple[SubsystemProblem, str, float]], names: Sequence[str]
-                     ) -> list[str]:
+def _starting_values(left: Squares, names: Sequence[str]) -> list[str]:
     """Return a sentence on the numbers whose signals are not explained even with effects."""
     if not names:
         return []
@@ -240,10 +271,9 @@ def _identified(rig: Rig, found: Sequence[Found]) -> Rig:
         if not one.number.effect and one.status == DETERMINED})
 
 
-def _rms(weighted: Weighted, x: FloatArray) -> dict[str, float]:
+def _rms(squares: Squares) -> dict[str, float]:
     """Return the rms error of every signal, SI."""
-    return {name: p.floor[name] * math.sqrt(square)
-            for p, name, square in weighted.mean_squares(x)}
+    return {name: p.floor[name] * math.sqrt(square) for p, name, square in squares}
 
 
 def _signals(before: dict[str, float], after: dict[str, float]) -> dict[str, dict[str, Any]]:
