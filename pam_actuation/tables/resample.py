@@ -52,7 +52,8 @@ def resampled(recording: Recording, rate_hz: float) -> Recording:
 
     """
     begin_ns = min(int(stamps[0]) for stamps, _ in recording.signals.values())
-    random, signals, told = np.random.default_rng(SEED), {}, []
+    random, told = np.random.default_rng(SEED), []
+    signals: dict[str, tuple[IntArray, FloatArray]] = {}
     for name, (stamps, values) in recording.signals.items():
         known = np.isfinite(values)
         time_s, values = 1e-9 * (stamps[known] - begin_ns), values[known]
