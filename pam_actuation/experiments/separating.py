@@ -122,21 +122,24 @@ def next_experiment(
         Whether a load cell that was not recorded may be asked for.
 
     """
-    found: list[tuple[tuple[bool, float, float], str, bool]] = []
     truth = rivals[0][1].with_(sensors=_sensors(noise))
     known = menu(rig.valve)
-    for name in pieces or known:
-        if out_of_time() and found:
+    runs: dict[str, RecordedRun] = {}
+    found: list[tuple[tuple[bool, float, float], str, bool]] = []
+    # A load cell that was not recorded is tried only where nothing is clear enough without it.
+    for with_cell in (False, True) if may_add_cell and 'force' not in recorded else (False,):
+        if any(is_clear for (is_clear, _, _), _, _ in found):
             break
-        try:
-            run = simulated(_experiment(known, [name]), truth)
-            apart = {False: separation(run, rig, rivals, 'force' in recorded)}
-            if may_add_cell and 'force' not in recorded:
-                apart[True] = separation(run, rig, rivals, True)
-        except InputError:
-            continue
-        for with_cell, (sigma, sure) in apart.items():
-            # Without a further sensor, if that is clear enough.
+        for name in pieces or known:
+            if out_of_time() and found:
+                break
+            try:
+                if name not in runs:
+                    runs[name] = simulated(_experiment(known, [name]), truth)
+                sigma, sure = separation(
+                    runs[name], rig, rivals, with_cell or 'force' in recorded)
+            except InputError:
+                continue
             rank = (not with_cell and sure >= 1.0 and sigma > CLEAR, min(sure, 1.0), sigma)
             found.append((rank, name, with_cell))
     if not found:
