@@ -26,6 +26,7 @@ large one does not close on itself, unlike Maxwell slip.
 """
 
 from collections.abc import Mapping
+import math
 from typing import Any
 
 import numpy as np
@@ -41,6 +42,7 @@ from pam_sim.records import record
 
 _LONGEST = 0.05         # of one midpoint step, in widths: z is good to 0.002
 _FAR = 20.0             # widths after which z no longer depends on where it began
+_STRAIGHT = 1e-9        # the slope after a reversal is 1, to the last bit that counts
 
 
 def _pack(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
@@ -78,18 +80,32 @@ EFFECT = Effect(
 @compiled
 def slope(z: float, exponent: float, back: float) -> float:
     """Return W dz/ds for a travel s in the direction of positive z."""
-    size = abs(z)
-    if exponent != 1.0:         # a power costs more than all the rest
-        size **= exponent
+    size = abs(z) ** exponent
     return 1.0 - size if z > 0.0 else 1.0 + back * size
 
 
 @compiled
+def loaded_exactly(y: float, widths: float, back: float) -> float:
+    """Return y after so many widths towards 1, for the exponent 1."""
+    if y < 0.0:
+        # Widths to zero, of which the travel may be a part.
+        to_zero = -y if back < _STRAIGHT else math.log1p(-back * y) / back
+        if widths < to_zero:
+            return (y + widths if back < _STRAIGHT
+                    else y - (1.0 - back * y) * math.expm1(-back * widths) / back)
+        widths -= to_zero
+        y = 0.0
+    return y - (1.0 - y) * math.expm1(-widths)
+
+
+@compiled
 def loaded(z: float, widths: float, exponent: float, back: float) -> float:
-    """Return z after a signed travel of so many widths (midpoint rule in short steps)."""
+    """Return z after a signed travel of so many widths; a midpoint rule but for the exponent 1."""
     sign = 1.0 if widths > 0.0 else -1.0
-    left = min(abs(widths), _FAR)
     y = z * sign
+    if exponent == 1.0:
+        return sign * loaded_exactly(y, abs(widths), back)
+    left = min(abs(widths), _FAR)
     while left > 0.0:
         h = min(left, _LONGEST)
         left -= h

@@ -115,14 +115,15 @@ def test_bouc_wen_follows_its_equation():
     path, _ = legs(5, 7)
     travel = (path - path[0]) / 0.8e-3
     assert np.allclose(change(path, 'hysteresis_bouc_wen'),
-                       -HALF_WIDTH_N * (1.0 - np.exp(-travel)), atol=2e-3)
+                       -HALF_WIDTH_N * (1.0 - np.exp(-travel)), atol=1e-9)
     assert np.allclose(change(path, 'hysteresis_bouc_wen', exponent=2.0),
                        -HALF_WIDTH_N * np.tanh(travel), atol=2e-3)
-    # From the sliding state back: straight to zero at sigma = 1/2.
+    # From the sliding state back: straight to zero at sigma = 1/2, else an exponential.
     path, (_, turn, _) = legs(2, 22, 21.4)
-    back = (path[turn] - path[turn:]) / 0.8e-3
-    assert np.allclose(change(path, 'hysteresis_bouc_wen')[turn:], -HALF_WIDTH_N * (1.0 - back),
-                       atol=2e-3)
+    widths = (path[turn] - path[turn:]) / 0.8e-3
+    for sigma, share in ((0.5, 1.0 - widths), (0.8, (1.6 * np.exp(-0.6 * widths) - 1.0) / 0.6)):
+        assert np.allclose(change(path, 'hysteresis_bouc_wen', sigma=sigma)[turn:],
+                           -HALF_WIDTH_N * share, atol=1e-9)
 
 
 def test_lugre_breaks_away_at_its_static_friction():
