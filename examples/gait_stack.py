@@ -20,9 +20,11 @@ A small gait stack that drives both knees: what a larger one would do, in plain 
 
 It knows of the knees only what any stack knows: ``joint_trajectory`` and ``co_contraction`` go
 in, ``joint_state`` comes out, by joint name. First both legs go to their places, a movement
-sent as a whole, and again should a leg not be there at its end (whoever has just been connected
-may miss the first message); then the next 0.6 s of the stride are sent 20 times a second, the
-stance stiffer than the swing. All joints together are on ``joint_states``, where viewers look.
+sent as a whole. It is sent again should a leg not be there at its end: whoever has just been
+connected may miss the first message. Then the next 0.6 s of the stride are sent 20 times a
+second. The stance is stiffer than the swing. All joints together are on ``joint_states``, where
+viewers look.
+
 Exit code: 0 done, 1 a knee fell silent or did not get to its place.
 """
 
