@@ -15,6 +15,7 @@
 """Style: the rules of the ROS 2 linters, the licence header, the size of files."""
 
 import ast
+import builtins
 import json
 from pathlib import Path
 import statistics
@@ -93,8 +94,8 @@ class Two():
 """
 
 
-# What flake8 7.3 with the plug-ins of ament_flake8 says of these, line by line; it adds I100 of
-# the second and third line of the source, and names the twelfth D001.
+# What flake8 7.3 with the plug-ins of ament_flake8 says of these, line by line. Of the source it
+# adds I100 of the second and third line and A003 of the eighth, and names the twelfth D001.
 FOUND_IN_SOURCE = [
     (1, 'E401'), (1, 'F401'), (1, 'F401'), (2, 'F403'), (7, 'Q000'), (8, 'A002'), (8, 'E202'),
     (8, 'E251'), (8, 'E251'), (8, 'E301'), (9, 'C404'), (11, 'F405'), (11, 'Q000'), (12, 'C411'),
@@ -132,6 +133,19 @@ def out_of_order(file, style):
             if error.code != 'I202']
 
 
+def shadowed(file):
+    """Return the lines on which a class gives a method or an attribute the name of a builtin."""
+    text = file.read_text(encoding='utf-8')
+    meant = {number for number, line in enumerate(text.splitlines(), 1) if 'noqa: A003' in line}
+    of_classes = (one for node in ast.walk(ast.parse(text))
+                  if isinstance(node, ast.ClassDef) for one in node.body)
+    named = ((one.lineno, name) for one in of_classes for name in (
+        [one.name] if isinstance(one, (ast.FunctionDef, ast.AsyncFunctionDef))
+        else [getattr(target, 'id', '') for target in getattr(one, 'targets', ())]))
+    return [line for line, name in named
+            if hasattr(builtins, name) and not name.startswith('__') and line not in meant]
+
+
 def test_ruff_finds_nothing():
     """The sources, the launch files, the examples, the benchmarks and the tests, all of them."""
     pytest.importorskip('ruff')
@@ -146,8 +160,11 @@ def test_ruff_finds_nothing():
 
 @pytest.mark.slow
 def test_continuation_lines_are_indented():
+    """And a class ends its first line with an empty one where a method follows, CNL100."""
     pycodestyle = pytest.importorskip('pycodestyle')
-    guide = pycodestyle.StyleGuide(select=CONTINUATION_LINES, max_line_length=99)
+    plug_in = pytest.importorskip('flake8_class_newline')
+    pycodestyle.register_check(plug_in.new_line_checker, ['CNL1'])
+    guide = pycodestyle.StyleGuide(select=[*CONTINUATION_LINES, 'CNL1'], max_line_length=99)
     assert guide.check_files(map(str, SOURCES)).total_errors == 0
 
 
@@ -161,17 +178,23 @@ def test_imports_have_the_order_of_google(google):
     assert {str(path): found for path in SOURCES if (found := out_of_order(path, google))} == {}
 
 
+def test_no_attribute_of_a_class_has_the_name_of_a_builtin():
+    """A003 of flake8-builtins; that of Ruff looks only where such an attribute is used."""
+    assert {str(path): found for path in SOURCES if (found := shadowed(path))} == {}
+
+
 def test_the_linters_say_what_flake8_with_its_plug_ins_says(google, tmp_path):
     pytest.importorskip('ruff')
-    for text, wanted, mistakes in (
-            (BAD_SOURCE, FOUND_IN_SOURCE, [(2, 'I100'), (3, 'I100')]),
-            (BAD_DOCSTRINGS, FOUND_IN_DOCSTRINGS, [])):
+    for text, wanted, mistakes, lines in (
+            (BAD_SOURCE, FOUND_IN_SOURCE, [(2, 'I100'), (3, 'I100')], [8]),
+            (BAD_DOCSTRINGS, FOUND_IN_DOCSTRINGS, [], [])):
         file = tmp_path / 'bad.py'
         file.write_text(text, encoding='utf-8')
         found = sorted((one['location']['row'], one['code']) for one in ruff(str(file)))
         # Of sections of a docstring Ruff finds more than pydocstyle.
         assert [one for one in found if one not in ((29, 'D410'), (32, 'D411'))] == wanted
         assert out_of_order(file, google) == mistakes
+        assert shadowed(file) == lines
 
 
 def test_pyproject_holds_the_rules_of_the_ament_linters():
