@@ -23,10 +23,11 @@ from pam_actuation.tables.importer import Recording
 from pam_actuation.tables.signals import BY_NAME
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.errors import InputError
+from pam_sim.gap.data.noise import smallest_step
 
 MEASURED = 'pressure', 'supply_pressure', 'contraction', 'force', 'external_force'
 HOLE_STEPS = 5.0             # times the usual step: readings are missing, and nothing is between
-FINEST = 1e-9                # of the range: below, two readings are equal
+ROUNDING = 1e-9              # of a sample: the grid holds the first and the last reading
 SEED = 0                     # of the noise: the same file gives the same bag
 
 
@@ -60,17 +61,18 @@ def resampled(recording: Recording, rate_hz: float) -> Recording:
         if time_s.size < 2:
             raise InputError(f'{name} has {time_s.size} readings; at least 2 are needed',
                              '--resample')
-        step_s = float(np.median(np.diff(time_s)))
+        step_s = _usual_step_s(stamps[known])
         if step_s * rate_hz <= 1.0:
             raise InputError(
                 f'{rate_hz:g} Hz is not above the {1.0 / step_s:.4g} Hz at which {name} was '
                 'read; allowed is a higher rate, or --every N for fewer rows', '--resample')
-        first = math.ceil(time_s[0] * rate_hz - FINEST)
-        last = math.floor(time_s[-1] * rate_hz + FINEST)
+        first = math.ceil(time_s[0] * rate_hz - ROUNDING)
+        last = math.floor(time_s[-1] * rate_hz + ROUNDING)
         grid_s = np.arange(first, last + 1) / rate_hz
         before = np.clip(np.searchsorted(time_s, grid_s, 'right') - 1, 0, time_s.size - 2)
         grid_s = grid_s[np.diff(time_s)[before] <= HOLE_STEPS * step_s]
-        made, fineness = np.interp(grid_s, time_s, values), resolution(values)
+        made = np.interp(grid_s, time_s, values)
+        fineness = smallest_step(np.unique(values))
         if name in MEASURED:
             made += fineness / math.sqrt(12.0) * random.standard_normal(made.size)
             told.append(f'{name}: read every {step_s:.4g} s, in steps of '
@@ -85,22 +87,14 @@ def resampled(recording: Recording, rate_hz: float) -> Recording:
 def hint(recording: Recording) -> str:
     """Return a sentence on readings too slow for ``pam gap`` and what can be done, '' without."""
     slow = [name for name, (stamps, values) in recording.signals.items()
-            if name in MEASURED and _usual_step_s(stamps, values) > 1.0 / SLOW_HZ]
+            if name in MEASURED and _usual_step_s(stamps[np.isfinite(values)]) > 1.0 / SLOW_HZ]
     return '' if not slow else (
         f'{", ".join(slow)}: read too slowly for pam gap. For a motion so slow that it is '
         'straight between its readings, such as a loop, add --resample 100')
 
 
-def _usual_step_s(stamps: IntArray, values: FloatArray) -> float:
-    known = stamps[np.isfinite(values)]
-    return 1e-9 * float(np.median(np.diff(known))) if known.size > 1 else 0.0
-
-
-def resolution(values: FloatArray) -> float:
-    """Return the smallest difference between two readings that are not equal; 0 without one."""
-    steps = np.diff(np.unique(values))
-    steps = steps[steps > FINEST * float(np.ptp(values))]
-    return float(steps.min()) if steps.size else 0.0
+def _usual_step_s(stamps: IntArray) -> float:
+    return 1e-9 * float(np.median(np.diff(stamps))) if stamps.size > 1 else 0.0
 
 
 def _shown(name: str, size: float) -> str:

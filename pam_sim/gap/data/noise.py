@@ -144,10 +144,14 @@ def quantisation_step(values: FloatArray) -> float:
     values = np.asarray(values, dtype=float)
     distinct = np.unique(values)
     # A quantised signal repeats its values; a free one hardly ever does.
-    if distinct.size < 2 or distinct.size > 0.5 * values.size:
-        return 0.0
+    return smallest_step(distinct) if distinct.size <= 0.5 * values.size else 0.0
+
+
+def smallest_step(distinct: FloatArray) -> float:
+    """Return the smallest difference between rising values; 0 without one."""
     steps = np.diff(distinct)
-    return float(steps[steps > 1e-9 * np.ptp(values)].min(initial=np.inf)) if steps.size else 0.0
+    steps = steps[steps > 1e-9 * np.ptp(distinct)] if steps.size else steps
+    return float(steps.min()) if steps.size else 0.0
 
 
 def sensor_floor(time_s: FloatArray, values: FloatArray, signal: str, inputs_sd: float = 0.0
