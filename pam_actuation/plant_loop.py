@@ -229,10 +229,13 @@ class Backlog(Generic[Arrived]):
     def take(self, now_ns: int, arrived: Iterable[Arrived]) -> list[Arrived] | None:
         """Return what is to be applied now, as a list; None while more may be on its way."""
         last_ns, self._last_ns = self._last_ns, now_ns
-        if last_ns is not None and now_ns - last_ns > self._after_ns:
-            self._until_ns = now_ns + self._patience_ns
         self._held += arrived
-        if last_ns is not None and last_ns <= now_ns < self._until_ns:
+        if last_ns is None or now_ns < last_ns:         # the first call, or a clock set back
+            self._until_ns = now_ns
+        elif now_ns - last_ns > self._after_ns and last_ns >= self._until_ns:
+            # One wait for a standstill: where all calls are late, each would begin another.
+            self._until_ns = now_ns + self._patience_ns
+        if now_ns < self._until_ns:
             return None
         taken, self._held = self._held, []
         return taken

@@ -164,4 +164,20 @@ def test_what_arrives_after_a_standstill_waits_for_the_rest():
     assert backlog.take(back + 19 * MS, ['d']) is None
     assert backlog.take(back + 20 * MS, ['e']) == ['b', 'c', 'd', 'e']
     assert backlog.take(back + 21 * MS, ['f']) == ['f']
-    assert backlog.take(START, ['g']) == ['g']          # a clock that was set back waits for none
+
+
+def test_a_wait_ends_where_the_clock_is_set_back():
+    """Nothing waits for a time that lies ahead again."""
+    backlog = Backlog(after_s=0.05, patience_s=0.02)
+    backlog.take(START, [])
+    assert backlog.take(START + 1000 * MS, ['a']) is None
+    assert backlog.take(START, ['b']) == ['a', 'b']
+    assert backlog.take(START + 1 * MS, ['c']) == ['c']
+
+
+def test_late_calls_do_not_hold_messages_back_for_ever():
+    """On a machine where every call is late each second one goes on."""
+    backlog = Backlog(after_s=0.05, patience_s=0.02)
+    backlog.take(START, [])
+    taken = [backlog.take(START + k * 60 * MS, [k]) for k in range(1, 5)]
+    assert taken == [None, [1, 2], None, [3, 4]]

@@ -130,7 +130,7 @@ class SafetySupervisor:
         self._device_problem = ''
         self._seen_command = False
         self._seen_pressure = False
-        self._command_problem = ''
+        self.command_problem = ''       # why the newest command was ignored, '' if it was not
         self._warnings: dict[str, tuple[str, int]] = {}
         self._fault: Fault | None = ('no_command', '')
         self._standing: Fault | None = None
@@ -292,11 +292,11 @@ class SafetySupervisor:
             problem, key = 'is not newer than the one before', 'command_out_of_order'
         if problem:
             self.commands_ignored += 1
-            self._command_problem = problem
+            self.command_problem = problem
             self._warn(key, f'a pressure command was ignored: it {problem}', now_ns)
             return
         self.command_stamp_ns, self.command_pa = stamp_ns, value
-        self._command_problem = ''
+        self.command_problem = ''
         self._seen_command = True
         self.command_duty = None
         if is_duty:
@@ -365,12 +365,12 @@ class SafetySupervisor:
             return 'two_publishers', ('two publishers send pressure_command (stamps or sequence '
                                       'numbers go back and forth), stop one of them')
         if not self._seen_command:
-            why = f'; the last one {self._command_problem}' if self._command_problem else ''
+            why = f'; the last one {self.command_problem}' if self.command_problem else ''
             return 'no_command', 'waiting for the first pressure command' + why
         age_s = math.inf if self.command_stamp_ns is None else (
             (now_ns - self.command_stamp_ns) / _NS)
         if age_s > lim.command_timeout_s + grace_s:
-            why = f'; the last one {self._command_problem}' if self._command_problem else ''
+            why = f'; the last one {self.command_problem}' if self.command_problem else ''
             return 'command_timeout', (
                 f'no valid pressure command for {age_s * 1e3:.0f} ms '
                 f'(limit {lim.command_timeout_s * 1e3:.0f} ms){why}')
