@@ -21,6 +21,7 @@ from pam_sim.annotations import FloatArray
 from pam_sim.compiled import allocating_entry_point, entry_point, source_key
 from pam_sim.joint import step as steps
 from pam_sim.joint.step import Arrays
+from pam_sim.rollout import physical
 
 
 def _entries(key: int) -> tuple[Callable[..., Any], ...]:
@@ -63,10 +64,15 @@ def _rollout_entry(key: int) -> Callable[..., Any]:
     @allocating_entry_point
     def joint_rollout(inputs: FloatArray, joint: Arrays, flexor: Arrays, extensor: Arrays,
                       joint_rows: FloatArray, flexor_rows: FloatArray,
-                      extensor_rows: FloatArray) -> None:
-        """Step through ``inputs``, N rows of ``INPUT``; the rows have N + 1 lines, 0 the start."""
+                      extensor_rows: FloatArray) -> tuple[int, int]:
+        """
+        Step through ``inputs``, N rows of ``INPUT``; the rows have N + 1 lines, 0 the start.
+
+        Of flexor and extensor the first line that is not physical is returned, -1 where all are.
+        """
         if key < 0:
-            return
+            return 0, 0
+        flexor_unphysical = extensor_unphysical = -1
         inp, _, _, out = joint
         _, _, _, flexor_out = flexor
         _, _, _, extensor_out = extensor
@@ -79,8 +85,13 @@ def _rollout_entry(key: int) -> Callable[..., Any]:
             joint_rows[i] = out
             flexor_rows[i] = flexor_out
             extensor_rows[i] = extensor_out
+            if flexor_unphysical < 0 and not physical.is_physical(flexor_out, 0):
+                flexor_unphysical = i
+            if extensor_unphysical < 0 and not physical.is_physical(extensor_out, 0):
+                extensor_unphysical = i
+        return flexor_unphysical, extensor_unphysical
 
     return joint_rollout
 
 
-joint_rollout = _rollout_entry(source_key(steps))
+joint_rollout = _rollout_entry(source_key(steps, physical))

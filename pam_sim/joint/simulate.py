@@ -40,10 +40,10 @@ def simulate_joint(joint: 'JointRig', flexor_signal: FloatArray, extensor_signal
     plant = joint.plant(dt_s=dt_s, **initial)
     rows = [np.empty((len(inputs) + 1, size))
             for size in map(size_of, (layout.OUTPUT, muscle.OUTPUT, muscle.OUTPUT))]
-    kernel.joint_rollout(inputs, *plant.arrays, *rows)
+    unphysical = kernel.joint_rollout(inputs, *plant.arrays, *rows)
     motion, *sides = rows
-    for rig, outputs in zip((joint.flexor, joint.extensor), sides):
-        one_muscle.check_outputs(rig, outputs)
+    for rig, outputs, row in zip((joint.flexor, joint.extensor), sides, unphysical):
+        one_muscle.check_outputs(rig, outputs, row)
     if not np.isfinite(motion.sum()):
         row = int(np.argmax(~np.isfinite(motion).all(axis=1)))
         raise InputError(

@@ -289,8 +289,8 @@ def _run_all(pairs: 'list[tuple[Rig, Record]]', finish: Callable[[int, FloatArra
                 if len(buffer) <= len(inputs):
                     buffer = np.empty((len(inputs) + 1, size_of(OUTPUT)))
                 outputs = buffer[:len(inputs) + 1]
-                kernel.entries_for(par).rollout(state, par, inputs, outputs)
-                check_outputs(rig, outputs)
+                check_outputs(rig, outputs, kernel.entries_for(par).rollout(
+                    state, par, inputs, outputs))
                 results[index] = finish(index, outputs)
             except InputError as error:
                 errors[index] = error

@@ -28,7 +28,7 @@ from pam_sim.annotations import FloatArray
 from pam_sim.compiled import allocating_entry_point, compiled, entry_point, source_key
 from pam_sim.errors import InputError
 from pam_sim.records import part, size_of
-from pam_sim.rollout import layout, step as steps
+from pam_sim.rollout import layout, physical, step as steps
 from pam_sim.rollout.dispatch import hooks
 from pam_sim.rollout.layout import (
     EFFECTS, INPUT, NOMINAL, OUTPUT, PARAMETERS, STATE, TERMS)
@@ -119,18 +119,20 @@ def _entries(key: int, beyond: int) -> Entries:
 
     @allocating_entry_point
     def rollout(state: FloatArray, par: FloatArray, inputs: FloatArray,
-                outputs: FloatArray) -> None:
+                outputs: FloatArray) -> int:
         """
         Step through ``inputs``, N rows of ``INPUT``; ``outputs`` has N + 1 of ``OUTPUT``.
 
-        Row 0 is the start. Both contiguous.
+        Row 0 is the start. Both contiguous. The number of the first row that is not physical is
+        returned, -1 where all are.
         """
         if key < 0:
-            return
+            return 0
         of_rig, numbers = part(state, 0, STATE), part(par, 0, PARAMETERS)
         flat_in, flat_out = inputs.reshape(inputs.size), outputs.reshape(outputs.size)
         steps.look_body(
             beyond, of_rig, numbers, part(flat_in, 0, INPUT), part(flat_out, 0, OUTPUT))
+        unphysical = -1 if physical.is_physical(flat_out, 0) else 0
         if numbers.beyond_nominal > NOMINAL:
             for i in range(inputs.shape[0]):
                 step_given = part(flat_in, i * _INPUT_SIZE, INPUT)
@@ -139,16 +141,21 @@ def _entries(key: int, beyond: int) -> Entries:
                     _step_terms(of_rig, numbers, step_given, step_seen)
                 else:
                     _step_beyond(of_rig, numbers, step_given, step_seen)
+                if unphysical < 0 and not physical.is_physical(flat_out, (i + 1) * _OUTPUT_SIZE):
+                    unphysical = i + 1
         else:
             for i in range(inputs.shape[0]):
                 steps.step_body(NOMINAL, of_rig, numbers, part(flat_in, i * _INPUT_SIZE, INPUT),
                                 part(flat_out, (i + 1) * _OUTPUT_SIZE, OUTPUT))
+                if unphysical < 0 and not physical.is_physical(flat_out, (i + 1) * _OUTPUT_SIZE):
+                    unphysical = i + 1
+        return unphysical
 
     return Entries(
         step, look, settle, rest_contraction, driven_tension, driven_force, rollout)
 
 
-_KEY = source_key(steps, layout)
+_KEY = source_key(steps, layout, physical)
 named = (step, look, settle, rest_contraction, driven_tension, driven_force, rollout) = _entries(
     _KEY, EFFECTS)
 with_terms = _entries(_KEY, TERMS)

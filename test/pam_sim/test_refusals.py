@@ -19,9 +19,11 @@ import numpy as np
 from pam_sim import load_rig
 from pam_sim.effects.registry import effects
 from pam_sim.errors import InputError
-from pam_sim.records import columns, fields
-from pam_sim.rollout.layout import OUTPUT, STATE
-from pam_sim.rollout.simulate import check_outputs
+from pam_sim.records import columns, fields, size_of
+from pam_sim.rollout import kernel
+from pam_sim.rollout.layout import INPUT, OUTPUT, STATE
+from pam_sim.rollout.physical import is_physical
+from pam_sim.rollout.simulate import check_outputs, prepare
 import pytest
 
 RIG = 'dmsp_5_300_hanging_mass'
@@ -89,13 +91,24 @@ def test_every_parameter_of_rig_and_effects_refuses_what_is_not_physical(valve):
 @pytest.mark.parametrize('signal, value', [
     ('contraction_m', np.nan), ('force_n', np.inf), ('true_pressure_pa', -5.0),
     ('true_pressure_pa', np.nan)])
-def test_a_result_that_is_no_physics_is_not_handed_over(signal, value):
-    rig = load_rig(RIG)
-    outputs = rig.simulate(np.full(20, 3.0)).outputs
-    check_outputs(rig, outputs)
+def test_outputs_that_are_no_physics_are_noticed(signal, value):
+    outputs = load_rig(RIG).simulate(np.full(20, 3.0)).outputs
+    row = outputs.shape[1]
+    assert is_physical(outputs.ravel(), 7 * row)
     columns(outputs, OUTPUT)[signal][7] = value
-    with pytest.raises(InputError, match='leaves what is physical at step 7'):
-        check_outputs(rig, outputs)
+    assert [k for k in range(21) if not is_physical(outputs.ravel(), k * row)] == [7]
+
+
+@pytest.mark.parametrize('effects', [[], [{'name': 'creep'}]])
+def test_a_result_that_is_no_physics_is_not_handed_over(effects):
+    rig = load_rig(RIG).with_(effects=effects)
+    state, par, inputs = prepare(rig, np.full(20, 3.0), None, None, 0.001, {})
+    columns(inputs, INPUT)['signal_0'][6:] = np.nan
+    outputs = np.empty((21, size_of(OUTPUT)))
+    row = kernel.entries_for(par).rollout(state, par, inputs, outputs)
+    assert np.isfinite(outputs[:row]).all() and not np.isfinite(outputs[row]).all()
+    with pytest.raises(InputError, match=f'leaves what is physical at step {row}'):
+        check_outputs(rig, outputs, row)
 
 
 def test_the_live_plant_stops_as_well():
