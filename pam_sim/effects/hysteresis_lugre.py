@@ -51,6 +51,7 @@ _NARROW_M, _AT_PA = 1e-4, 4e5      # a loop that is narrower at this pressure is
 
 def _pack(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     return {**pack_level(values, numbers), 'stiffness_n_per_m': values['stiffness_n_per_m'],
+            'inverse_stiffness_m_per_n': 1.0 / values['stiffness_n_per_m'],
             'bristle_damping_n_s_per_m': values['bristle_damping_n_s_per_m'],
             'static_excess': values['static_ratio'] - 1.0,
             'inverse_stribeck_s_per_m': 1.0 / values['stribeck_m_per_s']}
@@ -91,8 +92,8 @@ EFFECT = Effect(
     amplitude=LEVEL_AMPLITUDE,
     reported=LOOP_REPORTED,
     states=record('bending_m'),
-    packed=record(*LEVEL, 'stiffness_n_per_m', 'bristle_damping_n_s_per_m', 'static_excess',
-                  'inverse_stribeck_s_per_m'),
+    packed=record(*LEVEL, 'stiffness_n_per_m', 'inverse_stiffness_m_per_n',
+                  'bristle_damping_n_s_per_m', 'static_excess', 'inverse_stribeck_s_per_m'),
     pack=_pack,
     fitting=Fitting(
         free=(*LEVEL_FREE, FreeParameter('stiffness_n_per_m', 2e3, 200.0, 1e4, True)),
@@ -109,7 +110,7 @@ def bending_when_sliding(pressure_pa: float, velocity_m_per_s: float, par: np.re
     square = (velocity_m_per_s * par.inverse_stribeck_s_per_m) ** 2
     if square < 40.0:           # beyond, less than the last bit
         level *= 1.0 + par.static_excess * math.exp(-square)
-    return level / par.stiffness_n_per_m
+    return level * par.inverse_stiffness_m_per_n
 
 
 @compiled
@@ -119,8 +120,9 @@ def muscle_force(force_n: float, pressure_pa: float, velocity_m_per_s: float, dx
     sliding_m = bending_when_sliding(pressure_pa, velocity_m_per_s, par)
     if sliding_m <= 0.0:
         return force_n
-    z = bent(state.bending_m, dx_m, sliding_m)
-    rate = velocity_m_per_s - abs(velocity_m_per_s) * z / sliding_m
+    per_sliding_m = 1.0 / sliding_m
+    z = bent(state.bending_m, dx_m, sliding_m, per_sliding_m)
+    rate = velocity_m_per_s - abs(velocity_m_per_s) * z * per_sliding_m
     return force_n - par.stiffness_n_per_m * z - par.bristle_damping_n_s_per_m * rate
 
 
@@ -129,4 +131,5 @@ def commit(pressure_pa: float, velocity_m_per_s: float, dx_m: float, state: np.r
            par: np.record) -> None:
     """Advance the bending of the bristles."""
     sliding_m = bending_when_sliding(pressure_pa, velocity_m_per_s, par)
-    state.bending_m = bent(state.bending_m, dx_m, sliding_m) if sliding_m > 0.0 else 0.0
+    state.bending_m = (bent(state.bending_m, dx_m, sliding_m, 1.0 / sliding_m)
+                       if sliding_m > 0.0 else 0.0)

@@ -26,7 +26,7 @@ from pam_sim.rollout.hooks import check_hook, HOOKS
 _OWN_FOLDER = Path(__file__).parent
 _NOT_EFFECTS = ('effect', 'fitting', 'registry')
 # What several effects call.
-_SHARED = ('air_volume', 'lag', 'loop_level', 'presliding', 'progressive')
+_SHARED = ('air_volume', 'lag', 'loop_level', 'presliding', 'progressive', 'saturation')
 _UNNAMED_FOLDER = _OWN_FOLDER / 'unnamed'
 _NOT_TERMS = ('reading', 'terms')
 

@@ -22,7 +22,6 @@ sample; at 2 mm/s it is smaller.
 """
 
 from collections.abc import Mapping
-import math
 from typing import Any
 
 import numpy as np
@@ -32,6 +31,7 @@ from pam_sim.effects.effect import Effect, Numbers, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.effects.loop_level import (
     LEVEL, LEVEL_AMPLITUDE, LEVEL_FREE, loop_level_n, pack_level)
+from pam_sim.effects.saturation import saturation
 from pam_sim.parameters import Parameter
 from pam_sim.records import record
 
@@ -68,5 +68,5 @@ EFFECT = Effect(
 def muscle_force(force_n: float, pressure_pa: float, velocity_m_per_s: float,
                  par: np.record) -> float:
     """Return the force less that of the contact."""
-    return force_n - loop_level_n(pressure_pa, par) * math.tanh(
+    return force_n - loop_level_n(pressure_pa, par) * saturation(
         velocity_m_per_s * par.inverse_speed_s_per_m)

@@ -31,6 +31,7 @@ from typing import Any
 import numpy as np
 
 from pam_sim.compiled import compiled
+from pam_sim.effects.saturation import saturation
 from pam_sim.parameters import Parameter
 from pam_sim.records import record
 
@@ -173,7 +174,7 @@ def factor(kind: float, value: float, scale: float, shape: float, memory: float,
     if kind == SIGNED_SQUARE:
         return q * abs(q)
     if kind == SIGN:
-        return math.tanh(value / shape)
+        return saturation(value / shape)
     if kind == ABOVE:
         return max(value - shape, 0.0) / scale
     if kind == BELOW:
