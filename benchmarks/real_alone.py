@@ -61,7 +61,7 @@ def print_table(run, rig, seconds, names=None):
     rows, labels = {}, []
     for signal, (factor, _) in TABLED.items():
         trace = result.traces[signal]
-        part = split.part_of(recording.time_s[signal])
+        part = split.part_of(recording.time_s[signal], signal)
         judged, fitted = part == CERTIFY, ~np.isin(part, (CERTIFY, UNUSED))
         runs = {'before': trace.before, 'calibrated': trace.refit, '`pam gap`': trace.after}
         for kind in (black_boxes.arx, black_boxes.narx):

@@ -23,7 +23,7 @@ from pam_sim.gap.data.health import check_for, without_dead
 from pam_sim.gap.data.overlap import check_apart
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.speeds import moves_at_one_speed
-from pam_sim.gap.data.split import FIT, SELECT, SETTLE_S, split_of
+from pam_sim.gap.data.split import FIT, SELECT, settling_s, split_of
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit
 from pam_sim.gap.plan.detectable import least_sizes
@@ -127,8 +127,9 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     # Its valve signal alone: what was measured on it stays untouched until the validation.
     held_out = (Recording(without_dead(certify), rig.valve, driven) if certify
                 else recordings[0])
-    settle_s = SETTLE_S if certify else split_of(held_out, criteria=criteria).settle_s
-    settled = {s: held_out.time_s[s] > settle_s for s in held_out.signals}
+    split = split_of(held_out, criteria=criteria)
+    settled = {s: held_out.time_s[s] > (settling_s(held_out, s) if certify else split.unused_s(s))
+               for s in held_out.signals}
     valve = estimator.problems[0]
     if valve.is_dealt_short:
         remarks.append((SAME_EDGES if certify is None else SHORT_STRETCHES).format(valve.block_s))

@@ -19,7 +19,7 @@ from pam_sim import load_rig
 from pam_sim.gap import find_gap
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.split import (
-    BLOCK_S, CERTIFY, FIT, OWN_PROOF, SELECT, SETTLE_S, split_of, TEST_BLOCK_S)
+    BLOCK_S, CERTIFY, FIT, OWN_PROOF, SELECT, SETTLE_S, settling_s, split_of, TEST_BLOCK_S)
 from pam_sim.run import Run, Series
 from pam_sim.units import P_ATM_PA
 import pytest
@@ -80,6 +80,19 @@ def test_the_inner_state_of_a_rig_in_motion_is_not_known(step_each_way):
                 for name, one in step_each_way.topics.items()}, {}, '/m', 'in motion')
     split = split_of(Recording(late, 'ppr'))
     assert split.is_short and split.settle_s == SETTLE_S
+
+
+def test_a_muscle_that_is_filled_from_empty_is_compared_from_the_start():
+    levels = np.random.default_rng(3).uniform(2.0, 5.0, 60)
+    run = recorded(held((0.0, *levels), [0.01, *[0.5] * 60]))
+    recording = Recording(run, 'ppr')
+    assert recording.moves_at_start('pressure')
+    split = split_of(recording)
+    assert (split.unused_s('pressure'), split.unused_s('force')) == (0.0, SETTLE_S)
+    assert recording.start('pressure') < P_ATM_PA + 1e3
+    moving = Run({name: Series(one.stamp_ns[10:], {key: v[10:] for key, v in one.values.items()})
+                  for name, one in run.topics.items()}, {}, '/m', 'in motion')
+    assert settling_s(Recording(moving, 'ppr'), 'pressure') == SETTLE_S
 
 
 def test_a_dead_time_is_named_on_one_step_each_way(step_each_way):

@@ -27,11 +27,13 @@ from pam_sim.gap.data.pulses import openings, Pulses
 from pam_sim.gap.data.signals import FIELD, SIGNALS, VALVE_FIELDS
 from pam_sim.response import Response
 from pam_sim.run import Run, Series
+from pam_sim.units import P_ATM_PA
 
 GRID_S = 0.001
 START_S = 0.05               # the state at the start is read from this stretch
 SMOOTH_STEPS = 21            # of a measured signal whose rate is needed
 START_SAMPLES = 3            # or from so many samples of a slow log
+EMPTY_PA = 5e3               # above the atmosphere, below which a muscle is empty
 
 
 class Measured(Protocol):
@@ -203,12 +205,19 @@ class Recording:
         """
         level = self._moving_from(signal)
         if level is not None:
-            return level
+            # A bent rise is above its line, which would begin too high.
+            return min(level, float(self.measured[signal][0])) if (
+                signal == 'pressure' and self.starts_empty) else level
         return float(np.median(self.measured[signal][self.time_s[signal] <= START_S]))
 
     def moves_at_start(self, signal: str) -> bool:
         """Return whether a signal follows a line rather than a level at the start."""
         return self._moving_from(signal) is not None
+
+    @property
+    def starts_empty(self) -> bool:
+        """Return whether the first pressure is that of the atmosphere."""
+        return bool(self.measured['pressure'][0] < P_ATM_PA + EMPTY_PA)
 
     def _moving_from(self, signal: str) -> float | None:
         """Return where a signal comes from that is already moving; None where it rests."""

@@ -25,7 +25,7 @@ same edges at other moments. That is interpolation: it shows that the form of an
 that another edge would be.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pam_sim.annotations import FloatArray, IntArray
@@ -58,8 +58,8 @@ class Split:
         Parts of the blocks in turn.
     test_block_s : float
         Length of a block of the paired tests between rivals.
-    settle_s : float
-        What is unused at the start.
+    settle_s, pressure_settle_s : float
+        What is unused at the start, of other signals and of the pressure.
     is_short : bool
         Whether the blocks are stretches of an edge, because the moves are few.
 
@@ -69,9 +69,10 @@ class Split:
     pattern: tuple[int, ...]
     test_block_s: float = TEST_BLOCK_S
     settle_s: float = SETTLE_S
+    pressure_settle_s: float = SETTLE_S
     is_short: bool = False
 
-    def part_of(self, time_s: FloatArray) -> IntArray:
+    def part_of(self, time_s: FloatArray, signal: str = '') -> IntArray:
         """
         Return the part of every sample.
 
@@ -79,6 +80,8 @@ class Split:
         ----------
         time_s : numpy.ndarray, shape (N,)
             Seconds since the start of the recording.
+        signal : str
+            Of which signal.
 
         Returns
         -------
@@ -88,7 +91,11 @@ class Split:
         """
         time_s = np.asarray(time_s)
         part = np.array(self.pattern)[(time_s // self.block_s).astype(int) % len(self.pattern)]
-        return np.where(time_s < self.settle_s, UNUSED, part)
+        return np.where(time_s < self.unused_s(signal), UNUSED, part)
+
+    def unused_s(self, signal: str) -> float:
+        """Return for how long after the start a signal is unused [s]."""
+        return self.pressure_settle_s if signal == 'pressure' else self.settle_s
 
 
 def long_split(duration_s: float, holds_certify: bool = True) -> Split:
@@ -122,7 +129,8 @@ def split_of(recording: Recording, holds_certify: bool = True, criteria: Criteri
         Decision thresholds.
 
     """
-    split = long_split(float(recording.grid_s[-1]), holds_certify)
+    split = replace(long_split(float(recording.grid_s[-1]), holds_certify),
+                    pressure_settle_s=settling_s(recording, 'pressure'))
     if not has_few_moves(recording, split, criteria):
         return split
     block_s = float(np.clip(_quickest_edge_s(recording) / BLOCKS_OF_AN_EDGE, *SHORT_BLOCK_S))
@@ -132,7 +140,33 @@ def split_of(recording: Recording, holds_certify: bool = True, criteria: Criteri
         return split
     # A rig at rest has no inner state that is not known.
     settle_s = 0.0 if _starts_at_rest(recording) else SETTLE_S
-    return Split(block_s, split.pattern, block_s, settle_s, True)
+    return Split(block_s, split.pattern, block_s, settle_s,
+                 min(settle_s, split.pressure_settle_s), True)
+
+
+def settling_s(recording: Recording, signal: str) -> float:
+    """
+    Return for how long after the start a signal of a long recording is not compared [s].
+
+    So long the inner states are not known. A valve has none of these where the rig rests at first,
+    or where an empty muscle is filled. If the pressure moves soon, it is compared from the start
+    there. Of a slow log nobody knows what the valve was told before the first message.
+
+    Parameters
+    ----------
+    recording : Recording
+        What was recorded.
+    signal : str
+        Which of its signals.
+
+    """
+    time_s, mean = _path(recording)
+    early = mean[time_s < SETTLE_S]
+    if signal != 'pressure' or recording.unseen_s > 0.0 or early.size == 0 or (
+            np.ptp(early) < LEAST_MOVE * float(np.ptp(mean))):
+        return SETTLE_S
+    filled = recording.starts_empty and not recording.moves_at_start('contraction')
+    return 0.0 if filled or _starts_at_rest(recording) else SETTLE_S
 
 
 def has_few_moves(recording: Recording, split: Split, criteria: Criteria = CRITERIA) -> bool:
@@ -142,7 +176,7 @@ def has_few_moves(recording: Recording, split: Split, criteria: Criteria = CRITE
     That is, it holds less than ``even_share`` of what its time would make of them.
     """
     time_s, mean = _path(recording)
-    part = split.part_of(time_s)[1:]
+    part = split.part_of(time_s, 'pressure')[1:]
     steps = np.diff(_without_rest(mean, LEAST_MOVE * float(np.ptp(mean))))
     for moved in (np.maximum(steps, 0.0), np.maximum(-steps, 0.0)):
         for one in set(split.pattern):

@@ -113,7 +113,7 @@ class SubsystemProblem:
                 every = max(int(round(1.0 / (np.median(np.diff(time_s)) * RATE_HZ))), 1)
                 chosen[name] = at = time_s[::every]
                 parts.append(np.where(
-                    recording.tells(name, at), split.part_of(at), UNUSED))
+                    recording.tells(name, at), split.part_of(at, name), UNUSED))
                 blocks.append(first + (at // split.test_block_s).astype(int))
                 signals.append(np.full(at.size, s))
                 times.append(at)

@@ -26,7 +26,7 @@ import math
 import numpy as np
 from pam_sim.annotations import BoolArray, FloatArray
 from pam_sim.gap.data.signals import UNIT
-from pam_sim.gap.data.split import CERTIFY, SETTLE_S
+from pam_sim.gap.data.split import CERTIFY, settling_s
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit
 from pam_sim.gap.result import SignalGap
@@ -64,6 +64,8 @@ class OwnRuns:
     def __init__(self, validation: Validation, whole: bool, estimator: Estimator, base: Fit,
                  final: Fit, seed: int = 0) -> None:
         self._whole, self._estimator, self._final = whole, estimator, final
+        self._settle_s = {s: settling_s(validation.recording, s)
+                          for s in validation.recording.signals}
         self._problems = subsystem_problems(
             estimator.rig, [validation.recording], False, seed, estimator.criteria
         ) if whole else estimator.problems
@@ -129,7 +131,8 @@ class OwnRuns:
 
     def chosen(self, p: SubsystemProblem, signal: str) -> BoolArray:
         """Return which samples are those of a signal on the certify data."""
-        part = (p.run == 0) & (p.time_s > SETTLE_S if self._whole else p.part == CERTIFY)
+        part = (p.run == 0) & (p.time_s > self._settle_s[signal] if self._whole
+                               else p.part == CERTIFY)
         return part & (p.signal == p.signals.index(signal)) & p.recordings[0].tells(
             signal, p.time_s)
 

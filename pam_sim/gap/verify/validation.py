@@ -27,7 +27,7 @@ from pam_sim.annotations import FloatArray
 from pam_sim.gap.data.noise import noise_of, sensor_floor, STAMP_SD_S
 from pam_sim.gap.data.recording import Recording, START_S
 from pam_sim.gap.data.signals import UNIT
-from pam_sim.gap.data.split import CERTIFY, SETTLE_S, split_of
+from pam_sim.gap.data.split import CERTIFY, settling_s, split_of
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit
 from pam_sim.gap.result import SignalGap, Trace
@@ -88,8 +88,8 @@ class Validation:
         self.recording, self.estimator = recording, estimator
         split = split_of(recording, criteria=estimator.criteria)
         self.part = {s: recording.tells(s, recording.time_s[s]) & (
-            recording.time_s[s] > SETTLE_S if whole else
-            split.part_of(recording.time_s[s]) == CERTIFY) for s in recording.signals}
+            recording.time_s[s] > settling_s(recording, s) if whole else
+            split.part_of(recording.time_s[s], s) == CERTIFY) for s in recording.signals}
         self.before = free_run(estimator.rig, recording)
         self.refit, self.after = self.run(base, whole), self.run(final, whole)
         self.simulations = 3
