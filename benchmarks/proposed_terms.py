@@ -107,6 +107,8 @@ def command_line():
     parser.add_argument('--work', type=Path, help='keep answers here')
     parser.add_argument('--minutes', type=float, default=float('inf'), metavar='N',
                         help='with --work: begin no record after N minutes; start again to go on')
+    parser.add_argument('--part', default='', metavar='WORD',
+                        help='with --write: the part of the page with this word')
     results_page.add_write(parser, 'proposed_terms')
     return parser
 
@@ -114,7 +116,7 @@ def command_line():
 def main():
     """Look at every record; return the exit code."""
     args = command_line().parse_args()
-    results_page.check(args, __file__)
+    results_page.check(args, __file__, args.part)
     args.until = time.time() + 60.0 * args.minutes
     wanted = [k for k in KINDS if args.kinds is None or k in args.kinds.split(',')]
     tasks = list(dict.fromkeys(
@@ -130,7 +132,7 @@ def main():
     if any(a is None for a in (*answers, *nulls)):
         print('out of minutes; start again to go on')
         return UNFINISHED
-    with results_page.printed(args, __file__):
+    with results_page.printed(args, __file__, args.part):
         show(args, answers, nulls)
     return 0
 
