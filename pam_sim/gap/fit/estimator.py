@@ -113,7 +113,8 @@ class Estimator:
         return self.rig.with_(effects=[*self.rig.effects, *effects])
 
     def fit(self, hypothesis: Hypothesis, theta: ArrayLike = (), near: Fit | None = None,
-            hold: bool = False, whole: bool = True, rounds: int = ROUNDS) -> Fit:
+            hold: bool = False, whole: bool = True, rounds: int = ROUNDS, steady: int = 0
+            ) -> Fit:
         """
         Fit a hypothesis.
 
@@ -131,6 +132,8 @@ class Estimator:
             False to leave the subsystems as ``near`` has them in which nothing else shows.
         rounds : int
             At most so many times weights are set after the errors.
+        steady : int
+            How many of the first effects are as ``near`` has them, see ``Solver``.
 
         Returns
         -------
@@ -146,7 +149,8 @@ class Estimator:
         free = np.array([m for c, m in zip(hypothesis.effects, moves) for _ in c.free], bool)
         # From full weight: a low one is its own reason, for it keeps the misfit that made it.
         search = Solver(self, part, fitted, {
-            c.subsystem: np.ones(len(c.signals)) for c in fitted}, hold)
+            c.subsystem: np.ones(len(c.signals)) for c in fitted}, hold,
+            sum(len(c.free) for c in compress(hypothesis.effects[:steady], moves)))
         # Numbers of the baseline are bent by what is missing; a better model starts unbent.
         x, errors = search.settle(search.join(theta[free], {
             s: np.where((near is self.base) & (np.abs(z) > FAR_START), 0.0, z)

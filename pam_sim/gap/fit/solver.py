@@ -48,6 +48,9 @@ KEPT = 4                     # errors at the last points; the best one may be as
 REFUSED = 1e3                # error of a model that cannot be simulated, in floors
 
 
+_Moved = tuple[float, dict[str, FloatArray]]     # step of a parameter, change of the errors
+
+
 class SolverSettings(Protocol):
     """What a least-squares problem is given by an estimator."""
 
@@ -74,14 +77,17 @@ class Solver:
         By how much the weight of each signal is lowered at first, by subsystem.
     hold : bool
         Whether latency and skew of the measurement stay at their prior.
+    steady : int
+        How many of the first parameters have been fitted before. Their slopes are taken where a
+        run begins, and kept in it: one simulation each instead of one an iteration.
 
     """
 
     def __init__(self, estimator: SolverSettings, hypothesis: Hypothesis,
                  problems: Sequence[SubsystemProblem], temper: dict[str, FloatArray],
-                 hold: bool = False) -> None:
+                 hold: bool = False, steady: int = 0) -> None:
         self.estimator, self.hypothesis = estimator, hypothesis
-        self.problems, self.temper = problems, temper
+        self.problems, self.temper, self.steady = problems, temper, steady
         self.free = [f for c in hypothesis.effects for f in c.free]
         self.owner = [c.effect for c in hypothesis.effects for _ in c.free]
         self.masks = {c.subsystem: np.isin(c.part, estimator.use) for c in problems}
@@ -103,7 +109,8 @@ class Solver:
         self._weight: dict[str, FloatArray] = {}
         self._known: FloatArray | None = None
         self._errors: dict[bytes, dict[str, FloatArray]] = {}
-        self._moved: tuple[bytes, list[tuple[float, dict[str, FloatArray]]]] = (b'', [])
+        self._moved: tuple[bytes, list[_Moved]] = (b'', [])
+        self._kept: list[_Moved] = []
 
     def join(self, theta: FloatArray, known_z: Mapping[str, FloatArray]) -> FloatArray:
         """Return what ``split`` takes apart."""
@@ -144,15 +151,13 @@ class Solver:
 
     def slopes(self, x: FloatArray) -> FloatArray:
         """Return the derivatives of ``residuals``."""
-        base = self.errors(x)
         columns = self._known_columns().copy()
         rows = columns.shape[0] - self.prior.size
-        for j, (step, simulated) in enumerate(self._moved_from(x)):
+        for j, (step, change) in enumerate(self._moved_from(x)):
             # An effect of one subsystem leaves the other one as it is.
-            errors = {**base, **simulated}
             columns[:rows, j] = np.concatenate([
-                self._weighted(c, errors[c.subsystem] - base[c.subsystem])
-                for c in self.problems]) / step
+                self._weighted(c, change[c.subsystem]) if c.subsystem in change
+                else np.zeros(int(self.masks[c.subsystem].sum())) for c in self.problems]) / step
         return columns
 
     def _known_columns(self) -> FloatArray:
@@ -169,21 +174,25 @@ class Solver:
                 row, column = row + len(slope), end
         return self._known
 
-    def _moved_from(self, x: FloatArray) -> list[tuple[float, dict[str, FloatArray]]]:
-        """Return (step, errors after it) for each parameter of the effects."""
+    def _moved_from(self, x: FloatArray) -> list[_Moved]:
+        """Return (step, change of the errors by it) for each parameter of the effects."""
         key = x.tobytes()
         if self._moved[0] != key:       # other weights ask again at the same point
-            self._moved = (key, parallel_map(
-                lambda j: self._moved_at(x, j), range(len(self.free))))
+            places = range(len(self._kept), len(self.free))
+            base = self.errors(x)
+            self._moved = (key, self._kept + parallel_map(
+                lambda j: self._moved_at(x, j, base), places))
+        self._kept = self._moved[1][:self.steady]
         return self._moved[1]
 
-    def _moved_at(self, x: FloatArray, j: int) -> tuple[float, dict[str, FloatArray]]:
+    def _moved_at(self, x: FloatArray, j: int, base: Mapping[str, FloatArray]) -> _Moved:
         step = EFFECT_STEP * max(abs(x[j]), 0.3)
         if x[j] + step > self.bounds[1][j]:
             step = -step
         moved = np.array(x)
         moved[j] += step
-        return step, self._simulated(moved, self.owner[j])
+        return step, {s: errors - base[s]
+                      for s, errors in self._simulated(moved, self.owner[j]).items()}
 
     def blocks(self) -> IntArray:
         """Return the number of the block of every weighted error, rising."""
@@ -200,6 +209,7 @@ class Solver:
             return x
         margin = 1e-6 * (high - low)
         start = np.clip(x, low + margin, high - margin)
+        self._kept = []
         return minimised(
             self.residuals, self.slopes, start, low, high, FTOL, XTOL, EVALUATIONS)
 

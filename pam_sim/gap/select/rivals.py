@@ -225,7 +225,8 @@ def _fit(context: SearchContext, current: Fit, screened: Screened) -> Rival | No
     hypothesis = Hypothesis((*current.hypothesis.effects, screened.candidate),
                             current.hypothesis.numbers)
     return _rival(context, context.estimator.fit(
-        hypothesis, (*current.theta, *screened.start), current, whole=False),
+        hypothesis, (*current.theta, *screened.start), current, whole=False,
+        steady=len(current.hypothesis.effects)),
         screened.candidate.name)
 
 
