@@ -26,13 +26,14 @@ STILL = {'integral_pa_per_m_s': 0.0, 'feedback_gain_pa': 0.0, 'proportional_pa_p
 
 @pytest.mark.parametrize('form', [0.0, 1.0])
 def test_a_move_starts_and_ends_at_rest_and_its_rate_is_its_slope(form):
-    assert dynamics.to_go(0.01, 0.3, 0.3, form) == (0.01, 0.0)
-    assert dynamics.to_go(0.01, 0.0, 0.3, form) == (0.0, 0.0)
+    assert dynamics.to_go(0.01, 0.3, 0.3, form) == (0.01, 0.0, 0.0)
+    assert dynamics.to_go(0.01, 0.0, 0.3, form) == (0.0, 0.0, 0.0)
     assert dynamics.to_go(0.01, 0.15, 0.3, form)[0] == pytest.approx(0.005)
-    assert dynamics.to_go(0.01, 0.4, 0.3, form) == (0.01, 0.0)        # has not begun
+    assert dynamics.to_go(0.01, 0.4, 0.3, form) == (0.01, 0.0, 0.0)        # has not begun
     left = np.linspace(0.3, 0.0, 301)
     rest = np.array([dynamics.to_go(0.01, t, 0.3, form) for t in left])
     assert np.allclose(np.gradient(-rest[:, 0], 1e-3)[1:-1], rest[1:-1, 1], atol=3e-5)
+    assert np.allclose(np.gradient(rest[:, 1], 1e-3)[1:-1], rest[1:-1, 2], atol=5e-3)
     jerk = np.abs(np.diff(rest[:, 1], 2))
     first = jerk[0] / jerk.max()
     assert (first < 0.1) if form else (first > 0.9)
@@ -68,6 +69,22 @@ def test_a_jump_that_was_not_seen_ahead_waits_one_preview():
     assert unseen[40 + 20] == pytest.approx(-0.01, rel=1e-3)
     assert unseen[40 + 20 + 30] == pytest.approx(-0.005, rel=0.05)
     assert seen[40 + 30] == pytest.approx(-0.005, rel=0.05)
+
+
+@pytest.mark.parametrize('form', [0, 1])
+def test_the_acceleration_of_a_move_made_of_a_jump_is_exact(form):
+    inertia, move_s, begin = 2e4, 0.3, 40
+    settings = {**STILL, 'acceleration_feedforward_pa_s2_per_m': inertia, 'slew_pa_per_s': 1e9,
+                'acceleration_filter_s': 0.05, 'jump_time_s': move_s, 'jump_form': form}
+    references = np.r_[np.full(begin, 0.008), np.full(100, 0.018)]
+    still, _ = commands(sofc({**settings, 'acceleration_feedforward_pa_s2_per_m': 0.0}),
+                        references)
+    exact, _ = commands(sofc({**settings, 'jump_acceleration': 1}), references)
+    filtered, _ = commands(sofc(settings), references)
+    left_s = move_s - 0.005 * np.arange(100)
+    wanted = [inertia * dynamics.to_go(0.01, t, move_s, form)[2] for t in left_s]
+    assert (exact - still)[begin:] == pytest.approx(wanted, abs=1e-6 * inertia)
+    assert np.max(np.abs(filtered - exact)) > 0.3 * np.max(np.abs(wanted))
 
 
 def learned_at_rest(**more):

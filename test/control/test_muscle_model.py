@@ -205,6 +205,20 @@ def test_noise_of_the_contraction_does_not_hide_the_inertia(inverse):
     assert bounded == pytest.approx(17000.0 / 1.1)
 
 
+def test_the_damping_found_grows_no_further_beyond_its_rate(inverse):
+    settings = {'model_noise_pa': 1e4, 'rate_feedforward_pa_s_per_m': 5e4}
+    for damping_rate, shares in ((0.0, (1.0, 1.0)), (0.02, (1.0, 0.5))):
+        controller = controller_with(inverse, damping_rate_m_per_s=damping_rate, **settings)
+        par, st = fields(controller.parameters, PARAMETERS), fields(zeros(MODEL), MODEL)
+        st.number_pa[muscle_model._RATE] = 2e3
+        found = [muscle_model.damping_pa_s_per_m(par, st, rate) for rate in (0.0, -0.02)]
+        assert found == pytest.approx([5e4 + share * 2e3 / 0.05 for share in shares])
+        muscle_model._begin(st, 0.014, 3e5)
+        st.rate_m_per_s = -0.02
+        muscle_model.find_numbers(par, st, False)
+        assert st.now[muscle_model._RATE] == pytest.approx(-0.02 / 0.05 * shares[1])
+
+
 @pytest.mark.parametrize('valve', ['ppr', 'hsv'])
 def test_a_motion_nobody_announced_is_followed_from_the_first_seconds(valve):
     nominal = load_rig('dmsp_5_300_realistic', valve=valve)

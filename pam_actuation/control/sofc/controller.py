@@ -23,7 +23,7 @@ from pam_actuation.control.sofc import muscle_model
 from pam_actuation.control.sofc.credit import ring_rows
 from pam_actuation.control.sofc.learning import REASONS
 from pam_actuation.control.sofc.persistence import check_fit
-from pam_actuation.control.sofc.records import ENTRY, MODEL_OUTPUTS, OUTPUT, STATE
+from pam_actuation.control.sofc.records import ENTRY, MODEL_OUTPUTS, OUTPUT, STATE, TOLD
 from pam_actuation.control.sofc.rule_table import (
     infer_feedback, infer_feedforward, infer_motion, linear_feedback_table, RuleBase)
 from pam_actuation.control.sofc.rule_text import NUMBERS
@@ -104,7 +104,7 @@ class SelfOrganizingFuzzyController(CompiledController):
             self.rules.assign(rules)
         self.parameters = parameter_array(self.settings)
         par = fields(self.parameters, PARAMETERS)
-        rows = ring_rows(int(par.delay_ticks), int(par.spread_ticks), int(par.answer_ticks))
+        rows = ring_rows(int(par.delay_ticks), int(par.spread_ticks), int(par.answer_ticks) + 1)
         self._ring = np.zeros(rows * size_of(ENTRY))
         tables = self.rules.stacked()
         self._kept = tuple(table[3] for table in tables)
@@ -163,7 +163,11 @@ class SelfOrganizingFuzzyController(CompiledController):
 
     def _keep_output(self, before_pa: float) -> None:
         self.rules_replaced += 1
+        ring = self._ring.view(ENTRY)
+        told = {name: ring[name].copy() for name in TOLD}
         self._ring[:] = 0.0        # no credit for rules that are gone
+        for name, values in told.items():
+            ring[name] = values
         state = fields(self._state, STATE)
         state.history_ticks = min(state.history_ticks, 1.0)
         state.best_rms_m = 0.0        # the new rules are judged anew

@@ -31,6 +31,8 @@ contains the jerk.
 import math
 
 import numpy as np
+from pam_actuation.control.sofc import credit
+from pam_actuation.control.sofc.credit import Ring
 from pam_actuation.control.static_inverse import grid_of, GRID_SIZE, inverse_pressure_pa
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import compiled
@@ -39,6 +41,8 @@ _SLOPE_BASE_M = 5e-4      # the slope of the static inverse is taken over twice 
 _LEAST_SLOPE = 0.2        # of the mean slope of the table
 _ACCELERATION_FLOOR_M_PER_S2 = 1e-9       # then it is gone, before it becomes denormal
 _LEAST_SHAPE = 0.5        # of the integral, its inverse the largest
+_TOLD_TIME_S = 0.5        # of the means of what previews told
+_TOLD_FLOOR_M2_PER_S2 = 1e-8      # below, the rate changes too little to tell
 _BEND = 0.25              # of a change of rate: what a bent way may differ from a straight one
 
 
@@ -83,38 +87,106 @@ def jumps(par: np.record, st: np.record, inp: np.record) -> tuple[float, float]:
 
 
 @compiled
-def to_go(size_m: float, left_s: float, duration_s: float, form: float) -> tuple[float, float]:
-    """Return how much of a move is still to come [m] and the rate it has now [m/s]."""
+def to_go(size_m: float, left_s: float, duration_s: float,
+          form: float) -> tuple[float, float, float]:
+    """Return how much of a move is to come [m], its rate [m/s] and its acceleration [m/s^2]."""
     if not left_s > 0.0:
-        return 0.0, 0.0
+        return 0.0, 0.0, 0.0
     q = max(1.0 - left_s / duration_s, 0.0)
+    still = 1.0 - q
     if form > 0.5:
         done = q * q * q * q * (35.0 + q * (q * (70.0 - 20.0 * q) - 84.0))
-        rate = 140.0 * q * q * q * (1.0 - q) * (1.0 - q) * (1.0 - q) / duration_s
+        rate = 140.0 * q * q * q * still * still * still / duration_s
+        bend = 420.0 * q * q * still * still * (1.0 - 2.0 * q) / (duration_s * duration_s)
     else:
         done = q * q * q * (10.0 + q * (6.0 * q - 15.0))
-        rate = 30.0 * q * q * (1.0 - q) * (1.0 - q) / duration_s
-    return size_m * (1.0 - done), size_m * rate
+        rate = 30.0 * q * q * still * still / duration_s
+        bend = 60.0 * q * still * (1.0 - 2.0 * q) / (duration_s * duration_s)
+    return size_m * (1.0 - done), size_m * rate, size_m * bend
 
 
 @compiled
 def smooth_jump(par: np.record, move: np.record, jump_m: float,
-                wait_s: float) -> tuple[float, float]:
+                wait_s: float) -> tuple[float, float, float]:
     """
-    Take up a jump in one of the two references; return what is to go [m] and its rate.
+    Take up a jump in one of the two references; return ``to_go`` of its move.
 
     ``move`` is a ``records.MOVE``; ``wait_s``: it begins so much later.
     """
     duration = par.jump_time_s
     if not duration > 0.0:
-        return 0.0, 0.0
+        return 0.0, 0.0, 0.0
     if jump_m != 0.0:
-        rest, _ = to_go(move.size_m, move.left_s, duration, par.jump_form)
+        rest, _, _ = to_go(move.size_m, move.left_s, duration, par.jump_form)
         move.size_m = rest + jump_m
         move.left_s = duration + wait_s
-    rest, rate = to_go(move.size_m, move.left_s, duration, par.jump_form)
+    found = to_go(move.size_m, move.left_s, duration, par.jump_form)
     move.left_s = max(0.0, move.left_s - par.period_s)
-    return rest, rate
+    return found
+
+
+@compiled
+def note_announced(par: np.record, ring: Ring, st: np.record, inp: np.record) -> None:
+    """
+    Find how far the reference comes as its previews told; ``st`` is a ``STATE``.
+
+    Without a preview the lead reference goes on with the present rate. A reference that is told
+    ahead has another rate there, and has it one preview later.
+    """
+    tick = int(st.tick)
+    ring[credit.row_of(ring, tick, 0)].told_rate_m_per_s = inp.lead_rate_m_per_s
+    if st.history_ticks < par.answer_ticks:
+        return
+    rate: float = inp.reference_rate_m_per_s
+    told = inp.lead_rate_m_per_s - rate
+    untold = rate - ring[credit.row_of(ring, tick, int(par.answer_ticks))].told_rate_m_per_s
+    part = par.period_s / (_TOLD_TIME_S + par.period_s)
+    told_mean: float = st.told_m2_per_s2
+    untold_mean: float = st.untold_m2_per_s2
+    told_mean += part * (told * told - told_mean)
+    untold_mean += part * (untold * untold - untold_mean)
+    st.told_m2_per_s2 = told_mean
+    st.untold_m2_per_s2 = untold_mean
+    if told_mean + untold_mean > _TOLD_FLOOR_M2_PER_S2:      # at rest it stays what it was
+        st.announced = told_mean / (told_mean + untold_mean)
+
+
+@compiled
+def later(par: np.record, ring: Ring, st: np.record, inp: np.record, lead_m: float,
+          rate_m_per_s: float, move_m_per_s: float,
+          move_m_per_s2: float) -> tuple[float, float, float, float]:
+    """
+    Return the lead reference, its rate, and both derivatives of its move, for the dead time.
+
+    The preview is longer than the dead time that was found. A reference that was told ahead is
+    used as much later. Another one goes on with its present rate for the dead time only.
+    """
+    if not par.dead_time_s > 0.0:
+        return lead_m, rate_m_per_s, move_m_per_s, move_m_per_s2
+    tick = int(st.tick)
+    entry = ring[credit.row_of(ring, tick, 0)]
+    entry.lead_m = lead_m
+    entry.lead_rate_m_per_s = rate_m_per_s
+    entry.lead_move_m_per_s = move_m_per_s
+    entry.lead_move_m_per_s2 = move_m_per_s2
+    entry.told_m = inp.lead_reference_m - st.jumps_m
+    period: float = par.period_s
+    dead_s: float = st.lag.dead_s
+    early_s: float = min(par.lead_s - dead_s, st.lead_ticks * period)
+    st.lead_ticks += 1.0
+    whole = int(early_s / period)
+    rest = early_s / period - whole
+    new = ring[credit.row_of(ring, tick, whole)]
+    old = ring[credit.row_of(ring, tick, whole + (1 if rest > 0.0 else 0))]
+    surprise = 1.0 - st.announced
+    told_m = new.told_m + rest * (old.told_m - new.told_m)
+    told_rate = new.told_rate_m_per_s + rest * (old.told_rate_m_per_s - new.told_rate_m_per_s)
+    straight_m = entry.told_m - early_s * inp.lead_rate_m_per_s
+    return (new.lead_m + rest * (old.lead_m - new.lead_m) + surprise * (straight_m - told_m),
+            new.lead_rate_m_per_s + rest * (old.lead_rate_m_per_s - new.lead_rate_m_per_s)
+            + surprise * (inp.lead_rate_m_per_s - told_rate),
+            new.lead_move_m_per_s + rest * (old.lead_move_m_per_s - new.lead_move_m_per_s),
+            new.lead_move_m_per_s2 + rest * (old.lead_move_m_per_s2 - new.lead_move_m_per_s2))
 
 
 @compiled
@@ -126,6 +198,8 @@ def note_jump(par: np.record, st: np.record, rate_m_per_s: float, jump_m: float,
     Feed-forward and motion rules go over to the share they have for so long, and back, in the
     time of a move. Nobody announced a jump that comes at once in the reference and in that of one
     preview ahead; ``jump_announced`` says whether the share holds after the others too.
+
+    What of the integral only undoes the rules stands back with them.
     """
     if lead_jump_m != 0.0:
         st.surprising = 1.0 if jump_m != 0.0 else par.jump_announced
@@ -136,6 +210,9 @@ def note_jump(par: np.record, st: np.record, rate_m_per_s: float, jump_m: float,
     if par.jump_rules < 1.0 and par.jump_time_s > 0.0:
         step = par.period_s / par.jump_time_s
         wanted = par.jump_rules if st.jumped > 0.0 and st.surprising > 0.5 else 1.0
+        if st.rules_share >= 1.0:
+            st.balance_pa = min(max(-st.rules_pa, min(st.integral_pa, 0.0)),
+                                max(st.integral_pa, 0.0))
         st.rules_share += min(max(wanted - st.rules_share, -step), step)
 
 
@@ -165,24 +242,29 @@ def load_shape(par: np.record, contraction_m: float) -> float:
 
 @compiled
 def dynamic_pressure_pa(par: np.record, st: np.record, static_pa: float, rate_m_per_s: float,
-                        rate_jumped: bool, damping: float, inertia: float) -> float:
+                        rate_jumped: bool, damping: float, inertia: float,
+                        move_rate_m_per_s: float, move_m_per_s2: float) -> float:
     """
     Return what moving takes beyond the static pressure [Pa]; advances the filters.
 
-    ``rate_jumped``: the rate of before means nothing.
+    ``rate_jumped``: the rate of before means nothing. Rate and acceleration of a move made of a
+    jump come last; its rate is part of ``rate_m_per_s``.
     """
     period = st.gap_s
     if rate_jumped:
-        st.lead_rate_m_per_s = rate_m_per_s
         st.acceleration_m_per_s2 = 0.0
-    raw = (rate_m_per_s - st.lead_rate_m_per_s) / period
-    st.lead_rate_m_per_s = rate_m_per_s
+    exact = par.jump_acceleration
+    filtered_rate = rate_m_per_s - exact * move_rate_m_per_s
+    if rate_jumped:
+        st.lead_rate_m_per_s = filtered_rate
+    raw = (filtered_rate - st.lead_rate_m_per_s) / period
+    st.lead_rate_m_per_s = filtered_rate
     part = period / (par.acceleration_filter_s + period)
     acceleration: float = st.acceleration_m_per_s2 + part * (raw - st.acceleration_m_per_s2)
     if abs(acceleration) < _ACCELERATION_FLOOR_M_PER_S2:
         acceleration = 0.0
     st.acceleration_m_per_s2 = acceleration
-    moving = damping * rate_m_per_s + inertia * acceleration
+    moving = damping * rate_m_per_s + inertia * (acceleration + exact * move_m_per_s2)
     quasi_static = static_pa + moving
     if rate_jumped:
         st.quasi_static_pa = quasi_static

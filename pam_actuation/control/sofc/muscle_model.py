@@ -128,9 +128,18 @@ def numbers_pa(par: np.record, st: np.record, path: FloatArray, contraction_m: f
 
 
 @compiled
-def damping_pa_s_per_m(par: np.record, st: np.record) -> float:
+def _saturation(par: np.record, rate_m_per_s: float) -> float:
+    """Return which part of a rate counts for the number of the damping."""
+    if not par.damping_rate_m_per_s > 0.0:
+        return 1.0
+    return par.damping_rate_m_per_s / (par.damping_rate_m_per_s + abs(rate_m_per_s))
+
+
+@compiled
+def damping_pa_s_per_m(par: np.record, st: np.record, rate_m_per_s: float) -> float:
     """Return the pressure per rate: the setting and what the model found."""
-    found: float = par.rate_feedforward_pa_s_per_m + st.number_pa[_RATE] / _RATE_M_PER_S
+    number: float = st.number_pa[_RATE] * _saturation(par, rate_m_per_s)
+    found: float = par.rate_feedforward_pa_s_per_m + number / _RATE_M_PER_S
     return max(found, 0.0)
 
 
@@ -159,7 +168,7 @@ def find_numbers(par: np.record, st: np.record, surprised: bool) -> None:
     now[1] = (st.contraction_m - middle) / _SPAN_M
     for q in range(1, MOST_SETS):
         now[1 + q] = st.path[q] if q < par.path_sets else 0.0
-    now[_RATE] = st.rate_m_per_s / _RATE_M_PER_S
+    now[_RATE] = st.rate_m_per_s * _saturation(par, st.rate_m_per_s) / _RATE_M_PER_S
     now[_ACCELERATION] = st.acceleration_m_per_s2 / _ACCELERATION_M_PER_S2
     if par.number_filter_s > 0.0:
         part = par.period_s / (par.number_filter_s + par.period_s)
@@ -243,7 +252,7 @@ def observe(par: np.record, inverse: FloatArray, rules: FloatArray, st: np.recor
     st.rate_m_per_s, st.acceleration_m_per_s2 = rate, acceleration
     go(par, st.path, x - former_m)
     innovation = (
-        p - inverse_pressure_pa(inverse, x) - damping_pa_s_per_m(par, st) * rate
+        p - inverse_pressure_pa(inverse, x) - damping_pa_s_per_m(par, st, rate) * rate
         - inertia_pa_s2_per_m(par, st) * acceleration
         - numbers_pa(par, st, st.path, x) - rules_pa(par, rules, st.path, x))
     st.innovation_pa = innovation

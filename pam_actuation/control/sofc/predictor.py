@@ -21,7 +21,7 @@ no dead time in its loop (Smith 1957; in the time domain Manitius and Olbrot 197
 """
 
 import numpy as np
-from pam_actuation.control.sofc import credit
+from pam_actuation.control.sofc import valve_lag
 from pam_actuation.control.sofc.credit import Ring
 from pam_actuation.control.sofc.muscle_model import (
     damping_pa_s_per_m, go, inertia_pa_s2_per_m, numbers_pa, rules_pa)
@@ -31,18 +31,22 @@ from pam_sim.compiled import compiled
 
 
 @compiled
-def engage(par: np.record, st: np.record, error_m: float) -> None:
+def engage(par: np.record, st: np.record, error_m: float, announced: float) -> None:
     """
     Decide how much predicted feedback and disturbance act.
 
     Where errors are large they act in full. Where the rules already do it, they step back:
-    a strong feedback adds noise and takes the rules the error they learn from.
+    a strong feedback adds noise and takes the rules the error they learn from. ``announced``:
+    how far the reference comes as its previews told, 0 to 1.
     """
     if not par.half_strength_m > 0.0:
         st.strength = 1.0
         return
     square = error_m * error_m
-    share = par.period_s / (par.strength_time_s + par.period_s)
+    time_s: float = par.strength_time_s
+    if par.announced_strength_time_s > 0.0:
+        time_s += announced * (par.announced_strength_time_s - time_s)
+    share = par.period_s / (time_s + par.period_s)
     st.squared_error_m2 += share * (square - st.squared_error_m2)
     half = par.half_strength_m * par.half_strength_m
     st.strength = st.squared_error_m2 / (st.squared_error_m2 + half)
@@ -51,11 +55,12 @@ def engage(par: np.record, st: np.record, error_m: float) -> None:
 @compiled
 def predict(par: np.record, inverse: FloatArray, rules: FloatArray, ring: Ring, tick: int,
             st: np.record, contraction_m: float, pressure_pa: float,
-            lag_s: float) -> tuple[float, float]:
+            valve: np.record) -> tuple[float, float]:
     """
     Return contraction [m] and rate [m/s] for the moment at which a command of now arrives.
 
-    The model goes on from the measurement with the commands of the ``answer_ticks`` before.
+    The model goes on from the measurement with the commands of one dead time before.
+    ``valve`` is a ``LAG``.
     """
     period = par.period_s
     part = period / (par.predicted_rate_filter_s + period)
@@ -64,18 +69,23 @@ def predict(par: np.record, inverse: FloatArray, rules: FloatArray, ring: Ring, 
     x, rate, p = contraction_m, moved / period, pressure_pa
     for q in range(int(par.path_sets)):
         st.predicted_path[q] = st.path[q]
-    lag = period / (lag_s + period)
-    damping, inertia = damping_pa_s_per_m(par, st), inertia_pa_s2_per_m(par, st)
-    ticks = int(par.answer_ticks)
-    for ago in range(ticks, 0, -1):
-        p += lag * (ring[credit.row_of(ring, tick, ago)].command_pa - p)
-        go(par, st.predicted_path, rate * period)
+    inertia = inertia_pa_s2_per_m(par, st)
+    whole, rest = valve_lag.ticks_of(par, valve)
+    for ago in range(whole, -1 if rest > 0.0 else 0, -1):
+        step = period
+        if ago == 0:
+            step = rest * period
+            p += step / (valve.lag_s + step) * (valve_lag.command_of(ring, tick, 1, 0.0) - p)
+        else:
+            p += step / (valve.lag_s + step) * (
+                valve_lag.command_of(ring, tick, ago, rest) - p)
+        go(par, st.predicted_path, rate * step)
         missing = (
-            p - inverse_pressure_pa(inverse, x) - damping * rate
+            p - inverse_pressure_pa(inverse, x) - damping_pa_s_per_m(par, st, rate) * rate
             - numbers_pa(par, st, st.predicted_path, x)
             - rules_pa(par, rules, st.predicted_path, x) - st.disturbance_pa)
-        rate += period * missing / inertia
-        x += period * rate
+        rate += step * missing / inertia
+        x += step * rate
     return x, rate
 
 

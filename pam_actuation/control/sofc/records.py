@@ -28,6 +28,10 @@ ACTIVE_RULES = (
     'motion_knot', 'motion_knot_degree',                    # of the motion rules: position
     'motion_rate_knot', 'motion_rate_knot_degree',          # and rate
 )
+# What a tick was told of the reference one preview ahead: as it was given, less its jumps; then
+# what is used of it, and of that the move made of a jump.
+TOLD = ('told_m', 'told_rate_m_per_s', 'lead_m', 'lead_rate_m_per_s', 'lead_move_m_per_s',
+        'lead_move_m_per_s2')
 # One tick in the credit memory.
 ENTRY = record(
     *ACTIVE_RULES,
@@ -36,6 +40,7 @@ ENTRY = record(
     'correction_pa_per_m',            # pressure that mends an index of 1 m there
     'valid',                          # 1 = neither saturated nor disturbed when it was active
     'command_pa',
+    *TOLD,
     'index_m',                        # performance index, 0 where nothing was learned
     'integral_deviation_pa',          # of the integral from its mean
 )
@@ -60,6 +65,8 @@ STATE = record(
     'gap_s',                          # before this tick: a period, or more after a late one
     'error_m',
     'command_pa',
+    'jumps_m',                        # sum of those of the lead reference
+    'lead_ticks',                     # since the start, of lead references
     'lead_m',                         # lead reference without what is to go of a move
     'contracting_share',
     'knot_place',                     # of the lead reference among the feed-forward knots
@@ -80,8 +87,13 @@ STATE = record(
     ('move', MOVE),                   # of the reference
     ('lead_move', MOVE),              # of the lead reference
     'jumped',                         # 1 from a jump until the reference moves by itself
+    'told_m2_per_s2',                 # mean square of what previews told beyond the present rate
+    'untold_m2_per_s2',               # the same of what came and was not told
+    'announced',                      # 0 to 1, share of the first
     'surprising',                     # 1 where that jump is one as if nobody had announced it
     'rules_share',                    # of feed-forward and motion rules that acts
+    'rules_pa',                       # of both, in full, as pressure of the integral
+    'balance_pa',                     # part of the integral that only undoes them
     'settling_left_s',
     'freeze_left_s',
     ('model', MODEL),                 # of the muscle

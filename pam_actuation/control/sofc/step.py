@@ -59,6 +59,7 @@ def _start(par: np.record, inverse: FloatArray, values: Tables, kept: Tables, st
     st.rate_factor = 1.0
     st.rate_ceiling = 1.0
     st.lag.lag_s = par.valve_lag_s
+    st.lag.dead_s = min(par.dead_time_s, par.lead_s)
     st.contracting_share = 0.5
     st.offset_m = inp.reference_m - x
     st.contraction_m = x
@@ -214,8 +215,9 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
     jump, lead_jump = dynamics.jumps(par, st, inp)
     # A jump not seen ahead: the move can only begin one preview from now.
     wait = par.lead_s if lead_jump != 0.0 else 0.0
-    to_go, extra_rate = dynamics.smooth_jump(par, st.move, jump, wait)
-    lead_to_go, lead_extra_rate = dynamics.smooth_jump(par, st.lead_move, lead_jump, 0.0)
+    to_go, extra_rate, _ = dynamics.smooth_jump(par, st.move, jump, wait)
+    lead_to_go, lead_extra_rate, lead_extra = dynamics.smooth_jump(
+        par, st.lead_move, lead_jump, 0.0)
     change = filtered_change(
         st.change_m_per_s, par.change_filter_s, inp.reference_rate_m_per_s + extra_rate,
         inp.contraction_m - st.contraction_m, inp.elapsed_s, period,
@@ -235,6 +237,10 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
     st.error_m = error
     lead = inp.lead_reference_m - lead_to_go - offset
     lead_rate = inp.lead_rate_m_per_s + lead_extra_rate
+    dynamics.note_announced(par, ring, st, inp)
+    st.jumps_m += lead_jump
+    lead, lead_rate, lead_extra_rate, lead_extra = dynamics.later(
+        par, ring, st, inp, lead, lead_rate, lead_extra_rate, lead_extra)
     st.offset_m = faded_offset(offset, par.start_time_s, period)
 
     # Fuzzification.
@@ -268,35 +274,39 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
     damping = par.rate_feedforward_pa_s_per_m
     inertia = par.acceleration_feedforward_pa_s2_per_m
     if par.has_model > 0.5:
-        predictor.engage(par, model, error)
+        predictor.engage(par, model, error, st.announced)
         surprising_move = st.move.left_s > 0.0 and st.surprising > 0.5
         model.held = 1.0 - par.jump_disturbance if surprising_move else 0.0
         muscle_model.observe(par, inverse, path_rules, model, inp.contraction_m, measured)
         muscle_model.go(par, model.lead_path, way)
         path = (muscle_model.rules_pa(par, path_rules, model.lead_path, lead)
                 + muscle_model.numbers_pa(par, model, model.lead_path, lead))
-        damping = muscle_model.damping_pa_s_per_m(par, model)
+        damping = muscle_model.damping_pa_s_per_m(par, model, lead_rate)
         inertia = muscle_model.inertia_pa_s2_per_m(par, model)
     dynamic = dynamics.dynamic_pressure_pa(
         par, st, base + par.lag_share * path, lead_rate,
-        st.history_ticks < 0.5 or lead_jump != 0.0, damping, inertia)
+        st.history_ticks < 0.5 or lead_jump != 0.0, damping, inertia,
+        lead_extra_rate, lead_extra)
     predicted = 0.0
     acts = par.predicted_proportional_pa_per_m > 0.0 or par.predicted_derivative_pa_s_per_m > 0.0
     if acts and st.history_ticks >= par.answer_ticks:
         ahead_m, ahead_rate = predictor.predict(
             par, inverse, path_rules, ring, int(st.tick), model, inp.contraction_m, pressure,
-            st.lag.lag_s)
+            st.lag)
         predicted = predictor.predicted_feedback_pa(
             par, model, lead - ahead_m, lead_rate - ahead_rate, st.lag.lag_s)
         muscle_model.settle(par, model, lead - ahead_m, lead_rate)
     feedback = par.feedback_gain_pa * infer_feedback(feedback_rules, share, i, wi, j, wj)
-    feedforward = st.rules_share * infer_feedforward(feedforward_rules, share, k, wk)
-    motion = st.rules_share * infer_motion(motion_rules, m, wm, n, wn)
+    whole_feedforward = infer_feedforward(feedforward_rules, share, k, wk)
+    whole_motion = infer_motion(motion_rules, m, wm, n, wn)
+    feedforward = st.rules_share * whole_feedforward
+    motion = st.rules_share * whole_motion
     proportional = par.proportional_pa_per_m * error
     derivative = par.derivative_pa_s_per_m * change
     integral = st.integral_pa
     st.integral_shape = dynamics.load_shape(par, lead)
-    trim = integral * st.integral_shape
+    trim = (integral - (1.0 - st.rules_share) * st.balance_pa) * st.integral_shape
+    st.rules_pa = (whole_feedforward + whole_motion) / st.integral_shape
     wanted = (base + dynamic + feedback + feedforward + motion
               + proportional + trim + derivative
               + path + model.disturbance_pa + predicted)

@@ -15,12 +15,15 @@
 """
 The lag of the valve, found in motion.
 
-The commands of one preview ago, behind a low pass of first order, are the pressure to be
-expected. The measured pressure differs from it. This difference is correlated with what another
-lag would change, which gives the lag. The method is recursive least squares with forgetting, on
-the output of the model itself (an output error method, Ljung 1999). A zero error of the sensor or
-of the valve is behind a slow mean. An error of the dead time goes into the lag, which makes up
-for it.
+The commands of one preview ago, the dead time, behind a low pass of first order, are the
+pressure to be expected. The measured pressure differs from it. This difference is correlated with
+what another lag would change, which gives the lag. The method is recursive least squares with
+forgetting, on the output of the model itself (an output error method, Ljung 1999). A zero error
+of the sensor or of the valve is behind a slow mean. An error of the dead time goes into the lag,
+which makes up for it.
+
+Where ``dead_time_s`` is set, the dead time is a second number of the same least squares. It is at
+most the preview. Between two ticks the command is that of a straight line.
 """
 
 import math
@@ -40,18 +43,60 @@ LAG = record(
     'lag_s',
     'sensitivity_pa_per_s',           # of the expected pressure to the lag
     'information_pa2_per_s2',         # sum of its squares, with forgetting
+    'dead_s',                         # from a command to its arrival
+    'dead_sensitivity_pa_per_s',      # of the expected pressure to that dead time
+    'both_information_pa2_per_s2',
+    'dead_information_pa2_per_s2',
     'mean_pa',                        # of measured less expected pressure
     'rest_s',                         # for how long nothing is learned yet
 )
 
 
 @compiled
-def _find(par: np.record, st: np.record, arrived_pa: float, expected_pa: float,
-          measured_pa: float) -> None:
-    """
-    Correct the lag by one measurement; ``st`` is a ``LAG``.
+def _both(par: np.record, st: np.record, sensitivity: float, delayed: float, information: float,
+          difference_pa: float) -> float:
+    """Correct the dead time; return the correction of the lag that goes with it [s]."""
+    forgotten = par.period_s / par.lag_memory_s
+    both: float = st.both_information_pa2_per_s2
+    own: float = st.dead_information_pa2_per_s2
+    both += sensitivity * delayed - forgotten * both
+    own += delayed * delayed - forgotten * own
+    st.both_information_pa2_per_s2 = both
+    st.dead_information_pa2_per_s2 = own
+    first = information + _PRIOR_PA2_PER_S2
+    second = own + _PRIOR_PA2_PER_S2
+    whole = first * second - both * both
+    dead_s = st.dead_s + difference_pa * (first * delayed - both * sensitivity) / whole
+    st.dead_s = min(max(dead_s, par.dead_time_s / _RANGE), par.lead_s)
+    return difference_pa * (second * sensitivity - both * delayed) / whole
 
-    The command of one preview ago has arrived and is expected behind the lag. A pressure that is
+
+@compiled
+def ticks_of(par: np.record, st: np.record) -> tuple[int, float]:
+    """Return the dead time in ticks: whole ones and the rest; ``st`` is a ``LAG``."""
+    if not par.dead_time_s > 0.0:
+        return int(par.answer_ticks), 0.0
+    ticks = st.dead_s / par.period_s
+    whole = int(ticks)
+    return whole, ticks - whole
+
+
+@compiled
+def command_of(ring: Ring, tick: int, whole: int, rest: float) -> float:
+    """Return the command [Pa] of so many ticks ago."""
+    newer: float = ring[credit.row_of(ring, tick, whole)].command_pa
+    if rest > 0.0:
+        newer += rest * (ring[credit.row_of(ring, tick, whole + 1)].command_pa - newer)
+    return newer
+
+
+@compiled
+def _find(par: np.record, st: np.record, arrived_pa: float, arrived_pa_per_s: float,
+          expected_pa: float, measured_pa: float) -> None:
+    """
+    Correct lag and dead time by one measurement; ``st`` is a ``LAG``.
+
+    The command of one dead time ago has arrived and is expected behind the lag. A pressure that is
     not finite, or far from the expected one, tells nothing.
     """
     if not (par.lag_memory_s > 0.0 and st.lag_s > 0.0):
@@ -65,12 +110,18 @@ def _find(par: np.record, st: np.record, arrived_pa: float, expected_pa: float,
     slope = (arrived_pa - expected_pa) / lag_s
     sensitivity -= period / (lag_s + period) * (slope + sensitivity)
     st.sensitivity_pa_per_s = sensitivity
+    delayed: float = st.dead_sensitivity_pa_per_s
+    delayed -= period / (lag_s + period) * (arrived_pa_per_s + delayed)
+    st.dead_sensitivity_pa_per_s = delayed
     difference = measured_pa - expected_pa
     if st.rest_s > 0.0 or not abs(difference) <= par.valve_gap_pa:
         return
     mean_pa += period / (_MEAN_TIME_S + period) * (difference - mean_pa)
     information += sensitivity * sensitivity - period / par.lag_memory_s * information
-    lag_s += sensitivity * (difference - mean_pa) / (information + _PRIOR_PA2_PER_S2)
+    if par.dead_time_s > 0.0:
+        lag_s += _both(par, st, sensitivity, delayed, information, difference - mean_pa)
+    else:
+        lag_s += sensitivity * (difference - mean_pa) / (information + _PRIOR_PA2_PER_S2)
     st.mean_pa = mean_pa
     st.information_pa2_per_s2 = information
     st.lag_s = min(max(lag_s, setting_s / _RANGE), setting_s * _RANGE)
@@ -81,14 +132,20 @@ def falls_behind(par: np.record, ring: Ring, st: np.record, inp: np.record) -> b
     """
     Tell whether the measured pressure is far from what the commands should have made of it.
 
-    Expected is the command of one preview ago behind the lag of the valve; ``st`` is a ``STATE``.
+    Expected is the command of one dead time ago behind the lag of the valve. ``st`` is a
+    ``STATE``.
     """
-    if st.history_ticks < par.answer_ticks:
+    if st.history_ticks < par.answer_ticks + (1.0 if par.dead_time_s > 0.0 else 0.0):
         st.expected_pa = inp.pressure_pa
         st.lag.rest_s = _REST_S
         return False
-    then = credit.row_of(ring, int(st.tick), int(par.answer_ticks))
-    arrived: float = ring[then].command_pa
+    tick = int(st.tick)
+    whole, rest = ticks_of(par, st.lag)
+    arrived = command_of(ring, tick, whole, rest)
+    arrives = 0.0                     # rate of change of that command
+    if par.dead_time_s > 0.0:
+        arrives = (command_of(ring, tick, whole, 0.0)
+                   - command_of(ring, tick, whole + 1, 0.0)) / par.period_s
     expected: float = st.expected_pa
     measured: float = inp.pressure_pa
     if not math.isfinite(expected):
@@ -100,5 +157,5 @@ def falls_behind(par: np.record, ring: Ring, st: np.record, inp: np.record) -> b
         st.lag.rest_s = _REST_S
     else:
         st.lag.rest_s = max(st.lag.rest_s - par.period_s, 0.0)
-    _find(par, st.lag, arrived, expected, measured)
+    _find(par, st.lag, arrived, arrives, expected, measured)
     return gap > par.valve_gap_pa          # False for NaN: pressure is optional
