@@ -27,6 +27,7 @@ import math
 import numpy as np
 from pam_sim.annotations import BoolArray, FloatArray
 from pam_sim.errors import InputError
+from pam_sim.gap.data.noise import autocorrelation_time
 from pam_sim.gap.data.split import FIT, SELECT
 from pam_sim.gap.fit.solver import is_refused, REFUSED, simulated_errors, tempering
 from pam_sim.gap.subsystems.problem import SubsystemProblem
@@ -39,7 +40,8 @@ BETTER = 0.01                # of the sum of logarithms of misfits
 ROUNDS = 4                   # of weights and errors
 SETTLED = 0.2                # relative change of the weights that ends the rounds
 STEP = 1e-6                  # of a slope, in coordinates: a bend would look like information
-COARSE = 2e5                 # times that, of effects and of times of the measurement
+STEP_OF_KNOWN = 1e-4         # the same, of numbers with a prior
+BEGINS = 0.2                 # the same, of an effect that begins to act at some size
 EVALUATIONS = 30
 # Of an unknown number from one end of its range to the other, in deviations: what the data leave
 # open ends near the value that the rig file has.
@@ -118,17 +120,22 @@ class Weighted:
         rows = []
         for j in range(len(self.numbers)) if places is None else places:
             number = self.numbers[j]
-            step = STEP if x[j] + STEP <= self.high[j] else -STEP
-            if not number.unknown and (number.effect or number.subsystem):
-                step *= COARSE              # a time needs whole steps of the grid
-            moved = np.array(x)
-            moved[j] += step
-            own = (np.arange(x.size) == j) * self.prior
-            rows.append(np.concatenate([
-                self._scaled(self._changes(x, moved, base[k], p), k) / step
-                if number.acts_in(p) else np.zeros(base[k].size)
-                for k, p in enumerate(self.problems)] + [own]))
+            step = STEP if number.unknown else STEP_OF_KNOWN
+            own = self._slope(x, j, base, step)
+            if number.effect and not number.unknown and not any(np.any(one) for one in own):
+                own = self._slope(x, j, base, BEGINS)
+            rows.append(np.concatenate([*own, (np.arange(x.size) == j) * self.prior]))
         return np.array(rows).T
+
+    def _slope(self, x: FloatArray, j: int, base: Sequence[FloatArray], step: float
+               ) -> list[FloatArray]:
+        """Return how the weighted errors of each subsystem change with number ``j``."""
+        step = step if x[j] + step <= self.high[j] else -step
+        moved = np.array(x)
+        moved[j] += step
+        return [self._scaled(self._changes(x, moved, base[k], p), k) / step
+                if self.numbers[j].acts_in(p) else np.zeros(base[k].size)
+                for k, p in enumerate(self.problems)]
 
     def _changes(self, x: FloatArray, moved: FloatArray, base: FloatArray,
                  problem: SubsystemProblem) -> FloatArray:
@@ -219,6 +226,15 @@ class Weighted:
             for s, name in enumerate(p.signals):
                 chosen = errors[(p.signal == s) & used(p)]
                 found.append((p, name, float(np.mean(chosen ** 2))))
+        return found
+
+    def memories(self, x: FloatArray) -> list[float]:
+        """Return how many samples the errors of every signal stay alike, at least 1."""
+        found = []
+        for p in self.problems:
+            errors = self.errors(x, p)
+            found += [autocorrelation_time(errors[(p.signal == s) & used(p)])
+                      for s in range(len(p.signals))]
         return found
 
     def misfit(self, x: FloatArray) -> float:

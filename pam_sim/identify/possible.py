@@ -22,8 +22,9 @@ could explain widens the intervals. Their sizes are no result: ``pam gap`` names
 proves them.
 
 The hidden effect has a formulation of its own. Those that matter are therefore fitted in all
-formulations of the library, with their shapes free. The best one stays; how far the numbers
-move between those that explain about as much widens the intervals.
+formulations of the library, with their shapes free. The best one stays, with free shapes where
+it explains as much; how far the numbers move between those that explain about as much widens the
+intervals.
 """
 
 from collections.abc import Sequence
@@ -32,15 +33,17 @@ import numpy as np
 from pam_sim.annotations import FloatArray
 from pam_sim.effects.effect import Effect
 from pam_sim.effects.registry import effects
-from pam_sim.gap.subsystems.problem import SubsystemProblem
+from pam_sim.gap.subsystems.problem import RATE_HZ, SubsystemProblem
 from pam_sim.identify.fit import Weighted
 from pam_sim.identify.numbers import Number
+from pam_sim.identify.records import SHORT_S
 from pam_sim.identify.secant import solve_from
 from pam_sim.rig import Rig
 
 # Their least size, not zero, is the strongest effect.
 NOT_GRADUAL = ('flow_limit', 'supply_droop')
 SEEN_FLOORS2 = 1.5           # mean squared error from which on something is missing
+LASTING = SHORT_S * RATE_HZ  # samples that errors stay alike, from which on the same
 MATTERS_FLOORS2 = 0.1        # what an effect moves from which on its formulations are tried
 TRIED = 3                    # effects of which they are
 SHAPE_SD = 1.0               # of the logarithm of a shape
@@ -50,8 +53,14 @@ AS_GOOD = 0.3                # the same, within which formulations explain about
 
 
 def is_incomplete(weighted: Weighted, x: FloatArray) -> bool:
-    """Tell whether a fitted model leaves more than noise in some signal."""
-    return any(square > SEEN_FLOORS2 for _, _, square in weighted.mean_squares(x))
+    """
+    Tell whether a fitted model leaves more than noise in some signal.
+
+    An effect smaller than the noise shows by its memory: what is left then stays alike for many
+    samples, longer than the average of the measured pressure lets its noise last.
+    """
+    return any(square > SEEN_FLOORS2 for _, _, square in weighted.mean_squares(x)) or any(
+        memory > LASTING for memory in weighted.memories(x))
 
 
 def possible_effects(rig: Rig, problems: Sequence[SubsystemProblem], numbers: Sequence[Number]
@@ -143,10 +152,12 @@ def in_other_forms(weighted: Weighted, x: FloatArray, count: int
             guess[:rows, :len(kept)] = base_slopes[:rows, kept]
             guess[:rows, len(kept):] = other.slopes(at, range(len(kept), at.size))[:rows]
             guess[rows:] = np.diag(other.prior)
-            found, _, at_slopes = solve_from(other, at, guess, again=False)
+            found, _, at_slopes = solve_from(other, at, guess)
             misfit = other.misfit(found)
             met.append((misfit, found[:count]))
-            if misfit < least - BETTER:
+            # Free shapes hold the first formulation too: what they leave open counts.
+            margin = BETTER if form.name == name else -BETTER
+            if misfit < least + margin:
                 least, weighted, x, slopes = misfit, other, found, at_slopes
     best = min((m for m, _ in met), default=0.0)
     spread = np.zeros(count)

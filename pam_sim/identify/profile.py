@@ -19,8 +19,8 @@ The profile of a number is the least cost that the others reach while it is held
 ends where that cost is 3.84 above the least one (Raue et al. 2009, Bioinformatics 25(15), 1923).
 An end that lies at the end of the range is open: the data do not exclude what is beyond.
 
-With effects fitted along, many numbers end at a bound and the least cost of the others is hardly
-found: the profile then rises too soon. So there an end is no nearer than that of the slopes at the
+With effects fitted along, many numbers end at a bound and valleys are bent. There the others are
+fitted with slopes of their own at every point. An end is no nearer than that of the slopes at the
 solution, all numbers within their bounds.
 """
 
@@ -142,9 +142,14 @@ def profile(weighted: Weighted, x: FloatArray, place: int, covariance: FloatArra
     def rise(shift: float, near: FloatArray) -> tuple[float, FloatArray]:
         start = np.array(near)
         start[place] = x[place] + shift
-        solved, cost = weighted.follow(start, held, slopes)
-        if cost - least > RISE_95:          # in a bent valley the slopes lead astray
-            solved, cost, _ = solve_from(weighted, solved, slopes, held)
+        if weighted.incomplete:
+            solved, cost, _ = solve_from(weighted, start, held=held)
+        else:
+            solved, cost = weighted.follow(start, held, slopes)
+            if cost - least > RISE_95:          # in a bent valley the slopes lead astray
+                solved, cost, _ = solve_from(weighted, solved, slopes, held)
+            if cost - least > RISE_95:
+                solved, cost, _ = solve_from(weighted, solved, held=held)
         if cost < lowest[0] - BETTER:
             lowest[:] = [cost, solved]
         points[shift] = cost - least

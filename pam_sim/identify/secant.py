@@ -26,7 +26,7 @@ from pam_sim.identify.fit import ROUNDS, TIGHT, Weighted
 
 STEPS = 12
 GAIN = 0.05                  # of the cost, which ends the steps
-DAMPING = 1e-3               # of a step, beside the squared slopes
+DAMPING, LEAST = 1e-3, 1e-6  # of a step, beside the squared slopes; and where steps succeed
 HARDER, EASIER, HARDEST = 30.0, 0.1, 1e3     # factors on the damping, and its limit
 TINY = 1e-300
 
@@ -65,8 +65,9 @@ def solve_from(weighted: Weighted, x: FloatArray, slopes: FloatArray | None = No
         return x, cost, slopes
     for _ in range(STEPS):
         step = np.zeros(x.size)
-        step[free] = _step(slopes[:, free], residuals, damping, weighted.low[free] - x[free],
-                           weighted.high[free] - x[free])
+        step[free] = bounded_step(
+            slopes[:, free], residuals, damping, weighted.low[free] - x[free],
+            weighted.high[free] - x[free])
         moved = np.clip(x + step, weighted.low, weighted.high)
         step = moved - x
         if not np.any(step):
@@ -79,7 +80,7 @@ def solve_from(weighted: Weighted, x: FloatArray, slopes: FloatArray | None = No
             slopes += np.outer(found - residuals - slopes @ step, scale * step / max(length, TINY))
         if now < cost:
             gained, cost, x, residuals = cost - now, now, moved, found
-            damping = max(damping * EASIER, DAMPING)
+            damping = max(damping * EASIER, LEAST)
             fresh = False
             if gained < GAIN:
                 break
@@ -101,8 +102,8 @@ def settle(weighted: Weighted, x: FloatArray) -> FloatArray:
     return x
 
 
-def _step(slopes: FloatArray, residuals: FloatArray, damping: float, low: FloatArray,
-          high: FloatArray) -> FloatArray:
+def bounded_step(slopes: FloatArray, residuals: FloatArray, damping: float, low: FloatArray,
+                 high: FloatArray) -> FloatArray:
     """Return the damped step within its limits, from the normal equations."""
     from scipy.optimize import lsq_linear       # slow to import
 
@@ -111,4 +112,4 @@ def _step(slopes: FloatArray, residuals: FloatArray, damping: float, low: FloatA
     square = scaled.T @ scaled + damping * np.eye(scale.size)
     root = np.linalg.cholesky(square).T
     return lsq_linear(root, -np.linalg.solve(root.T, scaled.T @ residuals), (
-        np.minimum(low, -TIGHT) * scale, np.maximum(high, TIGHT) * scale)).x / scale
+        np.minimum(low, -TIGHT) * scale, np.maximum(high, TIGHT) * scale), 'bvls').x / scale
