@@ -29,6 +29,7 @@ from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.gap.verify.uncertainty import NORMAL_95
 from pam_sim.identify.advice import next_experiment, where_open
 from pam_sim.identify.fit import fit, NOWHERE, Weighted
+from pam_sim.identify.inputs import scatter_by_inputs
 from pam_sim.identify.judgement import Combination, DETERMINED, judge
 from pam_sim.identify.numbers import (
     known_numbers_of, Number, unknown_numbers, with_values)
@@ -192,10 +193,13 @@ def _judged(weighted: Weighted, x: FloatArray, acting: Sequence[Number], forms: 
             ) -> tuple[FloatArray, FloatArray, list[Found], list[Combination]]:
     """Return (solution, information, what is known of each first number, and of several)."""
     count = len(acting)
-    x, covariance, intervals = _profiles(weighted, x, count, progress)
+    x, covariance, slopes, intervals = _profiles(weighted, x, count, progress)
+    scatter = scatter_by_inputs(weighted, x, count, slopes)
+    doubts = np.sqrt(forms ** 2 + NORMAL_95 ** 2 * np.diag(scatter))
     intervals = [one.wider(n, n.value(float(c)), float(f))
-                 for one, n, c, f in zip(intervals, acting, x, forms)]
-    information = np.linalg.inv(covariance[:count, :count] + np.diag((forms / NORMAL_95) ** 2))
+                 for one, n, c, f in zip(intervals, acting, x, doubts)]
+    information = np.linalg.inv(
+        covariance[:count, :count] + scatter + np.diag((forms / NORMAL_95) ** 2))
     statuses, combinations = judge(acting, intervals, x[:count], information)
     found = [Found(n, n.value(float(c)), i, s)
              for n, c, i, s in zip(acting, x, intervals, statuses)]
@@ -218,8 +222,8 @@ def _without_valve(weighted: Weighted, x: FloatArray, count: int
 
 
 def _profiles(weighted: Weighted, x: FloatArray, count: int, progress: Callable[[float], object]
-              ) -> tuple[FloatArray, FloatArray, list[Interval]]:
-    """Return (solution, covariance, interval of each of the first numbers)."""
+              ) -> tuple[FloatArray, FloatArray, FloatArray, list[Interval]]:
+    """Return (solution, covariance, slopes, interval of each of the first numbers)."""
     for left in reversed(range(RETURNS)):
         slopes = weighted.slopes(x)
         covariance = np.linalg.inv(slopes.T @ slopes + NOWHERE * np.eye(x.size))
@@ -233,7 +237,7 @@ def _profiles(weighted: Weighted, x: FloatArray, count: int, progress: Callable[
                 break
         else:
             break
-    return x, covariance, intervals
+    return x, covariance, slopes, intervals
 
 
 def _of_one_scale(acting: Sequence[Number]) -> list[str]:
