@@ -165,6 +165,23 @@ def _is_left(result: GapResult, estimator: Estimator, validation: Validation, ba
     return any(surely(name, spread.get(name, 0.0)) > sure for name in large)
 
 
+def given_suffices(result: GapResult, estimator: Estimator, validation: Validation, base: Fit,
+                   materiality: float) -> bool:
+    """
+    Return whether the model as given explains the proof to its noise, and calibration does not.
+
+    Few moves tell some numbers hardly, and noise alone then leads them away. An effect may make
+    up for that. What the searched data show clearly is a gap all the same.
+    """
+    if result.verdict == 'no_gap' or result.noticed or _is_clear(estimator, base):
+        return False
+    least = max(materiality, 1.0)
+    if result.effects:          # what has a name is more than a gap without one
+        least *= estimator.criteria.greater_part
+    return all(_beyond(s.rmse_before, s.noise_floor) <= least * validation.noise[name]
+               for name, s in result.signals.items())
+
+
 def _is_clear(estimator: Estimator, base: Fit) -> bool:
     """Return whether calibration leaves a gap in the searched data that is clear without proof."""
     return any(gap(p, base.errors[p.subsystem]) > estimator.criteria.clear_rest

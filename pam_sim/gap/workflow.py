@@ -38,10 +38,10 @@ from pam_sim.gap.select.memory import as_sets, memories
 from pam_sim.gap.select.search import search
 from pam_sim.gap.subsystems.problems import subsystem_problems
 from pam_sim.gap.subsystems.pulses_seen import shows_pulses
-from pam_sim.gap.verdict import fill, judge
+from pam_sim.gap.verdict import fill, given_suffices, judge
 from pam_sim.gap.verify.harm import without_harm
 from pam_sim.gap.verify.materiality import is_material, moved
-from pam_sim.gap.verify.model import free_run_of, held_without
+from pam_sim.gap.verify.model import as_given, free_run_of, held_without
 from pam_sim.gap.verify.own_runs import OwnRuns
 from pam_sim.gap.verify.refutation import refute, refuted_alone, unconfirmed
 from pam_sim.gap.verify.validation import Validation
@@ -198,6 +198,14 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
         small = join(w.name for w in outcome.named)
         result.remarks.append(f'What {small} would explain is too small to matter.')
         outcome.named, final = [], base
+        validation = validated(final)
+        own_runs = judged()
+    if given_suffices(result, estimator, validation, base, materiality):
+        result.remarks.append('Calibrated numbers would follow the certify data less well than '
+                              'the given ones, so these stay.')
+        outcome.named, result.effects, result.ambiguity_set, result.rivals = [], [], [], []
+        result.unexplained_fraction = 0.0
+        base = final = estimator.base = as_given(estimator)
         validation = validated(final)
         own_runs = judged()
     result.at_one_speed = one_speed and set(memories()) <= set(result.ambiguity_set)

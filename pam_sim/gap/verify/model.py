@@ -22,6 +22,7 @@ from pam_sim.annotations import FloatArray
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
+from pam_sim.gap.fit.solver import simulated_errors
 from pam_sim.gap.subsystems.simulation import free_run
 from pam_sim.rig import Rig
 
@@ -40,6 +41,15 @@ def model_of(estimator: Estimator, found: Fit) -> Rig:
     """Return the rig of a fit: numbers calibrated, effects added."""
     numbers, _ = numbers_of(estimator, found)
     return estimator.with_effects(found.settings()).with_(parameters=numbers)
+
+
+def as_given(estimator: Estimator) -> Fit:
+    """Return the given model as a fit: all its numbers are where they are known to be."""
+    known: dict[str, FloatArray] = {
+        p.subsystem: np.zeros(len(p.known)) for p in estimator.problems}
+    errors = {p.subsystem: simulated_errors(p, estimator.rig, known[p.subsystem])
+              for p in estimator.problems}
+    return Fit(Hypothesis(), np.zeros(0), known, errors, estimator.base.temper)
 
 
 def held_without(found: Fit, kept: Collection[str] = ()) -> Fit:
