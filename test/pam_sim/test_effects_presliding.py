@@ -79,14 +79,15 @@ def test_breaks_away_above_and_slides_at_the_level(name):
 @pytest.mark.parametrize('before, after', [(0.01, -0.006), (-0.004, 0.01), (0.01, 0.02)])
 def test_a_turn_inside_a_step_is_travelled_both_ways(before, after):
     way_m, elapsed_s = 10e-6, 1e-3
+    way = way_m, 1.0 / way_m
     fine = np.linspace(0.0, elapsed_s, 10_001)
     path = before * fine + 0.5 * (after - before) / elapsed_s * fine ** 2
     z = 4e-6
     for dx in np.diff(path):
-        z = bent(z, dx, way_m)
-    assert bent_there_and_back(4e-6, path[-1], after, elapsed_s, way_m) == pytest.approx(
+        z = bent(z, dx, *way)
+    assert bent_there_and_back(4e-6, path[-1], after, elapsed_s, *way) == pytest.approx(
         z, abs=1e-9)
-    assert bent_there_and_back(4e-6, 0.0, after, 0.0, way_m) == 4e-6
+    assert bent_there_and_back(4e-6, 0.0, after, 0.0, *way) == 4e-6
 
 
 def test_pressure_scales_it():
