@@ -137,9 +137,9 @@ def test_a_controller_after_a_killed_one_is_not_two(rig):
     commander = Commander(rig, COMMAND_PA)
     try:
         wait_until_followed(rig)
+        wait_for(lambda: rig.node.count_publishers('/muscle/pressure_command') == 2, 5.0,
+                 'the dead one beside it')
         time.sleep(1.2)             # the driver looks at the graph twice a second
-        topic = '/muscle/pressure_command'
-        assert rig.node.count_publishers(topic) == 2         # the dead one stands there
         said = [one.message for one in rig.health['valve_driver'][since:]]
         assert not [one for one in said if 'publishers' in one], said
     finally:
