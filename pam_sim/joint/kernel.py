@@ -85,10 +85,9 @@ def _rollout_entry(key: int) -> Callable[..., Any]:
             joint_rows[i] = out
             flexor_rows[i] = flexor_out
             extensor_rows[i] = extensor_out
-            if flexor_unphysical < 0 and not physical.is_physical(flexor_out, 0):
-                flexor_unphysical = i
-            if extensor_unphysical < 0 and not physical.is_physical(extensor_out, 0):
-                extensor_unphysical = i
+            flexor_unphysical = physical.first_unphysical(flexor_unphysical, i, flexor_out, 0)
+            extensor_unphysical = physical.first_unphysical(
+                extensor_unphysical, i, extensor_out, 0)
         return flexor_unphysical, extensor_unphysical
 
     return joint_rollout

@@ -132,7 +132,7 @@ def _entries(key: int, beyond: int) -> Entries:
         flat_in, flat_out = inputs.reshape(inputs.size), outputs.reshape(outputs.size)
         steps.look_body(
             beyond, of_rig, numbers, part(flat_in, 0, INPUT), part(flat_out, 0, OUTPUT))
-        unphysical = -1 if physical.is_physical(flat_out, 0) else 0
+        unphysical = physical.first_unphysical(-1, 0, flat_out, 0)
         if numbers.beyond_nominal > NOMINAL:
             for i in range(inputs.shape[0]):
                 step_given = part(flat_in, i * _INPUT_SIZE, INPUT)
@@ -141,14 +141,14 @@ def _entries(key: int, beyond: int) -> Entries:
                     _step_terms(of_rig, numbers, step_given, step_seen)
                 else:
                     _step_beyond(of_rig, numbers, step_given, step_seen)
-                if unphysical < 0 and not physical.is_physical(flat_out, (i + 1) * _OUTPUT_SIZE):
-                    unphysical = i + 1
+                unphysical = physical.first_unphysical(
+                    unphysical, i + 1, flat_out, (i + 1) * _OUTPUT_SIZE)
         else:
             for i in range(inputs.shape[0]):
                 steps.step_body(NOMINAL, of_rig, numbers, part(flat_in, i * _INPUT_SIZE, INPUT),
                                 part(flat_out, (i + 1) * _OUTPUT_SIZE, OUTPUT))
-                if unphysical < 0 and not physical.is_physical(flat_out, (i + 1) * _OUTPUT_SIZE):
-                    unphysical = i + 1
+                unphysical = physical.first_unphysical(
+                    unphysical, i + 1, flat_out, (i + 1) * _OUTPUT_SIZE)
         return unphysical
 
     return Entries(

@@ -35,3 +35,9 @@ def is_physical(outputs: FloatArray, first: int) -> bool:
     for place in range(first, first + _SIZE):
         total += outputs[place]
     return math.isfinite(total) and part(outputs, first, OUTPUT).true_pressure_pa > 0.0
+
+
+@compiled
+def first_unphysical(known: int, row: int, outputs: FloatArray, first: int) -> int:
+    """Return the first row that is not physical, ``known`` of the rows before; -1: none yet."""
+    return row if known < 0 and not is_physical(outputs, first) else known
