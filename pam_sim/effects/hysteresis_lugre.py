@@ -30,7 +30,6 @@ instead of closing.
 """
 
 from collections.abc import Mapping
-import math
 from typing import Any
 
 import numpy as np
@@ -41,7 +40,7 @@ from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.effects.loop_level import (
     LEVEL, LEVEL_AMPLITUDE, LEVEL_FREE, level_parameters, loop_level_n, LOOP_REPORTED,
     pack_level)
-from pam_sim.effects.presliding import bent
+from pam_sim.effects.presliding import at_rest, bent
 from pam_sim.parameters import Parameter
 from pam_sim.records import record
 
@@ -107,9 +106,7 @@ def bending_when_sliding(pressure_pa: float, velocity_m_per_s: float, par: np.re
     level = loop_level_n(pressure_pa, par)
     if level <= 0.0:
         return 0.0
-    square = (velocity_m_per_s * par.inverse_stribeck_s_per_m) ** 2
-    if square < 40.0:           # beyond, less than the last bit
-        level *= 1.0 + par.static_excess * math.exp(-square)
+    level *= 1.0 + par.static_excess * at_rest(velocity_m_per_s, par)
     return level * par.inverse_stiffness_m_per_n
 
 
@@ -120,9 +117,9 @@ def muscle_force(force_n: float, pressure_pa: float, velocity_m_per_s: float, dx
     sliding_m = bending_when_sliding(pressure_pa, velocity_m_per_s, par)
     if sliding_m <= 0.0:
         return force_n
-    per_sliding_m = 1.0 / sliding_m
-    z = bent(state.bending_m, dx_m, sliding_m, per_sliding_m)
-    rate = velocity_m_per_s - abs(velocity_m_per_s) * z * per_sliding_m
+    inverse_sliding_per_m = 1.0 / sliding_m
+    z = bent(state.bending_m, dx_m, sliding_m, inverse_sliding_per_m)
+    rate = velocity_m_per_s - abs(velocity_m_per_s) * z * inverse_sliding_per_m
     return force_n - par.stiffness_n_per_m * z - par.bristle_damping_n_s_per_m * rate
 
 

@@ -55,7 +55,7 @@ PARAMETERS = (
 PRESLIDING_FREE = (
     FreeParameter('presliding_m', 1e-5, 2e-6, 1e-4, True, ends=('upper',)),
     FreeParameter('static_excess', 0.05, 0.0, 0.6))
-PACKED = ('presliding_m', 'per_presliding_m', 'bristle_time_s', 'static_excess',
+PACKED = ('presliding_m', 'inverse_presliding_per_m', 'bristle_time_s', 'static_excess',
           'inverse_stribeck_s_per_m')
 BENDING = record('bending_m')
 _SLIDING = 40.0             # square of a relative speed; beyond, less than the last bit
@@ -65,7 +65,7 @@ def pack_presliding(plain: Effect, values: Mapping[str, float],
                     numbers: Numbers) -> dict[str, Any]:
     """Return the packed values: those of presliding, then those of the ``plain`` effect."""
     return {'presliding_m': values['presliding_m'],
-            'per_presliding_m': 1.0 / values['presliding_m'],
+            'inverse_presliding_per_m': 1.0 / values['presliding_m'],
             'bristle_time_s': values['bristle_time_s'],
             'static_excess': values['static_excess'],
             'inverse_stribeck_s_per_m': 1.0 / values['stribeck_m_per_s'],
@@ -101,32 +101,32 @@ def presliding_of(sibling: Effect, sentence: str, equation: str, free: FreeParam
 
 
 @compiled
-def bent(z_m: float, dx_m: float, sliding_m: float, per_sliding_m: float) -> float:
+def bent(z_m: float, dx_m: float, sliding_m: float, inverse_sliding_per_m: float) -> float:
     """
     Return the bending [m] after a travel ``dx_m``, exact for a constant ``sliding_m``.
 
-    ``per_sliding_m`` is one over that.
+    ``inverse_sliding_per_m`` is one over that.
     """
     if dx_m == 0.0:
         return z_m
     end = math.copysign(sliding_m, dx_m)
     if z_m == end:              # slides, as most of the time: no need of the exponential
         return end
-    return end + (z_m - end) * math.exp(-abs(dx_m) * per_sliding_m)
+    return end + (z_m - end) * math.exp(-abs(dx_m) * inverse_sliding_per_m)
 
 
 @compiled
 def bent_there_and_back(z_m: float, dx_m: float, velocity_m_per_s: float, elapsed_s: float,
-                        sliding_m: float, per_sliding_m: float) -> float:
+                        sliding_m: float, inverse_sliding_per_m: float) -> float:
     """Return the same for a travel that may hold a turn: its net length would leave that out."""
     if elapsed_s <= 0.0:
         return z_m
     if (2.0 * dx_m - velocity_m_per_s * elapsed_s) * velocity_m_per_s < 0.0:
         before = 2.0 * dx_m / elapsed_s - velocity_m_per_s
         turn_m = 0.5 * elapsed_s * before * before / (before - velocity_m_per_s)
-        return bent(bent(z_m, turn_m, sliding_m, per_sliding_m), dx_m - turn_m, sliding_m,
-                    per_sliding_m)
-    return bent(z_m, dx_m, sliding_m, per_sliding_m)
+        return bent(bent(z_m, turn_m, sliding_m, inverse_sliding_per_m), dx_m - turn_m, sliding_m,
+                    inverse_sliding_per_m)
+    return bent(z_m, dx_m, sliding_m, inverse_sliding_per_m)
 
 
 @compiled
@@ -142,21 +142,21 @@ def bending(velocity_m_per_s: float, dx_m: float, elapsed_s: float, state: np.re
     """Return (bending [m], 1 / that in steady sliding, how much it is at rest) at ``dx_m``."""
     rest = at_rest(velocity_m_per_s, par)
     sliding_m = par.presliding_m * (1.0 + par.static_excess * rest)
-    per_sliding_m = 1.0 / sliding_m
+    inverse_sliding_per_m = 1.0 / sliding_m
     z = bent_there_and_back(
-        state.bending_m, dx_m, velocity_m_per_s, elapsed_s, sliding_m, per_sliding_m)
-    return z, per_sliding_m, rest
+        state.bending_m, dx_m, velocity_m_per_s, elapsed_s, sliding_m, inverse_sliding_per_m)
+    return z, inverse_sliding_per_m, rest
 
 
 @compiled
 def share_of_sliding(velocity_m_per_s: float, dx_m: float, elapsed_s: float, state: np.record,
                      par: np.record) -> float:
     """Return the friction over that of sliding, against motion, at travel ``dx_m``."""
-    z, per_sliding_m, rest = bending(velocity_m_per_s, dx_m, elapsed_s, state, par)
+    z, inverse_sliding_per_m, rest = bending(velocity_m_per_s, dx_m, elapsed_s, state, par)
     if rest > 0.0:
-        rate = velocity_m_per_s - abs(velocity_m_per_s) * z * per_sliding_m
+        rate = velocity_m_per_s - abs(velocity_m_per_s) * z * inverse_sliding_per_m
         z += par.bristle_time_s * rest * rate
-    return z * par.per_presliding_m
+    return z * par.inverse_presliding_per_m
 
 
 @compiled

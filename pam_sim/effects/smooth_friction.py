@@ -18,7 +18,7 @@ Friction that never sticks: F -> F - (F0 + k_p p_g) tanh(v / v_s).
 This is Coulomb friction as simulators smooth it, and as a film between the surfaces makes it.
 Above v_s it is dry friction. At rest nothing holds, and the muscle creeps until the forces
 balance. With 2 N at 1 mm/s, a step of 1 ms has an error of 0.15 % of the force range in one
-sample; at 2 mm/s it is smaller.
+sample. At 2 mm/s it is smaller.
 """
 
 from collections.abc import Mapping
