@@ -160,10 +160,11 @@ def settling_s(recording: Recording, signal: str) -> float:
         Which of its signals.
 
     """
+    if signal != 'pressure' or recording.unseen_s > 0.0:
+        return SETTLE_S
     time_s, mean = _path(recording)
     early = mean[time_s < SETTLE_S]
-    if signal != 'pressure' or recording.unseen_s > 0.0 or early.size == 0 or (
-            np.ptp(early) < LEAST_MOVE * float(np.ptp(mean))):
+    if early.size == 0 or np.ptp(early) < LEAST_MOVE * float(np.ptp(mean)):
         return SETTLE_S
     filled = recording.starts_empty and not recording.moves_at_start('contraction')
     return 0.0 if filled or _starts_at_rest(recording) else SETTLE_S
