@@ -37,7 +37,8 @@ from pam_sim.gap.verify.validation import Validation
 
 def fill(result: GapResult, estimator: Estimator, outcome: Outcome, final: Fit,
          validation: Validation) -> None:
-    """Put signals, numbers, effects and the model into a result."""
+    """Put signals, numbers, effects and the model into a result, in place of former ones."""
+    result.effects = []
     result.signals = validation.signals()
     precision = estimator.precision(final)
     result.calibration = _calibrated(estimator, final, precision)
@@ -72,6 +73,7 @@ def judge(result: GapResult, outcome: Outcome, estimator: Estimator, validation:
     though something is named.
     """
     named, criteria = outcome.named, estimator.criteria
+    result.ambiguity_set, result.rivals, result.unexplained_fraction = [], [], 0.0
     result.moved = validation.moved(base, whole) if named else {}
     own = validation.moved(held_without(final), whole) if named else {}
     again = bool(named) and validation.finds_again()

@@ -203,8 +203,7 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     if given_suffices(result, estimator, validation, base, materiality):
         result.remarks.append('Calibrated numbers would follow the certify data less well than '
                               'the given ones, so these stay.')
-        outcome.named, result.effects, result.ambiguity_set, result.rivals = [], [], [], []
-        result.unexplained_fraction = 0.0
+        outcome.named = []
         base = final = estimator.base = as_given(estimator)
         validation = validated(final)
         own_runs = judged()
