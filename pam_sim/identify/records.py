@@ -22,7 +22,7 @@ import numpy as np
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.gap.data.health import missed_pulses
-from pam_sim.gap.data.noise import noise_of, noise_sd, SMALLEST
+from pam_sim.gap.data.noise import Noise, noise_of, noise_sd, SMALLEST
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.signals import VALVE_FIELDS
 from pam_sim.gap.subsystems.mechanics import MechanicsProblem
@@ -72,14 +72,16 @@ class LoadedMechanics(MechanicsProblem):
     def __init__(self, rig: Rig, offers: Sequence[Offer], holds_certify: bool = False) -> None:
         self._added_kg = [one.added_kg for one in offers]
         self._raw = [one.recording for one in offers]
+        self._raw_noise = [noise_of(raw.time_s['pressure'], raw.measured['pressure'])
+                           for raw in self._raw]
         super().__init__(rig, [with_quiet_pressure(one.recording) for one in offers],
                          holds_certify=holds_certify)
 
     def _disturb(self, random: np.random.Generator | None) -> None:
         super()._disturb(None)
         if random is not None:
-            self._noise_pa = [_drawn_pa(raw, quiet, random)
-                              for raw, quiet in zip(self._raw, self.recordings)]
+            self._noise_pa = [_drawn_pa(*one, random) for one in zip(
+                self._raw, self._raw_noise, self.recordings)]
 
     def _simulate(self, rig: Rig, index: int, numbers: Mapping[str, float]) -> Response:
         recording = self.recordings[index]
@@ -172,12 +174,12 @@ def with_quiet_pressure(recording: Recording) -> Recording:
     return quiet
 
 
-def _drawn_pa(raw: Recording, quiet: Recording, random: np.random.Generator) -> FloatArray:
+def _drawn_pa(raw: Recording, noise: Noise, quiet: Recording, random: np.random.Generator
+              ) -> FloatArray:
     """Return what noise like that of a pressure leaves of itself in the averaged one."""
-    time_s, measured = raw.time_s['pressure'], raw.measured['pressure']
     noisy = copy.copy(raw)
-    noisy.measured = {**raw.measured,
-                      'pressure': measured + noise_of(time_s, measured).draw(time_s, random)}
+    noisy.measured = {**raw.measured, 'pressure': raw.measured['pressure'] + noise.draw(
+        raw.time_s['pressure'], random)}
     return with_quiet_pressure(noisy).measured['pressure'] - quiet.measured['pressure']
 
 
