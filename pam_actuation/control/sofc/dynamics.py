@@ -152,6 +152,12 @@ def note_announced(par: np.record, ring: Ring, st: np.record, inp: np.record) ->
 
 
 @compiled
+def between(newer: float, older: float, rest: float) -> float:
+    """Return the value a part of a tick before the newer one, on a straight line."""
+    return newer + rest * (older - newer)
+
+
+@compiled
 def later(par: np.record, ring: Ring, st: np.record, inp: np.record, lead_m: float,
           rate_m_per_s: float, move_m_per_s: float,
           move_m_per_s2: float) -> tuple[float, float, float, float]:
@@ -179,14 +185,14 @@ def later(par: np.record, ring: Ring, st: np.record, inp: np.record, lead_m: flo
     new = ring[credit.row_of(ring, tick, whole)]
     old = ring[credit.row_of(ring, tick, whole + (1 if rest > 0.0 else 0))]
     surprise = 1.0 - st.announced
-    told_m = new.told_m + rest * (old.told_m - new.told_m)
-    told_rate = new.told_rate_m_per_s + rest * (old.told_rate_m_per_s - new.told_rate_m_per_s)
+    told_m = between(new.told_m, old.told_m, rest)
+    told_rate = between(new.told_rate_m_per_s, old.told_rate_m_per_s, rest)
     straight_m = entry.told_m - early_s * inp.lead_rate_m_per_s
-    return (new.lead_m + rest * (old.lead_m - new.lead_m) + surprise * (straight_m - told_m),
-            new.lead_rate_m_per_s + rest * (old.lead_rate_m_per_s - new.lead_rate_m_per_s)
+    return (between(new.lead_m, old.lead_m, rest) + surprise * (straight_m - told_m),
+            between(new.lead_rate_m_per_s, old.lead_rate_m_per_s, rest)
             + surprise * (inp.lead_rate_m_per_s - told_rate),
-            new.lead_move_m_per_s + rest * (old.lead_move_m_per_s - new.lead_move_m_per_s),
-            new.lead_move_m_per_s2 + rest * (old.lead_move_m_per_s2 - new.lead_move_m_per_s2))
+            between(new.lead_move_m_per_s, old.lead_move_m_per_s, rest),
+            between(new.lead_move_m_per_s2, old.lead_move_m_per_s2, rest))
 
 
 @compiled

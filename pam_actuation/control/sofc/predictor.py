@@ -72,13 +72,11 @@ def predict(par: np.record, inverse: FloatArray, rules: FloatArray, ring: Ring, 
     inertia = inertia_pa_s2_per_m(par, st)
     whole, rest = valve_lag.ticks_of(par, valve)
     for ago in range(whole, -1 if rest > 0.0 else 0, -1):
-        step = period
-        if ago == 0:
-            step = rest * period
-            p += step / (valve.lag_s + step) * (valve_lag.command_of(ring, tick, 1, 0.0) - p)
-        else:
-            p += step / (valve.lag_s + step) * (
-                valve_lag.command_of(ring, tick, ago, rest) - p)
+        # At last the rest of a tick, with the newest command.
+        step = period if ago > 0 else rest * period
+        command = (valve_lag.command_of(ring, tick, ago, rest) if ago > 0
+                   else valve_lag.command_of(ring, tick, 1, 0.0))
+        p += step / (valve.lag_s + step) * (command - p)
         go(par, st.predicted_path, rate * step)
         missing = (
             p - inverse_pressure_pa(inverse, x) - damping_pa_s_per_m(par, st, rate) * rate
