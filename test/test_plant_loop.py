@@ -164,6 +164,7 @@ def test_what_arrives_after_a_standstill_waits_for_the_rest():
     assert backlog.take(back + 19 * MS, ['d']) is None
     assert backlog.take(back + 20 * MS, ['e']) == ['b', 'c', 'd', 'e']
     assert backlog.take(back + 21 * MS, ['f']) == ['f']
+    assert backlog.take(START, ['g']) == ['g']          # a clock that was set back waits for none
 
 
 def test_a_wait_ends_where_the_clock_is_set_back():

@@ -136,7 +136,8 @@ def test_the_driver_takes_nothing_for_a_message_from_the_future(context):
         assert safety.pressure.received and safety.commands_received
 
     ticked(context, 'valve_driver', ('pressure', 'pressure_command'), look)
-    assert [problem for problem in problems if 'future' in problem] == []
+    # On a busy machine messages may come too late; nothing else may be wrong with them.
+    assert [problem for problem in problems if problem and 'ms old' not in problem] == []
 
 
 @pytest.mark.parametrize('name, topic', [
