@@ -56,8 +56,8 @@ def is_incomplete(weighted: Weighted, x: FloatArray) -> bool:
     """
     Tell whether a fitted model leaves more than noise in some signal.
 
-    An effect smaller than the noise shows by its memory: what is left then stays alike for many
-    samples, longer than the average of the measured pressure lets its noise last.
+    An effect smaller than the noise shows by its memory. What is left then stays alike for many
+    samples. Noise of the averaged pressure does not last that long.
     """
     return any(square > SEEN_FLOORS2 for _, _, square in weighted.mean_squares(x)) or any(
         memory > LASTING for memory in weighted.memories(x))
