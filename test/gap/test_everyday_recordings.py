@@ -55,12 +55,15 @@ def test_what_is_held_longer_than_a_period_is_repeated_and_scattered_stamps_leav
     assert openings(late, np.array([1.0, 1.0, 1.0, 0.0]), Pulses(0.010), grid)[:30].min() == 1.0
 
 
+@pytest.mark.parametrize('lag_s', [0.0, 0.007])
 @pytest.mark.parametrize('fidelity', ['averaged', 'switching'])
-def test_the_pressure_tells_whether_the_valves_switch(fidelity):
+def test_the_pressure_tells_whether_the_valves_switch(fidelity, lag_s):
     rig = load_rig(NOMINAL, valve='hsv')
+    late = [{'name': 'pressure_lag', 'parameters': {'time_constant_s': lag_s}}] if lag_s else []
     wave = 0.25 * np.cos(2.0 * np.pi * 0.3e-3 * np.arange(6000))
     duty = np.column_stack([np.clip(wave, 0.0, 1.0), np.clip(-1.1 * wave, 0.0, 1.0)])
-    run = recorded(rig.with_(fidelity=fidelity), np.repeat(duty[::10], 10, axis=0), 500)
+    run = recorded(rig.with_(fidelity=fidelity, effects=late), np.repeat(
+        duty[::10], 10, axis=0), 500)
     signal = run.topics['valve_signal']
     signal.stamp_ns = signal.stamp_ns[::5]
     signal.values = {name: values[::5] for name, values in signal.values.items()}
