@@ -51,6 +51,7 @@ from pam_actuation.report.gap import gap_of  # noqa: E402, I100
 from pam_sim import load_rig  # noqa: E402
 from pam_sim.effects.registry import effects  # noqa: E402
 from pam_sim.gap.data.signals import FIELD, UNIT  # noqa: E402
+from pam_sim.gap.verify.uncertainty import NORMAL_95, NUMERICS  # noqa: E402
 from pam_sim.identify import identify  # noqa: E402
 from pam_sim.run import Run, Series  # noqa: E402
 from pam_sim.tolerance import UNKNOWN  # noqa: E402
@@ -72,6 +73,8 @@ SENSORS = ('pressure_zero_pa', 'contraction_zero_m')
 HIDDEN = ('', 'hysteresis', '', 'creep', '', 'valve_dead_time', '', 'coulomb_friction', '',
           'viscous_damping')
 TOLERANCE = {'damping': (25.0, 0.02), 't_m': (0.06, 0.02), 'gain_map': (1.0, 0.02)}
+# The same of numbers that may be unknown, drawn where they are not.
+KNOWN = {'mass': (5.0, 0.02), 'k_m': (100e3, 0.02)}
 WITHOUT = (                 # what cannot be determined: unknown number, topics, protocol
     ('mass_kg', ('pressure', 'contraction', 'valve_signal'), 'low'),
     ('K_m', ('pressure', 'contraction', 'force'), 'steps'),
@@ -80,6 +83,7 @@ WITHOUT = (                 # what cannot be determined: unknown number, topics,
     ('T_m', ('pressure', 'contraction'), 'steps'))
 LOW = {'domain': 'pressure', 'segments': [
     {'step': {'to_pa': truth_rig.ATM + p, 'duration_s': 1.0}} for p in (30e3, 60e3, 90e3, 50e3)]}
+SET_BY_NUMERICS = 1.3        # times the least half width, up to which nothing else sets it
 TRUE_OF = {'T_m': 't_m', 'mass_kg': 'mass', 'K_m': 'k_m'}
 
 
@@ -88,16 +92,20 @@ def draw(seed, place):
     rng = np.random.default_rng([seed, place])
     names = rng.choice(list(NUMBERS), size=1 + place % 2, replace=False)
     true = {str(n): float(rng.uniform(*NUMBERS[n][1:])) for n in names}
-    numbers = {n: value * (1.0 + sd * float(np.clip(rng.standard_normal(), -2.0, 2.0)))
-               for n, (value, sd) in TOLERANCE.items()}
-    sensors = {}
+    numbers, sensors = off_within(rng, TOLERANCE), {}
     for name, value in true.items():
         (sensors if name in SENSORS else numbers)[NUMBERS[name][0]] = value
     effect = HIDDEN[place % len(HIDDEN)]
     if effect:
         numbers |= truth_effects.EFFECTS[effect].draw(
             rng, float(rng.uniform(0.4, 1.2)), 'ppr').numbers
-    return true, numbers, sensors, effect
+    return true, off_within(rng, KNOWN) | numbers, sensors, effect
+
+
+def off_within(rng, nominal):
+    """Return numbers off their value by a normal deviate of at most two deviations."""
+    return {n: value * (1.0 + sd * float(np.clip(rng.standard_normal(), -2.0, 2.0)))
+            for n, (value, sd) in nominal.items()}
 
 
 def record(numbers, experiment, rng, sensors=None, topics=('pressure', 'contraction', 'force',
@@ -206,7 +214,8 @@ def shares(rows):
             known = sum(r['status'] == 'determined' for r in chosen)
             lines.append(f'- {title}: {held} of {len(chosen)} intervals hold the true value '
                          f'({100.0 * held / len(chosen):.0f} %), {known} are determined')
-    lines += ['', '| number | unit | no effect | an effect |', '|---|---|---|---|']
+    lines += ['', *scatter(rows), '', '| number | unit | no effect | an effect |',
+              '|---|---|---|---|']
     for name in NUMBERS:
         halves = [[0.5 * (r['high'] - r['low']) for r in rows if r['number'] == name and (
             r['effect'] == 'none') is plain] for plain in (True, False)]
@@ -217,6 +226,27 @@ def shares(rows):
     lines.append(f'\nA case takes {np.median(seconds):.1f} s of processor (median), at most '
                  f'{max(seconds):.1f} s.')
     return '\n'.join(lines)
+
+
+def scatter(rows):
+    """Return a table of errors over the deviation that the interval stands for."""
+    def least(row):
+        return row['number'] not in SENSORS and (
+            row['high'] - row['low'] < 2.0 * SET_BY_NUMERICS * NUMERICS * abs(row['value']))
+
+    lines = ['| intervals | | deviation of the errors | within 68 % | within 95 % |',
+             '|---|---|---|---|---|']
+    for title, chosen in (('as wide as numerics make them', [r for r in rows if least(r)]),
+                          ('wider', [r for r in rows if not least(r)])):
+        if chosen:
+            z = np.array([
+                NORMAL_95 * (r['value'] - r['true']) / max(
+                    r['high'] - r['value'] if r['true'] > r['value'] else r['value'] - r['low'],
+                    1e-300) for r in chosen])
+            lines.append(f'| {title} | {z.size} | {np.sqrt(np.mean(z ** 2)):.2f} | '
+                         f'{100.0 * np.mean(np.abs(z) < 1.0):.0f} % | '
+                         f'{100.0 * np.mean(np.abs(z) < NORMAL_95):.0f} % |')
+    return lines
 
 
 def command_line():

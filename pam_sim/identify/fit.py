@@ -27,7 +27,7 @@ import math
 import numpy as np
 from pam_sim.annotations import BoolArray, FloatArray
 from pam_sim.errors import InputError
-from pam_sim.gap.data.noise import autocorrelation_time
+from pam_sim.gap.data.noise import autocorrelation_time, noise_of, SMALLEST
 from pam_sim.gap.data.split import FIT, SELECT
 from pam_sim.gap.fit.solver import is_refused, REFUSED, simulated_errors, tempering
 from pam_sim.gap.subsystems.problem import SubsystemProblem
@@ -86,6 +86,7 @@ class Weighted:
         self.prior = np.array([
             TIE_BREAKER / (high - low) if n.unknown else 1.0
             for n, (low, high) in zip(self.numbers, ends)])
+        self.own = [sensor_squares(p) for p in self.problems]
 
     def values(self, x: FloatArray) -> dict[str, float]:
         """Return the values of the numbers by name."""
@@ -203,19 +204,23 @@ class Weighted:
 
     def retemper(self, x: FloatArray) -> bool:
         """Set the weights after the errors; return whether they had settled."""
-        fresh = [self._tempering(p, self.errors(x, p)) for p in self.problems]
+        fresh = [self._tempering(p, self.errors(x, p), own)
+                 for p, own in zip(self.problems, self.own)]
         settled = all(bool(np.all(np.abs(new / old - 1.0) < SETTLED))
                       for new, old in zip(fresh, self.temper))
         self.temper = fresh
         return settled
 
-    def _tempering(self, problem: SubsystemProblem, errors: FloatArray) -> FloatArray:
+    def _tempering(self, problem: SubsystemProblem, errors: FloatArray, own: FloatArray
+                   ) -> FloatArray:
         found = tempering(problem, errors, (FIT, SELECT))
-        if self.incomplete:
-            for s in range(len(problem.signals)):
-                chosen = errors[(problem.signal == s) & used(problem)]
-                beyond = max(float(np.mean(chosen ** 2)) - 1.0, 0.0)
-                found[s] = max(found[s], beyond * chosen.size / FORMS)
+        for s in range(len(problem.signals)):
+            chosen = errors[(problem.signal == s) & used(problem)]
+            square = float(np.mean(chosen ** 2))
+            if self.incomplete:
+                found[s] = max(found[s], (square - 1.0) * chosen.size / FORMS)
+            elif square < 1.0:      # the floor is too careful; an effect may hide below it
+                found[s] *= max(square, own[s])
         return found
 
     def mean_squares(self, x: FloatArray) -> list[tuple[SubsystemProblem, str, float]]:
@@ -240,6 +245,16 @@ class Weighted:
     def misfit(self, x: FloatArray) -> float:
         """Return a measure that compares far starts: sum of the logarithms of the misfits."""
         return sum(math.log(square) for _, _, square in self.mean_squares(x))
+
+
+def sensor_squares(problem: SubsystemProblem) -> FloatArray:
+    """Return the squared noise of the sensor of every signal, in squared floors, at most 1."""
+    found = []
+    for s in problem.signals:
+        own = [noise_of(r.time_s[s], r.measured[s]).sd ** 2 for r in problem.recordings
+               if s in problem.outputs(r)]
+        found.append(min((float(np.mean(own)) + SMALLEST[s] ** 2) / problem.floor[s] ** 2, 1.0))
+    return np.array(found)
 
 
 def used(problem: SubsystemProblem) -> BoolArray:

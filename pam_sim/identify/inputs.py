@@ -13,13 +13,14 @@
 # limitations under the License.
 
 """
-What noise of the measured inputs does to the numbers.
+What noise does to the numbers beyond what the weights say.
 
-The measured pressure drives muscle and load. Its noise moves the simulated load for as long as
-the load swings, and most where the load moves: on the edges, which tell the numbers. Weights for
-the whole record take it for noise that is new in every sample. So the inputs are disturbed as
-their noise and stamps do, and the solution is followed: how far the numbers scatter is a doubt
-beside that of the outputs.
+Weights take what is left of a signal for noise that is as strong everywhere. The measured pressure
+drives muscle and load, though. Its noise moves the simulated load for as long as the load swings,
+and most where the load moves: on the edges, which tell the numbers. So the inputs are disturbed as
+their noise and stamps do, and the solution is followed. How far the numbers scatter, with the
+noise of the sensors, counts instead of what the weights say, where it is more. The weights hold
+the noise of the inputs already, as part of what is left: both together would count it twice.
 """
 
 import numpy as np
@@ -28,6 +29,40 @@ from pam_sim.identify.fit import Weighted
 from pam_sim.identify.secant import bounded_step
 
 DRAWS = 24
+INSIDE = 1e-6                # of the range of a number, from which on it is not at its end
+
+
+def noise_beyond(weighted: Weighted, x: FloatArray, count: int, slopes: FloatArray,
+                 covariance: FloatArray) -> FloatArray:
+    """
+    Return the covariance of the first numbers that noise adds to that of the weights.
+
+    In coordinates, positive semidefinite.
+
+    Parameters
+    ----------
+    weighted, x, count, slopes
+        As of ``scatter_by_inputs``.
+    covariance : numpy.ndarray, shape (K, K)
+        Of all numbers, by the weights and priors.
+
+    """
+    # Numbers at an end of their range, such as effects of no size, hardly move.
+    room = INSIDE * (weighted.high - weighted.low)
+    free = (x > weighted.low + room) & (x < weighted.high - room)
+    free[:count] = True
+    rows = slopes[:slopes.shape[0] - x.size, free]
+    follow = np.linalg.pinv(slopes[:, free].T @ slopes[:, free])[:count] @ rows.T
+    share = np.concatenate([(own / temper)[p.signal] for p, own, temper in zip(
+        weighted.problems, weighted.own, weighted.temper)])
+    beyond = scatter_by_inputs(weighted, x, count, slopes) + (
+        follow * (share - 1.0)) @ follow.T
+    # In units of what is known of the numbers, only what is more counts.
+    root = np.linalg.cholesky(covariance[:count, :count])
+    back = np.linalg.inv(root)
+    size, axes = np.linalg.eigh(back @ beyond @ back.T)
+    axes = root @ axes
+    return (axes * np.maximum(size, 0.0)) @ axes.T
 
 
 def scatter_by_inputs(weighted: Weighted, x: FloatArray, count: int, slopes: FloatArray,

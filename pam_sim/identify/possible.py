@@ -36,7 +36,7 @@ from pam_sim.effects.registry import effects
 from pam_sim.gap.subsystems.problem import RATE_HZ, SubsystemProblem
 from pam_sim.identify.fit import Weighted
 from pam_sim.identify.numbers import Number
-from pam_sim.identify.records import SHORT_S
+from pam_sim.identify.quiet import SHORT_S
 from pam_sim.identify.secant import solve_from
 from pam_sim.rig import Rig
 

@@ -190,7 +190,9 @@ def profile(weighted: Weighted, x: FloatArray, place: int, covariance: FloatArra
             shift = inner + float(np.clip(part, 0.1, 0.9)) * (outer[0] - inner)
             end, is_open = shift, False
         best = number.value(float(x[place]))
-        least_width = math.hypot(NUMERICS * best, number.resolution) / number.slope(best)
+        # Step and interpolation act on what scales a signal. A zero is only added to it.
+        numerics = 0.0 if number.zero_of else NUMERICS * best
+        least_width = math.hypot(numerics, number.resolution) / number.slope(best)
         ends.append(number.value(float(x[place] + sign * math.hypot(end, least_width))))
         opened.append(is_open)
     interval = Interval(ends[0], ends[1], opened[0], opened[1], tuple(

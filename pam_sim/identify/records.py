@@ -15,19 +15,18 @@
 """What a recording can tell: of the valve, of muscle and load, or of the muscle alone."""
 
 from collections.abc import Mapping, Sequence
-import copy
 from dataclasses import dataclass
 
 import numpy as np
-from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.gap.data.health import missed_pulses
-from pam_sim.gap.data.noise import Noise, noise_of, noise_sd, SMALLEST
+from pam_sim.gap.data.noise import noise_of
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.signals import VALVE_FIELDS
 from pam_sim.gap.subsystems.mechanics import MechanicsProblem
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.gap.subsystems.valve import ValveProblem
+from pam_sim.identify.quiet import drawn_pa, with_quiet_pressure
 from pam_sim.response import Response
 from pam_sim.rig import Rig
 from pam_sim.run import Run
@@ -35,7 +34,6 @@ from pam_sim.run import Run
 LEAST_SAMPLES = 20
 LEAST_DURATION_S = 1.0
 STILL_SHARE = 0.003          # of the stroke; a contraction that moves less is held by something
-SHORT_S, LONG_S = 0.05, 0.4  # windows of a pressure that moves, and of one that rests
 MOVING_PA = 20e3             # a pressure that moves more would move a free muscle
 
 
@@ -74,13 +72,13 @@ class LoadedMechanics(MechanicsProblem):
         self._raw = [one.recording for one in offers]
         self._raw_noise = [noise_of(raw.time_s['pressure'], raw.measured['pressure'])
                            for raw in self._raw]
-        super().__init__(rig, [with_quiet_pressure(one.recording) for one in offers],
-                         holds_certify=holds_certify)
+        super().__init__(rig, [with_quiet_pressure(*one) for one in zip(
+            self._raw, self._raw_noise)], holds_certify=holds_certify)
 
     def _disturb(self, random: np.random.Generator | None) -> None:
         super()._disturb(None)
         if random is not None:
-            self._noise_pa = [_drawn_pa(*one, random) for one in zip(
+            self._noise_pa = [drawn_pa(*one, random) for one in zip(
                 self._raw, self._raw_noise, self.recordings)]
 
     def _simulate(self, rig: Rig, index: int, numbers: Mapping[str, float]) -> Response:
@@ -144,43 +142,6 @@ def offer_of(run: Run, rig: Rig, added_kg: float = 0.0) -> Offer:
         if there]
     kind = ' and '.join(kinds) + (f'; the valve is left out: {missed}' if missed else '')
     return Offer(where, recording, valve, mechanics, kind, added_kg)
-
-
-def with_quiet_pressure(recording: Recording) -> Recording:
-    """
-    Return a recording whose measured pressure has less noise, for use as an input.
-
-    Noise of the input moves the simulated muscle, and how much depends on mass and damping: a
-    recording at rest would seem to tell them. Where the pressure rests it is averaged over a long
-    window, where it moves over a short one.
-    """
-    from scipy.ndimage import uniform_filter1d       # slow to import
-    from scipy.signal import savgol_filter
-    p = recording.measured['pressure']
-    period_s = float(np.median(np.diff(recording.time_s['pressure'])))
-    short, wide = (2 * int(0.5 * window / period_s) + 1 for window in (SHORT_S, LONG_S))
-    if p.size <= wide or short < 5:
-        return recording
-    quick = savgol_filter(p, short, 2)
-    slow = uniform_filter1d(p, wide, mode='nearest')
-    noise = max(noise_sd(p), SMALLEST['pressure'])
-    moves = uniform_filter1d(((quick - slow) / noise) ** 2, wide, mode='nearest')
-    share = np.exp(-moves)
-    calm = share * slow + (1.0 - share) * quick
-    if np.std(slow) < noise:            # at rest: all that is left is noise
-        calm = np.full(p.size, np.mean(p))
-    quiet = copy.copy(recording)
-    quiet.measured = {**recording.measured, 'pressure': calm}
-    return quiet
-
-
-def _drawn_pa(raw: Recording, noise: Noise, quiet: Recording, random: np.random.Generator
-              ) -> FloatArray:
-    """Return what noise like that of a pressure leaves of itself in the averaged one."""
-    noisy = copy.copy(raw)
-    noisy.measured = {**raw.measured, 'pressure': raw.measured['pressure'] + noise.draw(
-        raw.time_s['pressure'], random)}
-    return with_quiet_pressure(noisy).measured['pressure'] - quiet.measured['pressure']
 
 
 def _is_held(run: Run, rig: Rig) -> bool:

@@ -29,7 +29,7 @@ from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.gap.verify.uncertainty import NORMAL_95
 from pam_sim.identify.advice import next_experiment, where_open
 from pam_sim.identify.fit import fit, NOWHERE, Weighted
-from pam_sim.identify.inputs import scatter_by_inputs
+from pam_sim.identify.inputs import noise_beyond
 from pam_sim.identify.judgement import Combination, DETERMINED, judge
 from pam_sim.identify.numbers import (
     known_numbers_of, Number, unknown_numbers, with_values)
@@ -194,12 +194,12 @@ def _judged(weighted: Weighted, x: FloatArray, acting: Sequence[Number], forms: 
     """Return (solution, information, what is known of each first number, and of several)."""
     count = len(acting)
     x, covariance, slopes, intervals = _profiles(weighted, x, count, progress)
-    scatter = scatter_by_inputs(weighted, x, count, slopes)
-    doubts = np.sqrt(forms ** 2 + NORMAL_95 ** 2 * np.diag(scatter))
+    noise = noise_beyond(weighted, x, count, slopes, covariance)
+    doubts = np.sqrt(forms ** 2 + NORMAL_95 ** 2 * np.diag(noise))
     intervals = [one.wider(n, n.value(float(c)), float(f))
                  for one, n, c, f in zip(intervals, acting, x, doubts)]
     information = np.linalg.inv(
-        covariance[:count, :count] + scatter + np.diag((forms / NORMAL_95) ** 2))
+        covariance[:count, :count] + noise + np.diag((forms / NORMAL_95) ** 2))
     statuses, combinations = judge(acting, intervals, x[:count], information)
     found = [Found(n, n.value(float(c)), i, s)
              for n, c, i, s in zip(acting, x, intervals, statuses)]
