@@ -24,7 +24,8 @@ import math
 
 import numpy as np
 from pam_sim.annotations import FloatArray
-from pam_sim.gap.data.noise import noise_of, sensor_floor, STAMP_SD_S
+from pam_sim.gap.data.noise import (
+    autocorrelation_time, noise_of, sensor_floor, STAMP_SD_S)
 from pam_sim.gap.data.recording import Recording, START_S
 from pam_sim.gap.data.signals import UNIT
 from pam_sim.gap.data.split import CERTIFY, settling_s, split_of
@@ -197,17 +198,22 @@ class Validation:
         Return the signals of which the final model leaves more than the calibrated one.
 
         Beyond the error of the floor, by one deviation of the sensor, and by more than noise,
-        stamps and the start of this recording may raise the squared errors.
+        stamps and the start of this recording may raise the squared errors. Where both models
+        leave a gap, one is now the better, now the other: the mean rise has a doubt by that too.
         """
         found, criteria = [], self.estimator.criteria
         for s, gap in self.signals().items():
-            between = (self.after[s] - self.refit[s])[self.part[s]]
+            chosen, measured = self.part[s], self.recording.measured[s]
+            refit, after = ((r[s] - measured)[chosen] for r in (self.refit, self.after))
+            change, between = after ** 2 - refit ** 2, after - refit
+            by_place = float(np.std(change)) * math.sqrt(
+                autocorrelation_time(change) / change.size)
             by_draw = [2.0 * float(np.mean(d[s][self.part[s]] * between)) for d in self.drift]
             doubt = math.hypot(float(np.sqrt(np.mean(np.square(by_draw)))), 2.0 * self.noise[
                 s] * float(np.sqrt(np.mean(between ** 2))) / math.sqrt(between.size))
             rise = gap.rmse_after ** 2 - gap.rmse_refit ** 2
             if (gap.rmse_after > criteria.floor_error * self.highest_floor[s]
-                    and rise > max(criteria.certain_sd * doubt,
+                    and rise > max(criteria.certain_sd * doubt, criteria.hint_sd * by_place,
                                    (criteria.hint_sd * self.noise[s]) ** 2)):
                 found.append(s)
         return found
