@@ -68,14 +68,16 @@ def test_a_subsystem_without_a_gap_has_none():
     assert 'valve: no gap beyond noise' in result.text()
 
 
-def given(verdict, valve=QUIET, muscle=MUSCLE, effects=(), parameters=(), named=(), doubt=0.0):
+def given(verdict, valve=QUIET, muscle=MUSCLE, effects=(), parameters=(), named=(), doubt=0.0,
+          searched=0.0):
     """Return the verdicts by subsystem of such gaps and names."""
     result = GapResult(verdict, '', noise={'pressure': 300.0, 'contraction': 1e-5, 'force': 0.1},
                        effects=[{'name': name, 'subsystem': subsystem_of(name)}
                                 for name in effects], parameters=list(parameters))
     gaps = {'valve': {'pressure': valve}, 'muscle': muscle}
     runs = SimpleNamespace(gaps=gaps, spread=lambda: {
-        (s, signal): doubt for s, one in gaps.items() for signal in one})
+        (s, signal): doubt for s, one in gaps.items() for signal in one},
+        searched=lambda subsystem, signal: searched)
     return subsystem_verdicts(result, list(named), runs, CRITERIA, 1.0)
 
 
@@ -101,6 +103,9 @@ def test_what_is_left_is_unknown_only_beyond_the_doubt_about_numbers():
     certain = {'effects': ['creep'], 'verdict': 'effects'}
     assert given(valve=WIDE, **certain)['valve'].verdict == 'unknown'
     assert given(valve=WIDE, doubt=7e3, **certain)['valve'].verdict == 'no_gap'
+    assert given(valve=WIDE, doubt=7e3, searched=310.0, **certain)['valve'].verdict == 'no_gap'
+    # The numbers were free in the searched data: what stays there is not theirs.
+    assert given(valve=WIDE, doubt=7e3, searched=5e3, **certain)['valve'].verdict == 'unknown'
     assert given(valve=QUIET, **certain)['valve'].verdict == 'no_gap'
 
 

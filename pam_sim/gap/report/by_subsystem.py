@@ -66,12 +66,13 @@ def subsystem_verdicts(result: GapResult, named: list[NamedEffect], runs: OwnRun
         return found
     open_ones = [s for s, one in found.items() if one.verdict == 'no_gap']
     least = criteria.likely_sd * max(materiality, 1.0)
-    left = {s: _left(runs.gaps[s], result, criteria, {}) for s in open_ones}
+    left = {s: _left(runs.gaps[s], result, criteria) for s in open_ones}
     plain = left
     if any(value > least for value in left.values()):
         doubt = runs.spread()
         left = {s: _left(runs.gaps[s], result, criteria, {
-            signal: doubt[s, signal] for signal in runs.gaps[s]}) for s in open_ones}
+            signal: (doubt[s, signal], runs.searched(s, signal)) for signal in runs.gaps[s]})
+            for s in open_ones}
     unknown = {s for s, value in left.items() if value > least}
     if result.verdict == 'unknown':
         unknown |= {one.subsystem for one in result.noticed}
@@ -131,12 +132,18 @@ def _verdict(s: str, names: tuple[str, ...], result: GapResult, named: list[Name
 
 
 def _left(gaps: Mapping[str, SignalGap], result: GapResult, criteria: Criteria,
-          doubt: Mapping[str, float]) -> float:
-    """Return what is left beyond the floor and the doubt about numbers, in sensor deviations."""
+          numbers: Mapping[str, tuple[float, float]] | None = None) -> float:
+    """
+    Return what is left beyond the floor and the doubt about numbers, in sensor deviations.
+
+    ``numbers``: by signal, how far the model may be off by its numbers, and what it leaves in the
+    data they were fitted to. There the numbers were free, so it is not theirs.
+    """
     found = 0.0
     for signal, gap in gaps.items():
-        floor = math.hypot(criteria.floor_error * gap.noise_floor,
-                           NORMAL_95 * doubt.get(signal, 0.0))
-        beyond = math.sqrt(max(gap.rmse_after ** 2 - floor ** 2, 0.0))
-        found = max(found, beyond / max(result.noise.get(signal, 0.0), 1e-12))
+        floor = criteria.floor_error * gap.noise_floor
+        doubt, searched = (numbers or {}).get(signal, (0.0, 0.0))
+        beyond = max(gap.rmse_after ** 2 - floor ** 2 - (NORMAL_95 * doubt) ** 2,
+                     min(gap.rmse_after, searched) ** 2 - floor ** 2, 0.0)
+        found = max(found, math.sqrt(beyond) / max(result.noise.get(signal, 0.0), 1e-12))
     return found

@@ -84,6 +84,14 @@ class OwnRuns:
         """Return the rms by which the final model may be off by its numbers alone."""
         return spread_of_runs(self._estimator.spread(self._final), self._errors, self._after)
 
+    def searched(self, subsystem: str, signal: str) -> float:
+        """Return the rms [SI] that the final model leaves of a signal in the searched data."""
+        p = next(p for p in self._estimator.problems if p.subsystem == subsystem)
+        if signal not in p.signals:
+            return 0.0
+        chosen = np.isin(p.part, self._estimator.use) & (p.signal == p.signals.index(signal))
+        return _rms(self._final.errors[subsystem][chosen]) * p.floor[signal]
+
     def residual(self, subsystem: str, signal: str) -> tuple[FloatArray, FloatArray]:
         """Return (instants [s], errors of the calibrated model, SI) on the certify data."""
         p = next(p for p in self._problems if p.subsystem == subsystem)
