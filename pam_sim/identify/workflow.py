@@ -161,6 +161,7 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
         _signals(before, _rms(squares)), incomplete, bent=bent)
     result.remarks += remarks + ([] if force_compared else _of_one_scale(acting))
     result.remarks += _starting_values(left, [name for name in starting if name not in at_rest])
+    result.remarks += _of_another_law(rig, left)
     result.remarks += [f'{name}: from the holds, where the regulator has settled; no effect of '
                        'the library explains its edges' for name in at_rest]
     result.remarks += [
@@ -257,6 +258,15 @@ def _starting_values(left: Squares, names: Sequence[str]) -> list[str]:
                          for _, name, square in left)
     return [f'{", ".join(names)}: a starting value. No effect of the library explains what is '
             f'left of {rests}, and it may act alike; the interval allows for that']
+
+
+def _of_another_law(rig: Rig, left: Squares) -> list[str]:
+    """Return a sentence where the muscle leaves a clear gap and its force law is stated."""
+    clear = any(p.subsystem == 'muscle' and square > CRITERIA.clear_rest for p, _, square in left)
+    if not clear or any(name.startswith('law.') for name in rig.unknown):
+        return []
+    return ['muscle and load leave a clear gap with the stated force law. If it was measured on '
+            'another muscle, state it as unknown: pam rig new --unknown law']
 
 
 def _what_shows(number: Number) -> str:

@@ -15,12 +15,13 @@
 """Unknown coefficients of the force law, from recordings of a muscle whose law is another one."""
 
 import math
+from types import SimpleNamespace
 
 from made_records import inside, record, RIG
 import numpy as np
 from pam_sim import load_rig
 from pam_sim.errors import InputError
-from pam_sim.identify import identify
+from pam_sim.identify import identify, workflow
 from pam_sim.identify.before_gap import numbers_first
 from pam_sim.identify.numbers import unknown_numbers
 from pam_sim.identify.possible import possible_effects
@@ -73,6 +74,15 @@ def test_law_and_mass_without_a_force_are_said_to_grow_together():
     run = record(RIG, gauge_pa=(50e3, 400e3, 100e3), hold_s=0.6, keep=('pressure', 'contraction'))
     found = identify(run, RIG, ['law.a5_n_per_pa', 'mass_kg'], advise=False)
     assert any('State the mass' in remark for remark in found.remarks)
+
+
+def test_a_clear_gap_of_the_muscle_asks_about_a_stated_law():
+    muscle, valve = SimpleNamespace(subsystem='muscle'), SimpleNamespace(subsystem='valve')
+    asked = workflow._of_another_law(RIG, [(muscle, 'contraction', 400.0)])
+    assert len(asked) == 1 and '--unknown law' in asked[0]
+    for rig, problem, square in ((RIG, muscle, 2.0), (RIG, valve, 400.0), (
+            RIG.with_(tolerance={'law.a3': math.inf}), muscle, 400.0)):
+        assert workflow._of_another_law(rig, [(problem, 'contraction', square)]) == []
 
 
 def test_a_static_map_is_no_possible_effect_beside_an_unknown_law():
