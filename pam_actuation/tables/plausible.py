@@ -37,6 +37,9 @@ STAND_INS = {-9999.0, -999.0, -99.0, -99999.0, 9999.0, 99999.0, 999999.0, -32768
 HUGE = 1e30
 LEAST_MOVE = {PRESSURE: 200.0, LENGTH: 5e-5, FORCE: 0.2}       # below: another unit is likely
 NEAR_ATMOSPHERE_PA = 5e3
+EMPTY_PA = 10e3                      # gauge, below which no muscle holds a load up
+FEWEST_EMPTY = 3                     # values there
+KEPT_SHARE = 0.03                    # of the length: more than friction and creep keep
 
 
 @dataclass(frozen=True)
@@ -75,8 +78,8 @@ def doubts(values: Mapping[str, FloatArray], mapped: Mapping[str, ColumnMap],
                                'left out'))
         found += [Doubt(f'{said}: {one.sentence}', one.is_wrong)
                   for one in _of_values(signal, mapped[name], finite, length_m)]
-    held = _held(values, mapped, length_m)
-    return [*found, held] if held is not None else found
+    both = (_held(values, mapped, length_m), _zero(values, mapped, length_m))
+    return [*found, *(one for one in both if one is not None)]
 
 
 def _held(values: Mapping[str, FloatArray], mapped: Mapping[str, ColumnMap], length_m: float
@@ -96,6 +99,24 @@ def _held(values: Mapping[str, FloatArray], mapped: Mapping[str, ColumnMap], len
         'the unit right, or is the muscle held?')
 
 
+def _zero(values: Mapping[str, FloatArray], mapped: Mapping[str, ColumnMap], length_m: float
+          ) -> Doubt | None:
+    """Return a doubt on a contraction that an empty muscle keeps, None without."""
+    if not {'pressure', 'contraction'} <= {*values}:
+        return None
+    pressure_pa, contraction_m = values['pressure'], values['contraction']
+    empty = contraction_m[(pressure_pa < P_ATM_PA + EMPTY_PA) & np.isfinite(contraction_m)]
+    if len(empty) < FEWEST_EMPTY:
+        return None
+    at_rest_m, one = float(np.median(empty)), mapped['contraction']
+    if at_rest_m < KEPT_SHARE * length_m:
+        return None
+    zero = replace(one, zero=float(f'{float(_raw(one, np.array([at_rest_m]))[0]):.4g}'))
+    return Doubt(
+        f'contraction (column "{one.column}" in {one.unit.name}): it is {1e3 * at_rest_m:.3g} mm '
+        f'while the muscle is empty; is the zero off? Then write {zero.option("contraction")}')
+
+
 def _of_values(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: float
                ) -> list[Doubt]:
     apart = _apart(mapped, finite)
@@ -113,6 +134,8 @@ def _of_values(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: 
             return [Doubt(f'{_shown(signal, low)} to {_shown(signal, high)}, which no muscle '
                           f'shortens by; {turned}', True)]
     found = [Doubt(one.sentence.partition(': ')[2].rstrip('.')) for one in wrong]
+    if signal.quantity == LENGTH and mapped.unit.factor != 1.0:     # so it is no share
+        found = [Doubt(one.sentence.partition(' A share of')[0]) for one in found]
     if low == high:
         return [*found, Doubt(f'the value never changes ({_shown(signal, low)}): is the sensor '
                               'connected?')]

@@ -91,7 +91,8 @@ SIGNALS = (
            'duty of the vent valve'),
     Signal('ppr_voltage', 'valve_signal', 'ppr_voltage', VOLTAGE,
            r'u|u ?(ppr|valve|cmd|command|ctrl|control|soll)|v|v ?(ppr|valve|cmd|command|out)|'
-           r'(ppr|valve|regulator|command|control|analog out) ?(voltage|volt|v|signal|u)|'
+           r'(ppr|(prop(ortional)? )?(valve|regulator)|command|control|analog out|dac|'
+           r'ao) ?(voltage|volt|v|signal|u|cmd|command|set ?point|input)|'
            r'voltage ?(ppr|valve|cmd|command|out)?|spannung', 'voltage to the regulator'),
 )
 BY_NAME = {signal.name: signal for signal in SIGNALS}
@@ -102,7 +103,10 @@ TIME_WORDS = (r't|time|t ?(nominal|rel|s)|time ?stamp|stamp|zeit|elapsed( time)?
 def signal_of(name: str, where: str) -> Signal:
     """Return a signal by its name; InputError names those there are."""
     if name not in BY_NAME:
+        of_topic = [one.name for one in SIGNALS if one.topic == name]
+        hint = (f' but a topic: {" or ".join(of_topic)}' if of_topic
+                else did_you_mean(name, BY_NAME))
         raise InputError(
-            f'{name!r} is no signal of a rig{did_you_mean(name, BY_NAME)}; allowed: '
+            f'{name!r} is no signal of a rig{hint}; allowed: '
             f'{", ".join(BY_NAME)}', where)
     return BY_NAME[name]

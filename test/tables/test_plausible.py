@@ -1,0 +1,51 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A file as a lab keeps it: what its columns are, and a zero of the encoder that is not set."""
+
+import numpy as np
+from pam_actuation.tables.mapping import column_of_text
+from pam_actuation.tables.plausible import doubts
+from pam_actuation.tables.signals import signal_of, SIGNALS
+from pam_actuation.tables.words import words_of
+from pam_sim.errors import InputError
+from pam_sim.units import P_ATM_PA
+import pytest
+
+PRESSURE_PA = P_ATM_PA + np.repeat([2e3, 3e5, 4e5], 20)
+SHORTENED_M = np.repeat([0.0, 0.03, 0.04], 20)
+
+
+@pytest.mark.parametrize('column', [
+    'valve cmd [V]', 'regulator_set_point_V', 'U_valve (V)', 'prop valve input [V]', 'dac_cmd_V'])
+def test_a_voltage_to_the_regulator_in_many_words(column):
+    assert next(one.name for one in SIGNALS if one.is_named(words_of(column))) == 'ppr_voltage'
+
+
+@pytest.mark.parametrize('text, shortening', [
+    ('pos:mm', 1.0), ('length:mm:zero=250:gain=-1', -1.0)])
+def test_a_zero_that_is_off_shows_while_the_muscle_is_empty(text, shortening):
+    column = column_of_text('contraction', text, 'here')
+    mapped = {'contraction': column, 'pressure': column_of_text('pressure', 'p:bar_abs', 'here')}
+    for at_rest_m in (0.0, 0.004, 0.0314):
+        said = ' '.join(one.sentence for one in doubts(
+            {'pressure': PRESSURE_PA, 'contraction': SHORTENED_M + at_rest_m}, mapped, 0.3))
+        off = at_rest_m > 0.03
+        assert ('31.4 mm while the muscle is empty' in said) == off
+        assert (f'zero={column.zero + shortening * 31.4:.4g}' in said) == off
+
+
+def test_the_name_of_a_topic_leads_to_its_signals():
+    with pytest.raises(InputError, match='a topic: fill_duty or vent_duty or ppr_voltage; allow'):
+        signal_of('valve_signal', '--map')
