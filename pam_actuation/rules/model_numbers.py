@@ -48,8 +48,11 @@ def numbers_in_words(rules: 'RuleBase') -> str:
     span_m, rate_m_per_s, acceleration_m_per_s2 = SCALES
     names = ['offset', f'per {span_m * 1e3:g} mm of contraction',
              *(f'after a path of {width_m * 1e3:.2g} mm' for width_m in widths_m)]
-    places = list(range(len(names))) + [len(rules.numbers) - 2, len(rules.numbers) - 1]
+    last = len(rules.numbers) - 1
+    places = [*range(len(names)), last - 2, last - 1]
     names += [f'per {rate_m_per_s * 1e3:g} mm/s', f'per {acceleration_m_per_s2:g} m/s^2']
+    if rules.covariance[last, last] > 0.0 and rules.numbers[last] != 0.0:
+        places, names = [*places, last], [*names, f'creep after {span_m * 1e3:g} mm']
     said = [f'{name} {1e-3 * rules.numbers[k]:+.2f} ± '
             f'{1e-3 * math.sqrt(max(rules.covariance[k, k], 0.0)):.2f}'
             for name, k in zip(names, places)]

@@ -96,6 +96,22 @@ def test_what_the_integral_only_undoes_stands_back_with_the_rules(inverse):
         stepped(100, 0.010, 1e-4)
 
 
+def test_a_move_made_of_a_jump_forgets_the_disturbance_of_the_rest_before_it(inverse):
+    left = []
+    for forgetting in (0.0, 1.0):
+        controller = SelfOrganizingFuzzyController(
+            inverse, {'jump_disturbance': 0.0, 'disturbance_time_s': 0.1, 'jump_time_s': MOVE_S,
+                      'jump_forgetting': forgetting, 'valve_gap_pa': 1e6}, rig_name='a/ppr')
+        state = fields(controller._state, STATE)
+        for tick in range(20 + int(MOVE_S * 200)):
+            wanted_m = 0.010 if tick < 20 else 0.014
+            controller.step(0.010, wanted_m, 0.0, wanted_m, 0.0, False, pressure_pa=2e5)
+            left.append(float(state.model.disturbance_pa))
+    still, forgotten = np.reshape(left, (2, -1))
+    assert still[-1] == still[19] != 0.0
+    assert forgotten[-1] == pytest.approx(np.exp(-1.0) * forgotten[19], rel=0.02)
+
+
 @pytest.mark.parametrize('announced, rules_pa, held', [(0, 8e3, 0.0), (1, 0.0, 0.8)])
 def test_what_acts_after_an_announced_jump_and_after_another(inverse, announced, rules_pa, held):
     controller = SelfOrganizingFuzzyController(

@@ -219,6 +219,30 @@ def test_the_damping_found_grows_no_further_beyond_its_rate(inverse):
         assert st.now[muscle_model._RATE] == pytest.approx(-0.02 / 0.05 * shares[1])
 
 
+@pytest.mark.parametrize('time_s, expected_pa, found_pa', [
+    (1.0, 2e4, 3000.0), (1.0, 0.0, 0.0), (0.0, 2e4, 0.0)])
+def test_creep_is_told_apart_and_begins_anew_after_a_move(inverse, time_s, expected_pa, found_pa):
+    controller = controller_with(
+        inverse, path_learning=0.0, model_noise_pa=5e3, creep_time_s=time_s, creep_pa=expected_pa)
+    par, st = fields(controller.parameters, PARAMETERS), fields(zeros(MODEL), MODEL)
+    x, slow = slow_motion(40.0), 0.014
+    st.slow_m = slow
+    for one in x:
+        slow += PERIOD_S / (1.0 + PERIOD_S) * (one - slow)
+        muscle_model.observe(par, inverse, controller.rules.path, st, one, inverse_pressure_pa(
+            inverse, one) + 3e3 * (one - slow) / 0.01)
+        muscle_model.find_numbers(par, st, False)
+    creep_pa = float(st.number_pa[muscle_model._CREEP])
+    assert creep_pa == pytest.approx(found_pa, rel=0.15)
+    before = muscle_model.numbers_pa(par, st, st.path, 0.02)
+    for tick in range(400):      # two seconds at rest, the first without the sensor of pressure
+        pressure_pa = math.nan if tick < 200 else inverse_pressure_pa(inverse, x[-1])
+        muscle_model.observe(par, inverse, controller.rules.path, st, x[-1], pressure_pa)
+    slower = x[-1] + (slow - x[-1]) * math.exp(-2.0)
+    assert muscle_model.numbers_pa(par, st, st.path, 0.02) - before == pytest.approx(
+        creep_pa * (slow - slower) / 0.01, abs=60.0)
+
+
 @pytest.mark.parametrize('valve', ['ppr', 'hsv'])
 def test_a_motion_nobody_announced_is_followed_from_the_first_seconds(valve):
     nominal = load_rig('dmsp_5_300_realistic', valve=valve)
@@ -272,12 +296,24 @@ def test_a_file_without_numbers_leaves_those_and_a_wrong_one_is_refused():
     for changed, said in (
             ({'covariance': None}, 'numbers and covariance, or neither'),
             ({'numbers': [1.0]}, r'numbers has shape \[1\]'),
-            ({'numbers': [2e6] + [0.0] * 8}, 'allowed is'),
-            ({'covariance': (np.ones((9, 9)) - np.eye(9)).tolist()}, 'covariance is none')):
+            ({'numbers': [2e6] + [0.0] * 9}, 'allowed is'),
+            ({'covariance': (np.ones((10, 10)) - np.eye(10)).tolist()}, 'covariance is none')):
         wrong = {name: value for name, value in {**mapping, **changed}.items()
                  if value is not None and name != 'sha256'}
         with pytest.raises(InputError, match=said):
             rules_from_mapping({**wrong, 'sha256': digest_of(wrong)}, 'rules.json')
+
+
+def test_a_file_from_before_the_creep_has_none_of_it():
+    controller = load_controller('sofc_model_ppr', load_rig('dmsp_5_300_realistic'))
+    controller.rules.numbers[0], controller.rules.covariance[0, 0] = 3e3, 1e4
+    mapping = rules_to_mapping(controller.rules)
+    former = {**mapping, 'numbers': mapping['numbers'][:-1],
+              'covariance': [row[:-1] for row in mapping['covariance'][:-1]]}
+    del former['sha256']
+    read = rules_from_mapping({**former, 'sha256': digest_of(former)}, 'rules.json')
+    assert np.array_equal(read.numbers, controller.rules.numbers)
+    assert np.array_equal(read.covariance, controller.rules.covariance)
 
 
 @pytest.mark.parametrize('off_pa', [60e3, math.nan])

@@ -23,8 +23,9 @@ measured differs by friction, creep, load and errors of the force map::
 Contraction and pressure pass the same two low passes, so that they belong to the same moment.
 The residual has neither dead time nor lag of the valve in it, and needs no reference.
 
-A few *numbers* hold everywhere: offset, slope, friction for every set of the path, damping and
-inertia. Recursive least squares find them within seconds. *Path rules* learn the rest as a
+A few *numbers* hold everywhere: offset, slope, friction for every set of the path, damping,
+inertia and creep. Recursive least squares find them within seconds. The creep is that of one
+element of Maxwell: a spring that gives way with ``creep_time_s``. *Path rules* learn the rest as a
 function of contraction and of the path before. This is direct inverse learning (Jordan and
 Rumelhart 1992). The degrees of the path are those of play operators of several widths, so the
 rules are the inverse of a Prandtl-Ishlinskii operator whose weights depend on the contraction.
@@ -48,9 +49,9 @@ _MOVES_M_PER_S = 2e-3     # from this rate on a residual counts in full: at rest
 _FADE = 0.99              # per tick, of a disturbance that is not observed any more
 
 # Numbers of the model that hold everywhere: offset, slope, the sets of the path beyond that of
-# any path, damping, inertia.
-_RATE, _ACCELERATION = 1 + MOST_SETS, 2 + MOST_SETS
-# What a number of the model is per: contraction, rate, acceleration.
+# any path, damping, inertia, creep. A file from before the creep lacks the last.
+_RATE, _ACCELERATION, _CREEP = 1 + MOST_SETS, 2 + MOST_SETS, 3 + MOST_SETS
+# What a number of the model is per: contraction, also of the creep, rate, acceleration.
 SCALES = _SPAN_M, _RATE_M_PER_S, _ACCELERATION_M_PER_S2 = 0.01, 0.05, 0.5
 _UNKNOWN_PA = 2e4         # standard deviation of each before the first measurement
 
@@ -71,6 +72,7 @@ MODEL = record(
     ('path', MOST_SETS),              # degrees of the measured path
     ('lead_path', MOST_SETS),         # the same of the reference one preview ahead
     ('predicted_path', MOST_SETS),
+    'slow_m',                         # contraction behind the time of the creep
     'innovation_pa',                  # residual less the path rules
     'disturbance_pa',
     'held',                           # part of its change that is held back, 0 = none
@@ -116,15 +118,42 @@ def rules_pa(par: np.record, rules: FloatArray, path: FloatArray, contraction_m:
 
 
 @compiled
+def _crept(par: np.record, st: np.record, contraction_m: float) -> float:
+    """Return how far a contraction is from where the creep has come to, in units of its number."""
+    if not par.creep_time_s > 0.0:
+        return 0.0
+    return (contraction_m - st.slow_m) / _SPAN_M
+
+
+@compiled
+def _creep(par: np.record, st: np.record, contraction_m: float) -> None:
+    """Let the creep go on for a period."""
+    if par.creep_time_s > 0.0:
+        st.slow_m = _low_pass(
+            st.slow_m, contraction_m, par.period_s / (par.creep_time_s + par.period_s))
+
+
+@compiled
+def forget(par: np.record, st: np.record) -> None:
+    """
+    Forget a part of the disturbance in a tick of a move made of a jump.
+
+    After a long rest it is creep for the most part, and the move begins that anew.
+    """
+    part = min(par.jump_forgetting * par.period_s / par.jump_time_s, 1.0)
+    st.disturbance_pa -= part * st.disturbance_pa
+
+
+@compiled
 def numbers_pa(par: np.record, st: np.record, path: FloatArray, contraction_m: float) -> float:
-    """Return what offset, slope and path of the model add at a contraction [Pa]."""
+    """Return what offset, slope, path and creep of the model add at a contraction [Pa]."""
     if not par.model_noise_pa > 0.0:
         return 0.0
     middle = 0.5 * (par.reference_lower_m + par.reference_upper_m)
     total: float = st.number_pa[0] + st.number_pa[1] * (contraction_m - middle) / _SPAN_M
     for q in range(1, int(par.path_sets)):
         total += st.number_pa[1 + q] * path[q]
-    return total
+    return total + st.number_pa[_CREEP] * _crept(par, st, contraction_m)
 
 
 @compiled
@@ -170,6 +199,7 @@ def find_numbers(par: np.record, st: np.record, surprised: bool) -> None:
         now[1 + q] = st.path[q] if q < par.path_sets else 0.0
     now[_RATE] = st.rate_m_per_s * _saturation(par, st.rate_m_per_s) / _RATE_M_PER_S
     now[_ACCELERATION] = st.acceleration_m_per_s2 / _ACCELERATION_M_PER_S2
+    now[_CREEP] = _crept(par, st, st.contraction_m)
     if par.number_filter_s > 0.0:
         part = par.period_s / (par.number_filter_s + par.period_s)
         for i in range(NUMBERS):
@@ -179,7 +209,6 @@ def find_numbers(par: np.record, st: np.record, surprised: bool) -> None:
         for i in range(NUMBERS):
             phi[i] = now[i]
         st.unexplained_pa = st.innovation_pa
-    first = _UNKNOWN_PA * _UNKNOWN_PA
     drift = par.model_drift_pa * par.model_drift_pa * par.period_s
     if surprised:
         for i in range(2):
@@ -188,6 +217,8 @@ def find_numbers(par: np.record, st: np.record, surprised: bool) -> None:
                 cov[j * NUMBERS + i] = 0.0
     for i in range(NUMBERS):
         at = i * NUMBERS + i
+        unknown = par.creep_pa if i == _CREEP else _UNKNOWN_PA
+        first = unknown * unknown
         if cov[at] == 0.0:
             cov[at] = first
         elif cov[at] < first:
@@ -235,6 +266,7 @@ def observe(par: np.record, inverse: FloatArray, rules: FloatArray, st: np.recor
     if not math.isfinite(pressure_pa):
         st.known = 0.0
         st.innovation_pa = 0.0
+        _creep(par, st, contraction_m)
         st.disturbance_pa *= _FADE
         return
     if st.known < 0.5:
@@ -250,6 +282,7 @@ def observe(par: np.record, inverse: FloatArray, rules: FloatArray, st: np.recor
     st.contraction_once_m, st.contraction_m = once_m, x
     st.pressure_once_pa, st.pressure_pa = once_pa, p
     st.rate_m_per_s, st.acceleration_m_per_s2 = rate, acceleration
+    _creep(par, st, x)
     go(par, st.path, x - former_m)
     innovation = (
         p - inverse_pressure_pa(inverse, x) - damping_pa_s_per_m(par, st, rate) * rate

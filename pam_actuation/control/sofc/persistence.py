@@ -208,6 +208,8 @@ def _checked_numbers(mapping: dict[str, Any], where: str) -> dict[str, FloatArra
             found[name] = np.array(mapping[name], dtype=float)
         except (TypeError, ValueError):
             raise InputError(f'{name} is not a table of numbers', where) from None
+        if found[name].shape == tuple(length - 1 for length in shape):
+            found[name] = np.pad(found[name], (0, 1))     # from before the creep was a number
         if found[name].shape != shape or not np.all(np.isfinite(found[name])):
             raise InputError(
                 f'{name} has shape {list(found[name].shape)} or values that are not finite; it '

@@ -35,7 +35,7 @@ OPTIONAL = ('path',)      # tables that may be empty; files then lack them
 SUFFIXES = ('', '_initial', '_fired')
 ARRAYS = tuple(name + suffix for suffix in SUFFIXES for name in NAMES)
 MOST_SETS = 6             # of the path, that of any path included
-NUMBERS = 3 + MOST_SETS   # of a model of the muscle: those of every place and motion
+NUMBERS = 4 + MOST_SETS   # of a model of the muscle: those of every place and motion
 MODEL_NUMBERS = ('numbers', 'covariance')     # and how well they are known
 
 

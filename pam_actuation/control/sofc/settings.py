@@ -137,6 +137,8 @@ SETTINGS = (
             'share of feed-forward and motion rules that acts and learns for that long'),
     setting('jump_disturbance', '-', 1.0, 0.0, 1.0,
             'share with which the disturbance follows its residual while such a move lasts'),
+    setting('jump_forgetting', '-', 0.0, 0.0, 10.0,
+            'such a move leaves exp(-this) of the disturbance of the rest before it'),
     setting('jump_announced', '-', 1.0, 0.0, 1.0,
             'whether both hold after an announced jump too: 0 no, 1 yes'),
     setting('path_sets', '-', 0.0, 0.0, float(MOST_SETS),
@@ -157,6 +159,11 @@ SETTINGS = (
             'rate at which half of the damping found is left, as friction grows no further; '
             '0 = it grows with the rate'),
     setting('model_drift_pa', 'Pa', 500.0, 0.0, 1e6, 'change of each such number in a second'),
+    setting('creep_time_s', 's', 0.0, 0.0, 100.0,
+            'time constant of the creep whose pressure is a number of the model; 0 = none'),
+    setting('creep_pa', 'Pa', 2e4, 0.0, 1e6,
+            'how large the creep after a way of 10 mm is expected to be: its standard deviation '
+            'before anything is measured'),
     setting('model_filter_s', 's', 0.015, 0.0, 0.5,
             'both low passes on contraction and pressure for the residual'),
     setting('number_filter_s', 's', 0.0, 0.0, 0.5,

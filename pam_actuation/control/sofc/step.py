@@ -65,6 +65,7 @@ def _start(par: np.record, inverse: FloatArray, values: Tables, kept: Tables, st
     st.contraction_m = x
     st.reference_m = inp.reference_m
     st.lead_reference_m = inp.lead_reference_m
+    st.model.slow_m = x
     guard.keep(values, kept)
     pressure = inp.pressure_pa
     st.command_pa = first_command_pa(
@@ -277,6 +278,8 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
         predictor.engage(par, model, error, st.announced)
         surprising_move = st.move.left_s > 0.0 and st.surprising > 0.5
         model.held = 1.0 - par.jump_disturbance if surprising_move else 0.0
+        if surprising_move:
+            muscle_model.forget(par, model)
         muscle_model.observe(par, inverse, path_rules, model, inp.contraction_m, measured)
         muscle_model.go(par, model.lead_path, way)
         path = (muscle_model.rules_pa(par, path_rules, model.lead_path, lead)
