@@ -125,6 +125,8 @@ def loop_table(rig, first, second, found=None):
             rows[name].append(both(sizes))
     labels = {}
     pressures = [one.measured['pressure'][::READING] for one in recordings]
+    rows['the fitted cycle itself, read at the same pressure'] = [
+        [read_from(pressures[k], targets[k], asked) for asked in pressures] for k in (0, 1)]
     # One series of both cycles: the part that is fitted is one of them.
     u, y = np.concatenate(pressures), np.concatenate(targets)
     ends = np.cumsum([0, *map(len, targets)])
@@ -143,6 +145,16 @@ def loop_table(rig, first, second, found=None):
             (one, 0), (one, 1), (other, 1), (other, 0))]
         print(f'| {name} | ' + ' | '.join(f'{cell:.3f}' for cell in cells) + ' |')
     print_labels(labels)
+
+
+def read_from(pressure, contraction, asked):
+    """Return the contraction of a cycle at other pressures, rising and falling ones apart."""
+    found, top, asked_top = np.empty(asked.size), int(np.argmax(pressure)), int(np.argmax(asked))
+    for here, there in ((slice(None, top), slice(None, asked_top)),
+                        (slice(top, None), slice(asked_top, None))):
+        order = np.argsort(pressure[here])
+        found[there] = np.interp(asked[there], pressure[here][order], contraction[here][order])
+    return found
 
 
 def chain_table(rig, volts, gauge_pa, contraction_m):
