@@ -204,6 +204,19 @@ def test_mean_of_a_held_signal_is_exact_between_grid_points():
     assert mean == pytest.approx([2.0, 3.0, 4.0])
     mean = held_mean(np.array([0.25]), np.array([2.0]), grid, before=0.0)
     assert mean == pytest.approx([1.5, 2.0, 2.0])
+    # Many changes in one step, and none in some.
+    time_s, value = np.array([0.1, 0.5, 2.0, 2.9]), np.array([1.0, 3.0, 0.0, 10.0])
+    assert held_mean(time_s, value, grid) == pytest.approx([2.0, 3.0, 1.0])
+
+
+@pytest.mark.parametrize('late_s', [0.0, 3.7e-4])
+def test_a_held_duty_keeps_its_last_bit(late_s):
+    """At 0.8 a valve with a closing time of 2 ms stays open, below it shuts between pulses."""
+    duty = np.where(np.arange(200) % 20 < 15, 0.8, 0.3)
+    mean = held_mean(1e-2 * np.arange(200) + late_s, duty, 1e-3 * np.arange(2001))
+    mixed = mean[(mean != 0.8) & (mean != 0.3)]
+    assert mixed.size == (0 if late_s == 0.0 else 19)
+    assert ((mixed > 0.3) & (mixed < 0.8)).all()
 
 
 def test_parts_cover_everything_once_the_start_has_settled():

@@ -30,6 +30,7 @@ from pam_sim.run import Run, Series
 from pam_sim.units import P_ATM_PA
 
 GRID_S = 0.001
+STAMP_S = 1e-9               # stamps count nanoseconds
 START_S = 0.05               # the state at the start is read from this stretch
 SMOOTH_STEPS = 21            # of a measured signal whose rate is needed
 START_SAMPLES = 3            # or from so many samples of a slow log
@@ -265,14 +266,28 @@ def held_mean(time_s: FloatArray, value: FloatArray, grid_s: FloatArray,
     numpy.ndarray, shape (N,)
 
     """
-    first = value[0] if before is None else before
-    start = min(float(grid_s[0]), float(time_s[0])) - 1.0
-    end = max(float(grid_s[-1]), float(time_s[-1])) + 1.0
-    knots = np.concatenate(([start], time_s, [end]))
-    held = np.concatenate(([first], value))
-    # The integral of a held signal is piecewise linear, so its means are exact.
-    integral = np.concatenate(([0.0], np.cumsum(held * np.diff(knots))))
-    return np.diff(np.interp(grid_s, knots, integral)) / np.diff(grid_s)
+    held = np.concatenate(([value[0] if before is None else before], value))
+    # Where the value stays, nothing changes: a mean of two equal values is not quite that value.
+    new = np.append(True, np.diff(held) != 0.0)
+    held, changes_s = held[new], time_s[new[1:]]
+    step_s, steps = float(grid_s[1] - grid_s[0]), grid_s.size - 1
+    place = (changes_s - grid_s[0]) / step_s                   # in steps
+    near = np.rint(place)
+    place = np.where(np.abs(place - near) * step_s < STAMP_S, near, place)
+    first = np.clip(np.ceil(place), 0, steps).astype(int)      # step that holds the new value
+    mean = np.repeat(held, np.diff(first, prepend=0, append=steps))
+    changes = np.zeros(steps, dtype=bool)
+    changes[np.floor(place[(place != near) & (place > 0.0) & (place < steps)]).astype(int)] = True
+    mixed = np.flatnonzero(changes)
+    if mixed.size:
+        start = min(float(grid_s[0]), float(changes_s[0])) - 1.0
+        end = max(float(grid_s[-1]), float(changes_s[-1])) + 1.0
+        knots = np.concatenate(([start], changes_s, [end]))
+        # The integral of a held signal is piecewise linear, so its means are exact.
+        integral = np.concatenate(([0.0], np.cumsum(held * np.diff(knots))))
+        since, until = (np.interp(grid_s[mixed + k], knots, integral) for k in range(2))
+        mean[mixed] = (until - since) / step_s
+    return mean
 
 
 def _ordered(series: Series, field: str) -> tuple[IntArray, FloatArray]:
