@@ -27,6 +27,7 @@ from pam_sim.gap.data.pulses import openings, Pulses
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.split import FIT
 from pam_sim.gap.subsystems.pulses_seen import shows_pulses
+from pam_sim.gap.subsystems.simulation import free_run
 from pam_sim.gap.subsystems.valve import ValveProblem
 from pam_sim.model_file import load_rig
 from pam_sim.run import Run, Series
@@ -45,6 +46,19 @@ def test_pulses_have_the_mean_opening_of_the_averaged_valves(edges):
         found = openings(stamps, np.full(40, duty), Pulses(0.010, *edges), grid)
         assert found[100:300].mean() == pytest.approx(
             mean_opening_with_lift.py_func(duty, 0.010, *edges), abs=1e-9)
+    every = np.linspace(0.0, 1.0, 101)
+    assert Pulses(0.010, *edges, averaged=True).mean_opening(every).tolist() == [
+        mean_opening_with_lift.py_func(duty, 0.010, *edges) for duty in every]
+
+
+def test_opening_times_act_alike_within_a_step_of_the_grid():
+    late = {'name': 'valve_dead_zone', 'parameters': {'open_time_s': 1.7e-3, 'close_time_s': 2e-3}}
+    rig = load_rig(NOMINAL, valve='hsv').with_(effects=[late])
+    fill = np.repeat(np.random.default_rng(1).choice([-0.3, 0.0, 0.3], 100), 20)
+    run = recorded(rig, np.column_stack([np.clip(fill, 0.0, 1.0), np.clip(-fill, 0.0, 1.0)]), 100)
+    first, half, whole = (free_run(rig, Recording(run, 'hsv'), late_s)['pressure']
+                          for late_s in (0.0, 0.5e-3, 1e-3))
+    assert np.abs(half - 0.5 * (first + whole)).max() < 10.0
 
 
 def test_what_is_held_longer_than_a_period_is_repeated_and_scattered_stamps_leave_no_break():

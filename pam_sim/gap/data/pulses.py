@@ -39,6 +39,8 @@ class Pulses:
         From switching on until half open, and from switching off until half shut.
     rise_s, fall_s : float
         Times that a whole lift takes, around these instants.
+    averaged : bool
+        The mean over a period acts, not the single pulse.
 
     """
 
@@ -47,6 +49,21 @@ class Pulses:
     close_s: float = 0.0
     rise_s: float = 0.0
     fall_s: float = 0.0
+    averaged: bool = False
+
+    def mean_opening(self, duty: FloatArray) -> FloatArray:
+        """Return the mean opening over a period with a constant duty, as the averaged model."""
+        pulse = np.clip(duty, 0.0, 1.0) * self.period_s
+        lifted = pulse - self.open_s + 0.5 * self.rise_s          # since the lift began
+        lift = (np.clip(lifted / self.rise_s, 0.0, 1.0) if self.rise_s > 0.0
+                else np.ones(pulse.size))
+        shutting = lift * (self.close_s - 0.5 * self.fall_s) + 0.5 * lift * lift * self.fall_s
+        partly = np.minimum((0.5 * lift * lifted + shutting) / self.period_s, 1.0)
+        whole = np.minimum((pulse - self.open_s + self.close_s) / self.period_s, 1.0)
+        found = np.where(lifted >= self.rise_s, whole, partly)
+        found[self.period_s - pulse < self.close_s] = 1.0         # never shut between pulses
+        found[(pulse <= 0.0) | (lifted <= 0.0)] = 0.0
+        return found
 
 
 def openings(time_s: FloatArray, duty: FloatArray, pulses: Pulses, grid_s: FloatArray

@@ -141,8 +141,12 @@ class Recording:
             moved = seconds + delay_s
             if stamp_shift_s is not None:
                 moved = np.maximum.accumulate(moved + stamp_shift_s[:moved.size])
-            columns.append(held_mean(moved, value, self.grid_s) if pulses is None else
-                           openings(moved, value, pulses, self.grid_s))
+            if pulses is not None and not pulses.averaged:
+                columns.append(openings(moved, value, pulses, self.grid_s))
+                continue
+            # The opening of a mean duty is not the mean of the openings.
+            columns.append(held_mean(
+                moved, value if pulses is None else pulses.mean_opening(value), self.grid_s))
         return columns[0] if len(columns) == 1 else np.column_stack(columns)
 
     @property

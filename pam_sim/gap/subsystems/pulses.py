@@ -13,11 +13,14 @@
 # limitations under the License.
 
 """
-On/off valves that switch: the averaged model on openings that follow every pulse.
+On/off valves: the averaged model on openings, which follow every pulse where these are seen.
 
 The averaged valves take a mean opening. Given the mean of every millisecond in place of that of a
 period, they follow single pulses. Pulses then move smoothly in time, as a fit needs it, whatever
 their phase in the recording.
+
+Where the mean of a period acts, opening and closing times give every duty its opening before the
+mean of a millisecond is taken. The opening of a mean duty is another one.
 """
 
 from typing import TYPE_CHECKING
@@ -30,24 +33,24 @@ if TYPE_CHECKING:
 
 
 def pulses_of(rig: 'Rig') -> Pulses | None:
-    """Return how the valves of a rig follow their pulses, None where they do not switch."""
-    if rig.valve != 'hsv' or rig.fidelity != 'switching':
+    """Return how the valves of a rig follow their pulses, None where a duty is the opening."""
+    if rig.valve != 'hsv':
         return None
-    period_s = rig.parameters['pwm_period_s']
-    for setting in rig.effects:
-        effect = get_effect(setting.name)
-        if effect.fitting.edges:
-            value = {p.name: p.default for p in effect.parameters} | dict(setting.parameters)
-            opens_s, closes_s = (value[name] for name in effect.fitting.edges)
-            ramp_s = min(value.get('ramp_s', 0.0), 2.0 * opens_s, 2.0 * closes_s)
-            return Pulses(period_s, opens_s, closes_s,
-                          min(value.get('rise_s', ramp_s), 2.0 * opens_s),
-                          min(value.get('fall_s', ramp_s), 2.0 * closes_s))
-    return Pulses(period_s)
+    period_s, averaged = rig.parameters['pwm_period_s'], rig.fidelity != 'switching'
+    shaping = [e for e in rig.effects if get_effect(e.name).fitting.edges]
+    if not shaping or (averaged and len(shaping) > 1):
+        return None if averaged else Pulses(period_s)
+    effect = get_effect(shaping[0].name)
+    value = {p.name: p.default for p in effect.parameters} | dict(shaping[0].parameters)
+    opens_s, closes_s = (value[name] for name in effect.fitting.edges)
+    ramp_s = min(value.get('ramp_s', 0.0), 2.0 * opens_s, 2.0 * closes_s)
+    return Pulses(period_s, opens_s, closes_s,
+                  min(value.get('rise_s', ramp_s), 2.0 * opens_s),
+                  min(value.get('fall_s', ramp_s), 2.0 * closes_s), averaged)
 
 
 def on_openings(rig: 'Rig') -> 'Rig':
-    """Return the rig that takes openings of single pulses; what shapes these is left out."""
+    """Return the rig that takes openings; what makes these of duties or pulses is left out."""
     if pulses_of(rig) is None:
         return rig
     return rig.with_(fidelity='averaged', effects=[
