@@ -110,7 +110,8 @@ def _new(args: argparse.Namespace) -> int:
         text, rig = rig_file(described, args.out)
         write_text(args.out, text)
     following = _following(rig, args.out)
-    lines = [f'rig file: {args.out}', *_numbers_text(rig), f'next: {following}']
+    lines = [f'rig file: {args.out}', *_numbers_text(rig), *_law_text(rig),
+             f'next: {following}']
     emit(args, {'file': args.out, **_numbers(rig), 'next': following}, '\n'.join(lines))
     return EXIT_DONE
 
@@ -241,6 +242,14 @@ def _numbers_text(rig: 'Rig') -> list[str]:
     return lines + [
         f'  {p.name}: {rig.number(p.name):g} ± {rig.prior_sd(p.name):.3g} {p.unit}'
         for p in _inexact(rig)]
+
+
+def _law_text(rig: 'Rig') -> list[str]:
+    """Return a line on a force law that is taken as exact beside unknown numbers."""
+    stated = not any(name.startswith('law.') for name in rig.unknown)
+    if not (rig.unknown and rig.law_list and stated):
+        return []
+    return ['  force law: exact, that of another muscle; with --unknown law it is found as well']
 
 
 def _inexact(rig: 'Rig') -> list[Any]:

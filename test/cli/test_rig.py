@@ -82,7 +82,10 @@ def test_without_a_word_it_is_the_nominal_rig_with_every_number_in_a_comment(loa
 
 
 def test_the_force_law_may_be_unknown(capsys):
-    rig = new('--muscle', 'dmsp_10_250', '--unknown', 'mass_kg', 'law')
+    new('--muscle', 'dmsp_10_250', '--unknown', 'mass_kg')
+    assert 'force law: exact' in capsys.readouterr().out
+    rig = new('--muscle', 'dmsp_10_250', '--unknown', 'mass_kg', 'law', '--overwrite')
+    assert 'force law' not in capsys.readouterr().out
     assert rig.unknown[0] == 'mass_kg' and 'law.a3' in rig.unknown and len(rig.unknown) == 7
     assert main(['rig', 'check', 'made.yaml']) == 0
     assert 'law.a3: unknown, -85.' in capsys.readouterr().out
