@@ -142,6 +142,18 @@ def test_of_a_regulator_the_commanded_pressure_is_the_input():
     assert refused.verdict == 'refused' and 'behind a regulator' in refused.reason
 
 
+def test_the_measured_pressure_stands_in_for_a_command_that_nobody_recorded():
+    friction = {'name': 'coulomb_friction', 'parameters': {'force_n': 2.0}}
+    run = recorded(nominal().with_(effects=[friction]), voltages(12.0))
+    without = Run({name: s for name, s in run.topics.items() if name != 'valve_signal'})
+    quick = nominal().with_(parameters={'T_m': 0.001})
+    refused = find_gap(without, quick)
+    assert refused.verdict == 'refused' and 'the measured pressure as' in refused.reason
+    stand_in = Run(without.topics | {'pressure_command': without.topics['pressure']})
+    found = find_gap(stand_in, quick, effects=['coulomb_friction']).subsystems['muscle']
+    assert (found.verdict, found.names) == ('effects', ('coulomb_friction',))
+
+
 def test_of_on_off_valves_every_pulse_is_needed():
     rig = load_rig(NOMINAL, valve='hsv')
     run = recorded(rig, np.zeros((8000, 2)), rate_hz=50, initial_pressure_pa=401_325.0)

@@ -119,7 +119,8 @@ def _no_input(run: Run, valve: str) -> str:
     """Return the sentence on a recording that does not tell what the valve was given."""
     if valve == 'ppr':
         return ('the recording has neither a valve_signal with ppr_voltage nor a '
-                'pressure_command, so the model has no input')
+                'pressure_command, so the model has no input; to compare muscle and load alone, '
+                'import the measured pressure as pressure_command too')
     if COMMAND in run:
         return ('the recording has a pressure_command and no valve_signal; it can be followed '
                 'behind a regulator (a model with valve ppr), while on/off valves need fill_duty '
