@@ -28,7 +28,8 @@ import math
 
 import numpy as np
 
-from pam_sim.compiled import compiled
+from pam_sim.annotations import FloatArray
+from pam_sim.compiled import compiled, entry_point
 from pam_sim.effects.effect import Effect
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.effects.valve_dead_zone import (
@@ -102,6 +103,14 @@ def mean_opening_with_lift(duty: float, period_s: float, open_s: float, close_s:
     lift = lifted / rise_s
     shutting = lift * (close_s - 0.5 * fall_s) + 0.5 * lift * lift * fall_s
     return min((0.5 * lift * lifted + shutting) / period_s, 1.0)
+
+
+@entry_point
+def mean_openings_with_lift(duty: FloatArray, period_s: float, open_s: float, close_s: float,
+                            rise_s: float, fall_s: float, found: FloatArray) -> None:
+    """Fill ``found`` with the ``mean_opening_with_lift`` of each duty."""
+    for i in range(duty.size):
+        found[i] = mean_opening_with_lift(duty[i], period_s, open_s, close_s, rise_s, fall_s)
 
 
 @compiled

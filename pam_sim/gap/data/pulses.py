@@ -22,6 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from pam_sim.annotations import FloatArray
+from pam_sim.effects.valve_dead_zone_gradual import mean_openings_with_lift
 
 SAME_PERIOD = 0.3            # of the period: messages so near to one apart leave no break
 
@@ -53,16 +54,9 @@ class Pulses:
 
     def mean_opening(self, duty: FloatArray) -> FloatArray:
         """Return the mean opening over a period with a constant duty, as the averaged model."""
-        pulse = np.clip(duty, 0.0, 1.0) * self.period_s
-        lifted = pulse - self.open_s + 0.5 * self.rise_s          # since the lift began
-        lift = (np.clip(lifted / self.rise_s, 0.0, 1.0) if self.rise_s > 0.0
-                else np.ones(pulse.size))
-        shutting = lift * (self.close_s - 0.5 * self.fall_s) + 0.5 * lift * lift * self.fall_s
-        partly = np.minimum((0.5 * lift * lifted + shutting) / self.period_s, 1.0)
-        whole = np.minimum((pulse - self.open_s + self.close_s) / self.period_s, 1.0)
-        found = np.where(lifted >= self.rise_s, whole, partly)
-        found[self.period_s - pulse < self.close_s] = 1.0         # never shut between pulses
-        found[(pulse <= 0.0) | (lifted <= 0.0)] = 0.0
+        found = np.empty(duty.size)
+        mean_openings_with_lift(np.clip(duty, 0.0, 1.0), self.period_s, self.open_s,
+                                self.close_s, self.rise_s, self.fall_s, found)
         return found
 
 
