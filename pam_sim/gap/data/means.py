@@ -27,6 +27,15 @@ def recent(values: FloatArray, time_s: FloatArray, memory_s: float) -> FloatArra
     return values - lfilter([0.0, 1.0 - keep], [1.0, -keep], values)
 
 
+def behind(values: FloatArray, memory: float, period: float) -> FloatArray:
+    """Return evenly sampled values behind a lag, at rest before; both times in one unit."""
+    from scipy.signal import lfilter       # slow to import
+    if memory == 0.0:
+        return values
+    keep = math.exp(-period / memory)
+    return lfilter([1.0 - keep], [1.0, -keep], values, zi=[keep * values[0]])[0]
+
+
 def means_of(values: FloatArray, time_s: FloatArray, mean_s: float,
              inside: BoolArray | None = None) -> FloatArray:
     """Return means over ``mean_s``, of the spans with nearly all samples inside."""

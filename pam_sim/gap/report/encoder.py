@@ -25,6 +25,7 @@ import math
 import numpy as np
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.gap.criteria import Criteria
+from pam_sim.gap.data.means import behind
 from pam_sim.gap.data.recording import GRID_S, Recording
 from pam_sim.gap.report.location import AT_STOP_M, smooth_motion
 from pam_sim.gap.subsystems.simulation import pressure_driven, simulate_driven
@@ -70,7 +71,7 @@ def sensor_part(rig: Rig, recording: Recording, time_s: FloatArray, errors: Floa
         return None
     softness = usual / np.maximum(stiffness, LEAST_SHARE_OF_STIFFNESS * usual)
     features = np.column_stack([np.ones(x.size), x, v, *(
-        x - followed(x, memory) for memory in MEMORIES_S)])
+        x - behind(x, memory, GRID_S) for memory in MEMORIES_S)])
     place = np.clip(np.rint(time_s / GRID_S).astype(int), 0, x.size - 1)
     span = (time_s // MEAN_S).astype(int)
     used = np.flatnonzero(np.bincount(span, ~lifted[place], minlength=span.max() + 1) == 0)
@@ -93,13 +94,6 @@ def sensor_part(rig: Rig, recording: Recording, time_s: FloatArray, errors: Floa
         np.bincount(first, as_sensor ** 2) + 1e-18))
     t = float(ratio.mean()) / max(float(ratio.std(ddof=1)) / math.sqrt(ratio.size), 1e-9)
     return part if part > criteria.greater_part and t > criteria.ahead_t else None
-
-
-def followed(x: FloatArray, memory_s: float) -> FloatArray:
-    """Return what follows a signal on the grid within a time."""
-    from scipy.signal import lfilter       # slow to import
-    keep = math.exp(-GRID_S / memory_s)
-    return lfilter([1.0 - keep], [1.0, -keep], x, zi=[keep * x[0]])[0]
 
 
 def _left_out(columns: FloatArray, y: FloatArray, fold: IntArray) -> FloatArray:

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from pam_sim.annotations import FloatArray
 from pam_sim.gap.criteria import CRITERIA, Criteria
+from pam_sim.gap.data.means import behind
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.split import TEST_BLOCK_S
 from pam_sim.gap.subsystems.simulation import free_run
@@ -88,14 +89,5 @@ def _tried(rig: Rig, recording: Recording, period_s: float, delays: FloatArray) 
     for delay in delays:
         run = free_run(rig, recording, period_s * float(delay))['pressure']
         found.append(_Tried(float(delay), np.array([
-            np.diff(_behind(run, lag / step) - measured) ** 2 for lag in LAGS])))
+            np.diff(behind(run, lag / step, 1.0) - measured) ** 2 for lag in LAGS])))
     return found
-
-
-def _behind(values: FloatArray, samples: float) -> FloatArray:
-    """Return evenly sampled values behind a lag of so many samples."""
-    from scipy.signal import lfilter       # slow to import
-    if samples == 0.0:
-        return values
-    keep = float(np.exp(-1.0 / samples))
-    return lfilter([1.0 - keep], [1.0, -keep], values, zi=[keep * values[0]])[0]
