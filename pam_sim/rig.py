@@ -169,6 +169,11 @@ class Rig:
         """Names of the parameters that are stated as unknown, in the order of model files."""
         return tuple(name for name, known in self.tolerance.items() if known == UNKNOWN)
 
+    @property
+    def unknown_of_law(self) -> tuple[str, ...]:
+        """Those of ``unknown`` that are coefficients of the force law."""
+        return tuple(name for name in self.unknown if name.startswith(PREFIX))
+
     def prior_sd(self, name: str) -> float:
         """
         Return the standard deviation with which a parameter is known, in its unit.

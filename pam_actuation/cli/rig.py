@@ -246,8 +246,7 @@ def _numbers_text(rig: 'Rig') -> list[str]:
 
 def _law_text(rig: 'Rig') -> list[str]:
     """Return a line on a force law that is taken as exact beside unknown numbers."""
-    stated = not any(name.startswith('law.') for name in rig.unknown)
-    if not (rig.unknown and rig.law_list and stated):
+    if rig.unknown_of_law or not (rig.unknown and rig.law_list):
         return []
     return ['  force law: exact, that of another muscle; with --unknown law it is found as well']
 

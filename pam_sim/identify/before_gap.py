@@ -21,7 +21,6 @@ from pam_sim.gap.data.health import check_for, without_dead
 from pam_sim.identify.result import Identification
 from pam_sim.identify.settled import ZERO
 from pam_sim.identify.workflow import identify_beside
-from pam_sim.muscle.coefficients import PREFIX
 from pam_sim.rig import Rig
 from pam_sim.run import Run
 from pam_sim.tolerance import UNKNOWN
@@ -51,7 +50,7 @@ def numbers_first(runs: Sequence[Run], rig: Rig, holds_certify: bool, seed: int 
         Told the share that is done, 0 to 1.
 
     """
-    law = [name for name in rig.unknown if name.startswith(PREFIX)]
+    law = rig.unknown_of_law
     others = [name for name in rig.unknown if name not in law]
     if not others or not all(check_for(run, rig).usable for run in runs):
         return rig, None, []

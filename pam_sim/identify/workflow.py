@@ -269,7 +269,7 @@ def _tells_law(problems: Sequence[SubsystemProblem]) -> str:
 def _of_another_law(rig: Rig, left: Squares) -> list[str]:
     """Return a sentence where the muscle leaves a clear gap and its force law is stated."""
     clear = any(p.subsystem == 'muscle' and square > CRITERIA.clear_rest for p, _, square in left)
-    if not clear or any(name.startswith('law.') for name in rig.unknown):
+    if not clear or rig.unknown_of_law:
         return []
     return ['muscle and load leave a clear gap with the stated force law. If it was measured on '
             'another muscle, state it as unknown: pam rig new --unknown law']
