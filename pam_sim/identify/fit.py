@@ -27,7 +27,7 @@ import math
 import numpy as np
 from pam_sim.annotations import BoolArray, FloatArray
 from pam_sim.errors import InputError
-from pam_sim.gap.data.noise import autocorrelation_time, noise_of, SMALLEST
+from pam_sim.gap.data.noise import autocorrelation_time
 from pam_sim.gap.data.split import FIT, SELECT
 from pam_sim.gap.fit.solver import is_refused, REFUSED, simulated_errors, tempering
 from pam_sim.gap.subsystems.problem import SubsystemProblem
@@ -86,7 +86,7 @@ class Weighted:
         self.prior = np.array([
             TIE_BREAKER / (high - low) if n.unknown else 1.0
             for n, (low, high) in zip(self.numbers, ends)])
-        self.own = [sensor_squares(p) for p in self.problems]
+        self.own = [p.sensor_squares for p in self.problems]
 
     def values(self, x: FloatArray) -> dict[str, float]:
         """Return the values of the numbers by name."""
@@ -245,16 +245,6 @@ class Weighted:
     def misfit(self, x: FloatArray) -> float:
         """Return a measure that compares far starts: sum of the logarithms of the misfits."""
         return sum(math.log(square) for _, _, square in self.mean_squares(x))
-
-
-def sensor_squares(problem: SubsystemProblem) -> FloatArray:
-    """Return the squared noise of the sensor of every signal, in squared floors, at most 1."""
-    found = []
-    for s in problem.signals:
-        own = [noise_of(r.time_s[s], r.measured[s]).sd ** 2 for r in problem.recordings
-               if s in problem.outputs(r)]
-        found.append(min((float(np.mean(own)) + SMALLEST[s] ** 2) / problem.floor[s] ** 2, 1.0))
-    return np.array(found)
 
 
 def used(problem: SubsystemProblem) -> BoolArray:

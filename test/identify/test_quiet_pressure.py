@@ -18,7 +18,7 @@ from made_records import record, RIG
 import numpy as np
 from pam_sim.gap.data.noise import noise_of
 from pam_sim.gap.data.recording import Recording
-from pam_sim.identify.fit import fit, sensor_squares
+from pam_sim.identify.fit import fit
 from pam_sim.identify.inputs import noise_beyond, scatter_by_inputs
 from pam_sim.identify.profile import profile
 from pam_sim.identify.quiet import drawn_pa, with_quiet_pressure
@@ -90,7 +90,7 @@ def test_noise_counts_where_it_is_more_than_the_weights_say(solved):
 def test_weights_rise_where_the_floor_is_too_careful_but_not_beyond_the_sensor(solved):
     weighted, x = solved
     problem = weighted.problems[-1]
-    own = sensor_squares(problem)
+    own = problem.sensor_squares
     assert np.all((own > 0.0) & (own <= 1.0))
     random = np.random.default_rng(8)
     for size, least in ((0.5, 0.25), (1e-6, own[0])):

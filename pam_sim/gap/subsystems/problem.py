@@ -15,7 +15,7 @@
 """One subsystem with the recordings it is compared with."""
 
 from collections.abc import Hashable, Mapping, Sequence
-from functools import lru_cache
+from functools import cached_property, lru_cache
 import math
 import threading
 
@@ -23,7 +23,7 @@ import numpy as np
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.effects.unnamed.reading import of_reading, with_terms
 from pam_sim.gap.criteria import CRITERIA, Criteria
-from pam_sim.gap.data.noise import sensor_floor, STAMP_SD_S
+from pam_sim.gap.data.noise import noise_of, sensor_floor, SMALLEST, STAMP_SD_S
 from pam_sim.gap.data.recording import GRID_S, Recording
 from pam_sim.gap.data.signals import FIELD, SIGNALS
 from pam_sim.gap.data.split import split_of, UNUSED
@@ -126,6 +126,16 @@ class SubsystemProblem:
         self.time_s, self.run = np.concatenate(times), np.concatenate(runs)
         self.floor = self._floors(rig, seed)
         self._scale = np.array([self.floor[s] for s in self.signals])[self.signal]
+
+    @cached_property
+    def sensor_squares(self) -> FloatArray:
+        """Return the squared noise of each signal's sensor, in squared floors, at most 1."""
+        found = []
+        for s in self.signals:
+            own = [noise_of(r.time_s[s], r.measured[s]).sd ** 2 for r in self.recordings
+                   if s in self.outputs(r)]
+            found.append(min((float(np.mean(own)) + SMALLEST[s] ** 2) / self.floor[s] ** 2, 1.0))
+        return np.array(found)
 
     @staticmethod
     def outputs(recording: Recording) -> tuple[str, ...]:
