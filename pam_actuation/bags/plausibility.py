@@ -55,6 +55,7 @@ _PRESSURE_UNITS = (
 LEAST_LIMIT_M = 0.02                   # any muscle may shorten by this
 MOST_M = 0.5                           # and none of the usual ones by this
 MOST_N = 1e5
+SHARE_HINT = ' A share of the length? Multiply it by the length then; the topic is in m.'
 # Of which only the times are looked at.
 _WITHOUT_VALUES = {row.type_name for row in OF_A_RUN.values() if row.numeric is None}
 
@@ -300,7 +301,7 @@ def _contraction(finite: FloatArray, low: float, high: float,
                      f'Divide them by {factor:g}; the topic is in m.')
     hint = ''
     if largest > limit and high <= 0.5:
-        hint = ' A share of the length? Multiply it by the length then; the topic is in m.'
+        hint = SHARE_HINT
     elif low < -CONTRACTION_MARGIN_M and float(np.median(finite)) < -CONTRACTION_MARGIN_M:
         hint = ' Is the sign turned round, or the zero not set? Shortening is positive.'
     return (f'contraction from {1e3 * low:.1f} to {1e3 * high:.1f} mm leaves 0 to '

@@ -18,7 +18,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from pam_actuation.bags.plausibility import MAX_CONTRACTION, value_findings
+from pam_actuation.bags.plausibility import MAX_CONTRACTION, SHARE_HINT, value_findings
 from pam_actuation.tables.mapping import ColumnMap
 from pam_actuation.tables.signals import BY_NAME, Signal
 from pam_actuation.tables.units import (
@@ -78,15 +78,16 @@ def doubts(values: Mapping[str, FloatArray], mapped: Mapping[str, ColumnMap],
                                'left out'))
         found += [Doubt(f'{said}: {one.sentence}', one.is_wrong)
                   for one in _of_values(signal, mapped[name], finite, length_m)]
-    both = (_held(values, mapped, length_m), _zero(values, mapped, length_m))
-    return [*found, *(one for one in both if one is not None)]
+    if {'pressure', 'contraction'} <= {*values}:
+        found += [one for one in (_held(values, mapped, length_m),
+                                  _zero(values, mapped, length_m)) if one is not None]
+    return found
 
 
 def _held(values: Mapping[str, FloatArray], mapped: Mapping[str, ColumnMap], length_m: float
           ) -> Doubt | None:
     """Return a doubt on a muscle that hardly moves under much pressure, None without."""
-    if not {'pressure', 'contraction'} <= {*values} or not all(
-            np.isfinite(values[name]).any() for name in ('pressure', 'contraction')):
+    if not all(np.isfinite(values[name]).any() for name in ('pressure', 'contraction')):
         return None
     risen_pa, moved_m = (float(np.nanmax(values[name]) - np.nanmin(values[name]))
                          for name in ('pressure', 'contraction'))
@@ -102,8 +103,6 @@ def _held(values: Mapping[str, FloatArray], mapped: Mapping[str, ColumnMap], len
 def _zero(values: Mapping[str, FloatArray], mapped: Mapping[str, ColumnMap], length_m: float
           ) -> Doubt | None:
     """Return a doubt on a contraction that an empty muscle keeps, None without."""
-    if not {'pressure', 'contraction'} <= {*values}:
-        return None
     pressure_pa, contraction_m = values['pressure'], values['contraction']
     empty = contraction_m[(pressure_pa < P_ATM_PA + EMPTY_PA) & np.isfinite(contraction_m)]
     if len(empty) < FEWEST_EMPTY:
@@ -133,9 +132,9 @@ def _of_values(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: 
         if turned:
             return [Doubt(f'{_shown(signal, low)} to {_shown(signal, high)}, which no muscle '
                           f'shortens by; {turned}', True)]
-    found = [Doubt(one.sentence.partition(': ')[2].rstrip('.')) for one in wrong]
-    if signal.quantity == LENGTH and mapped.unit.factor != 1.0:     # so it is no share
-        found = [Doubt(one.sentence.partition(' A share of')[0]) for one in found]
+    no_hint = SHARE_HINT if mapped.unit.factor != 1.0 else ''      # so it is no share
+    found = [Doubt(one.sentence.partition(': ')[2].removesuffix(no_hint).rstrip('.'))
+             for one in wrong]
     if low == high:
         return [*found, Doubt(f'the value never changes ({_shown(signal, low)}): is the sensor '
                               'connected?')]
