@@ -208,7 +208,7 @@ class Validation:
             change, between = after ** 2 - refit ** 2, after - refit
             by_place = float(np.std(change)) * math.sqrt(
                 autocorrelation_time(change) / change.size)
-            by_draw = [2.0 * float(np.mean(d[s][self.part[s]] * between)) for d in self.drift]
+            by_draw = [2.0 * float(np.mean(d[s][chosen] * between)) for d in self.drift]
             doubt = math.hypot(float(np.sqrt(np.mean(np.square(by_draw)))), 2.0 * self.noise[
                 s] * float(np.sqrt(np.mean(between ** 2))) / math.sqrt(between.size))
             rise = gap.rmse_after ** 2 - gap.rmse_refit ** 2
