@@ -22,10 +22,11 @@ from pam_actuation.report.sections.gap import gap_section
 from pam_actuation.report.sections.gap_witness import witness_part
 from pam_sim.gap import find_gap
 from pam_sim.gap.criteria import CRITERIA
-from pam_sim.gap.data.recording import Recording
+from pam_sim.gap.data.means import behind
+from pam_sim.gap.data.recording import GRID_S, Recording
 from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
 from pam_sim.gap.report.by_subsystem import add_place
-from pam_sim.gap.report.encoder import followed, sensor_part
+from pam_sim.gap.report.encoder import sensor_part
 from pam_sim.gap.report.location import force_errors, ForceErrors
 from pam_sim.gap.report.place import Evidence, first_place
 from pam_sim.gap.result import GapResult, Share, SignalGap, SubsystemVerdict
@@ -154,7 +155,7 @@ def test_an_encoder_that_creeps_is_told_from_a_muscle_that_does():
     recording = Recording(recorded(rig, voltages(20.0)), 'ppr')
     time_s, x = recording.time_s['contraction'], recording.measured['contraction']
     grid = np.interp(recording.grid_s, time_s, x)
-    late = np.interp(time_s, recording.grid_s, grid - followed(grid, 3.0))
+    late = np.interp(time_s, recording.grid_s, grid - behind(grid, 3.0, GRID_S))
     k = pressure_driven(rig)
     stiffness = (simulate_driven(k, recording, grid).force_n - simulate_driven(
         k, recording, grid + 1e-4).force_n) / 1e-4
