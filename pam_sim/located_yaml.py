@@ -36,6 +36,7 @@ MAX_VALUES = 50_000       # counted where aliases put them, so that few bytes ca
 MAX_DEPTH = 50
 _WHOLE = re.compile(r'[-+]?[0-9]+')
 _COMMA = re.compile(r'[-+]?[0-9]+,[0-9]+')
+_NO_TEXT = re.compile('[\0\ud800-\udfff]')
 MAX_DIGITS = 300          # of a whole number; such a number still fits a float
 
 
@@ -436,7 +437,7 @@ class _Conversion:
             # A tag such as !!float in front of a text that is none; each tag fails its own way.
             raise InputError(f'`{node.value[:40]}` does not fit its tag {node.tag}',
                              where) from error
-        if isinstance(value, str) and any(c == '\0' or '\ud800' <= c <= '\udfff' for c in value):
+        if isinstance(value, str) and _NO_TEXT.search(value):
             raise InputError('holds a character that is not text', where)
         return value
 

@@ -35,7 +35,7 @@ for valve, fidelity in (('ppr', 'averaged'), ('hsv', 'averaged'), ('hsv', 'switc
     for settings in ([], effects):
         rig = joint.flexor.with_(effects=settings)
         both = joint.with_({'friction_n_m': 0.01}, flexor=rig, extensor=rig)
-        levels = np.repeat(random.uniform(0.0, 1.0, (2, 6, 2)), 20, axis=1)
+        levels = np.repeat(random.uniform(0.0, 1.0, (2, 4, 2)), 8, axis=1)
         signal = 6.0 * levels[:, :, 0] if valve == 'ppr' else 0.4 * levels
         response = both.simulate(signal[0], signal[1], 0.1)
         rows.append(np.hstack([response.outputs, response.flexor.outputs,
