@@ -274,6 +274,8 @@ def _pressure(finite: FloatArray, low: float, high: float, length_m: Length) -> 
             'pressure? Add 101325 Pa then; the topic is absolute, in Pa.'), True
     is_gauge = abs(float(np.quantile(finite, 0.01))) < ATMOSPHERE_MARGIN_PA
     hint = ('They are likely gauge pressure: add 101325 Pa.' if is_gauge else
+            'No muscle is evacuated so far. Is it gauge pressure? Add 101325 Pa then; or did the '
+            'sensor drop out?' if low < 0.5 * P_ATM_PA else
             'If the muscle was vented then, the sensor has a zero: state '
             '`pressure_zero_pa: unknown` in the rig file.')
     return (f'{below} values below atmospheric pressure, down to {gauge_kpa(low):.1f} kPa '

@@ -126,8 +126,8 @@ def _understood(args: argparse.Namespace) -> 'tuple[list[Table], Guess]':
     from pam_sim.errors import InputError
     mapping = (load_mapping(args.mapping) if args.mapping else TableMapping()).with_options(
         args.maps, args.rate)
-    # Who says what the signals are means these; otherwise all columns are looked at.
-    wanted = [one.column for one in mapping.signals.values()] or None
+    # A mapping file says everything; otherwise all columns are looked at.
+    wanted = [one.column for one in mapping.signals.values()] if args.mapping else None
     tables = []
     with progress(args, float(len(args.files)), '', 'reading') as bar:
         for done, file in enumerate(args.files):
@@ -163,13 +163,21 @@ def _show(args: argparse.Namespace, tables: 'list[Table]', found: 'Guess') -> in
     lines = [preview(tables, found, args.missing)]
     if found.questions:
         lines += ['', 'the file does not tell:', questions_text(found)]
-    lines += ['', 'mapping:', found.mapping.to_yaml().rstrip()]
+    lines += ['', *_mapping_lines(found)]
     emit(args, {
         'files': args.files, 'mapping': found.mapping.to_yaml(),
         'questions': [{'signal': one.signal, 'column': one.column, 'text': one.text,
                        'answers': list(one.answers)} for one in found.questions],
         'columns': [list(table.columns) for table in tables]}, '\n'.join(lines))
     return EXIT_DONE
+
+
+def _mapping_lines(found: 'Guess') -> list[str]:
+    """Return the mapping, or how to begin one."""
+    if found.mapping.signals:
+        return ['mapping:', found.mapping.to_yaml().rstrip()]
+    return ['no column is known by its name: say which are signals, such as',
+            '    --map pressure="#2:kPa_gauge" --map contraction="#3:mm"']
 
 
 def _tell(args: argparse.Namespace, recording: 'Recording', found: 'Guess',

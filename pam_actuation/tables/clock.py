@@ -36,6 +36,7 @@ SLOW_HZ = 10.0                              # below: another unit may be meant
 UNLIKELY_HZ = 1.0                           # below: the user has to say the unit
 EPOCH_S = 9e8                               # seconds that can only count from 1970
 GAP_S, GAP_STEPS = 0.05, 5.0                # longer than both: rows are missing
+LATE_S = 1.0                                # messages that overtake one another by less
 JUMP_S = 10.0                               # longer than this and the rest: the clock was set
 
 
@@ -108,7 +109,7 @@ def clock_of(table: Table, mapping: TableMapping, start_ns: int = START_NS,
             raise InputError(
                 'no column is the time; add --map time="COLUMN:s", or --rate HZ for rows at '
                 'equal distances', table.source)
-        read = _Times(table.stamp_ns, 'times of the messages')
+        read = _Times(table.stamp_ns, f'times of the messages on {table.topic}')
     else:
         read = _from_column(table, column, start_ns)
     return _with_gaps(table, _in_order(table, read, sort))
@@ -256,7 +257,9 @@ def _in_order(table: Table, read: _Times, sort: bool) -> Clock:
     rows, remarks = np.arange(len(stamps), dtype=np.int64), [remark] if remark else []
     back = np.flatnonzero(np.diff(stamps) < 0)
     if len(back):
-        if not sort:
+        late_s = 1e-9 * float(np.max(np.maximum.accumulate(stamps) - stamps))
+        overtaken = bool(table.topic) and late_s < LATE_S
+        if not (sort or overtaken):
             row = int(back[0]) + 1
             raise InputError(
                 f'the time runs back by {(stamps[row - 1] - stamps[row]) * 1e-9:g} s '
@@ -264,7 +267,10 @@ def _in_order(table: Table, read: _Times, sort: bool) -> Clock:
                 '--sort to put the rows in order', table.place(row))
         order = np.argsort(stamps, kind='stable')
         stamps, rows = stamps[order], rows[order]
-        remarks.append(f'the rows were put in order of time ({len(back)} steps back)')
+        if overtaken:
+            told += f', put in order ({len(back)} arrived late, by up to {1e3 * late_s:.3g} ms)'
+        else:
+            remarks.append(f'the rows were put in order of time ({len(back)} steps back)')
     repeated = np.flatnonzero(np.diff(stamps) == 0) + 1
     if not len(repeated):
         return Clock(stamps, rows, told, tuple(remarks))

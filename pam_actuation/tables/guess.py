@@ -201,7 +201,8 @@ def _of_column(table: Table, column: str, signal: Signal, missing: Collection[st
         return Question(signal.name, column, f'{shown}: in which unit?',
                         tuple(_plausible(signal, low, high)))
     if unit.is_complete:
-        return ColumnMap(column, unit), f'unit {unit.name} by name'
+        by = 'message type' if column in table.by_type else 'name'
+        return ColumnMap(column, unit), f'unit {unit.name} by {by}'
     below = finite * unit.factor < BELOW_ATMOSPHERE * P_ATM_PA
     if below.any() and float(below.mean()) < FEW_BELOW:
         shown += f', below 1 atmosphere in {int(below.sum())} of {len(finite)} rows only'

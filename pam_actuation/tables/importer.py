@@ -176,8 +176,7 @@ def _check(result: Recording, length_m: float, accept: bool) -> None:
         other, = {*VALVE_NAMES['hsv']} - duties
         raise InputError(f'{duties.pop()} is mapped, {other} is not; a valve signal has both',
                          '--map')
-    found = doubts({name: values for name, (_, values) in result.signals.items()},
-                   result.mapping.signals, length_m)
+    found = doubts(result.signals, result.mapping.signals, length_m)
     wrong = next((one for one in found if one.is_wrong), None)
     if wrong is not None and not accept:
         raise InputError(f'{wrong.sentence}. (--accept takes the values as they are)')

@@ -24,12 +24,13 @@ from pam_actuation.tables.signals import BY_NAME, Signal
 from pam_actuation.tables.units import (
     ABSOLUTE, FORCE, GAUGE, LENGTH, names_of, PRESSURE, unit_of_text)
 from pam_actuation.tables.words import unit_in
-from pam_sim.annotations import FloatArray
+from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.units import P_ATM_PA
 
 FAR = 20.0                           # times the range of the others: no value of the rig
 MUCH_PA, LITTLE = 2e5, 0.01         # a free muscle shortens by more of its length
 MUCH_N = 8e3                         # the strongest muscle on sale pulls 6 kN
+PUSH_N = 2.0                         # more than the zero of a load cell is off
 SMALL_GAUGE_PA = 20e3                # no muscle moves below
 # Numbers by which programs say that there is none.
 STAND_INS = {-9999.0, -999.0, -99.0, -99999.0, 9999.0, 99999.0, 999999.0, -32768.0, 32767.0,
@@ -50,15 +51,15 @@ class Doubt:
     is_wrong: bool = False
 
 
-def doubts(values: Mapping[str, FloatArray], mapped: Mapping[str, ColumnMap],
+def doubts(signals: Mapping[str, tuple[IntArray, FloatArray]], mapped: Mapping[str, ColumnMap],
            length_m: float) -> list[Doubt]:
     """
     Return what is doubtful in the signals of a recording.
 
     Parameters
     ----------
-    values : dict of str to ndarray
-        SI values by name of the signal, NaN where missing.
+    signals : dict of str to tuple of ndarray
+        Stamps [ns] and SI values by name of the signal, NaN where missing.
     mapped : dict of str to ColumnMap
         Where they come from.
     length_m : float
@@ -66,6 +67,7 @@ def doubts(values: Mapping[str, FloatArray], mapped: Mapping[str, ColumnMap],
 
     """
     found = []
+    values = {name: column for name, (_, column) in signals.items()}
     for name, column in values.items():
         signal, finite = BY_NAME[name], column[np.isfinite(column)]
         said = f'{name} (column "{mapped[name].column}" in {mapped[name].unit.name})'
@@ -80,7 +82,7 @@ def doubts(values: Mapping[str, FloatArray], mapped: Mapping[str, ColumnMap],
                   for one in _of_values(signal, mapped[name], finite, length_m)]
     if {'pressure', 'contraction'} <= {*values}:
         found += [one for one in (_held(values, mapped, length_m),
-                                  _zero(values, mapped, length_m)) if one is not None]
+                                  _zero(signals, mapped, length_m)) if one is not None]
     return found
 
 
@@ -100,10 +102,15 @@ def _held(values: Mapping[str, FloatArray], mapped: Mapping[str, ColumnMap], len
         'the unit right, or is the muscle held?')
 
 
-def _zero(values: Mapping[str, FloatArray], mapped: Mapping[str, ColumnMap], length_m: float
-          ) -> Doubt | None:
+def _zero(signals: Mapping[str, tuple[IntArray, FloatArray]], mapped: Mapping[str, ColumnMap],
+          length_m: float) -> Doubt | None:
     """Return a doubt on a contraction that an empty muscle keeps, None without."""
-    pressure_pa, contraction_m = values['pressure'], values['contraction']
+    (own_ns, pressure_pa), (stamp_ns, contraction_m) = signals['pressure'], signals['contraction']
+    known = np.isfinite(pressure_pa)
+    if not known.any():
+        return None
+    # Each signal has times of its own, in a bag and in files that are read together.
+    pressure_pa = np.interp(stamp_ns, own_ns[known], pressure_pa[known], np.inf, np.inf)
     empty = contraction_m[(pressure_pa < P_ATM_PA + EMPTY_PA) & np.isfinite(contraction_m)]
     if len(empty) < FEWEST_EMPTY:
         return None
@@ -145,6 +152,11 @@ def _of_values(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: 
     if signal.quantity == FORCE and max(high, -low) > MUCH_N:
         found.append(Doubt(f'it reaches {_shown(signal, max(high, -low))}, more than a muscle '
                            f'pulls{_fix(signal, mapped, finite, length_m)}'))
+    if signal.name == 'force' and float(np.median(finite)) < -PUSH_N and -low > FAR * high:
+        other = replace(mapped, gain=-mapped.gain)
+        found.append(Doubt(f'it is negative nearly throughout, down to {_shown(signal, low)}, and '
+                           'a pull is positive; if it counts the other way, write '
+                           f'{other.option(signal.name)}'))
     if signal.quantity == PRESSURE and P_ATM_PA < high < P_ATM_PA + SMALL_GAUGE_PA and not (
             least is not None and high - low < least):
         found.append(Doubt(f'it reaches {_shown(signal, high)} only, at which no muscle moves'

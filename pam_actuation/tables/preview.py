@@ -43,7 +43,8 @@ def preview(tables: Collection[Table], found: Guess, missing: Collection[str] = 
     lines = []
     for table in tables:
         meant = _meaning(table, found)
-        lines.append(f'{table.source}: {len(table)} rows, {len(table.columns)} columns')
+        rows_are = f'{table.topic}, {len(table)} messages' if table.topic else f'{len(table)} rows'
+        lines.append(f'{table.source}: {rows_are}, {len(table.columns)} columns')
         rows = [('', 'column', 'lowest', 'highest', 'first', 'read as')]
         for number, name in enumerate(table.columns):
             if number == _MOST_COLUMNS:

@@ -54,6 +54,12 @@ class Table:
         What the file calls a column whose name stands twice; its own is its number.
     decimal : str
         Decimal sign of numbers that are held as texts.
+    topic : str
+        Of a bag, whose rows are messages; '' for other files.
+    by_type : set of str
+        Columns whose unit the type of the message states.
+    aliases : dict of str to str
+        Other names of columns.
 
     """
 
@@ -66,6 +72,9 @@ class Table:
     numbered: IntArray | None = None
     called: dict[str, str] = field(default_factory=dict)
     decimal: str = '.'
+    topic: str = ''
+    by_type: set[str] = field(default_factory=set)
+    aliases: dict[str, str] = field(default_factory=dict)
 
     def __len__(self) -> int:
         """Return the number of rows."""
@@ -73,6 +82,7 @@ class Table:
 
     def name_of(self, wanted: str) -> str | None:
         """Return the column that ``wanted`` means: a name, or a number such as ``#3``."""
+        wanted = self.aliases.get(wanted, wanted)
         if wanted in self.columns:
             return wanted
         if re.fullmatch(r'#\d+', wanted):
@@ -90,9 +100,11 @@ class Table:
         return name
 
     def place(self, row: int) -> str:
-        """Return where a row stands, for messages: file and line, or file and row."""
+        """Return where a row stands, for people: file and line, or file and row or message."""
         if self.lines is not None:
             return f'{self.source}:{self.lines[row]}'
+        if self.topic:
+            return f'{self.source}, {self.topic}, message {row + 1}'
         return f'{self.source}, row {row + 1}'
 
     def numbers(self, name: str, missing: Collection[str] = ()) -> FloatArray:

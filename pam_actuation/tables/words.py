@@ -18,7 +18,7 @@ import re
 
 from pam_actuation.tables.units import FACTORS, unit_of_text
 
-_BRACKETS = re.compile(r'[\[(]([^\])]*)[\])]\s*$')
+_BRACKETS = re.compile(r'(?!(?<=\w)\[\d+\])[\[(]([^\])]*)[\])]\s*$')     # `data[1]` has no unit
 
 
 def unit_in(name: str) -> str:

@@ -24,6 +24,7 @@ from pam_sim.units import P_ATM_PA
 import pytest
 
 PRESSURE_PA = P_ATM_PA + np.repeat([2e3, 3e5, 4e5], 20)
+STAMP_NS = np.arange(60)
 SHORTENED_M = np.repeat([0.0, 0.03, 0.04], 20)
 
 
@@ -40,7 +41,8 @@ def test_a_zero_that_is_off_shows_while_the_muscle_is_empty(text, shortening):
     mapped = {'contraction': column, 'pressure': column_of_text('pressure', 'p:bar_abs', 'here')}
     for at_rest_m in (0.0, 0.004, 0.0314):
         said = ' '.join(one.sentence for one in doubts(
-            {'pressure': PRESSURE_PA, 'contraction': SHORTENED_M + at_rest_m}, mapped, 0.3))
+            {'pressure': (10 * STAMP_NS[:-7], PRESSURE_PA[:-7]),
+             'contraction': (10 * STAMP_NS, SHORTENED_M + at_rest_m)}, mapped, 0.3))
         off = at_rest_m > 0.03
         assert ('31.4 mm while the muscle is empty' in said) == off
         assert (f'zero={column.zero + shortening * 31.4:.4g}' in said) == off

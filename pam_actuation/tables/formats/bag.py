@@ -19,12 +19,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pam_actuation.tables.formats.fields import describe, items_named, Message
 from pam_actuation.tables.table import MOST_ROWS, Table
 from pam_actuation.topics.definitions import typestore
 from pam_sim.errors import InputError
 
 _MOST_ITEMS = 32                 # of an array in a message
 _PREVIEWED = 1000                # messages of a topic
+_LARGE_BYTES = 20_000            # a message of an image, which is no signal of a rig
 
 
 def read(path: str, every: int, wanted: Collection[str] | None,
@@ -32,7 +34,9 @@ def read(path: str, every: int, wanted: Collection[str] | None,
     """
     Return a table for each topic; see ``formats.read_tables``.
 
-    A column is called ``/topic.field``. Times are header stamps, or receive times for messages
+    A column is called ``/topic.field``. Where a message names the items of its arrays, as
+    ``JointState`` does, each name has a table of its own, with columns such as
+    ``/joint_states.position[knee]``. Times are header stamps, or receive times for messages
     without header. Of topics that are not ``wanted`` only the first messages are read.
     """
     from rosbags.highlevel import AnyReader, AnyReaderError
@@ -40,14 +44,14 @@ def read(path: str, every: int, wanted: Collection[str] | None,
     try:
         with AnyReader([place], default_typestore=typestore()) as reader:
             total = sum(one.msgcount for one in reader.connections) or 1
-            tables, done = [], 0
+            tables: list[Table] = []
+            done = 0
             for connection in reader.connections:
                 used = wanted is None or any(_is_of(name, connection.topic) for name in wanted)
-                rows, stamps = _rows(reader, connection, every, None if used else _PREVIEWED)
+                read_messages = _messages(reader, connection, every, None if used else _PREVIEWED)
                 done += connection.msgcount
                 progress(done / total)
-                if rows:
-                    tables.append(_table(path, connection.topic, rows, stamps))
+                tables += _tables(path, connection.topic, connection.msgtype, read_messages)
             return tables
     except (AnyReaderError, KeyError, ValueError, AssertionError, OSError) as error:
         raise InputError(f'is no readable bag: {error}', path) from None
@@ -57,31 +61,50 @@ def _is_of(column: str, topic: str) -> bool:
     return column == topic or column.startswith(f'{topic}.') or column.startswith('#')
 
 
-def _rows(reader: Any, connection: Any, every: int, most: int | None
-          ) -> tuple[list[dict[str, float]], list[int]]:
-    """Return the numbers of every message of a topic, and its times [ns]."""
-    rows: list[dict[str, float]] = []
-    stamps: list[int] = []
+def _messages(reader: Any, connection: Any, every: int, most: int | None) -> list[Message]:
+    """Return time [ns], names of items and numbers of every message of a topic."""
+    found: list[Message] = []
     for count, (_, log_time_ns, raw) in enumerate(reader.messages(connections=[connection])):
-        if most is not None and count >= most or len(rows) >= MOST_ROWS:
+        if most is not None and count >= most or len(found) >= MOST_ROWS:
             break
         if count % every:
             continue
+        if len(raw) > _LARGE_BYTES:
+            break
         message = reader.deserialize(raw, connection.msgtype)
         values = dict(_numbers(message, ''))
         if not values:
             break
-        rows.append(values)
-        stamps.append(_stamp_ns(message) or log_time_ns)
-    return rows, stamps
+        found.append(Message(_stamp_ns(message) or log_time_ns, items_named(message), values))
+    return found
 
 
-def _table(path: str, topic: str, rows: list[dict[str, float]], stamps: list[int]) -> Table:
+def _tables(path: str, topic: str, msgtype: str, found: list[Message]) -> list[Table]:
+    """Return the table of a topic, or one for each name in its messages."""
+    if not any(one.names for one in found):
+        return [_table(path, topic, msgtype, found)] if found else []
+    tables = []
+    for name in dict.fromkeys(name for one in found for name in one.names):
+        own = [one.of(name) for one in found if name in one.names]
+        table = _table(path, topic, msgtype, own)
+        places = {one.names.index(name) for one in found if name in one.names}
+        if len(places) == 1:            # the number of the item says the same as its name
+            place = f'[{places.pop()}]'
+            table.aliases = {column.replace(f'[{name}]', place): column
+                             for column in table.columns if f'[{name}]' in column}
+        tables.append(table)
+    return tables
+
+
+def _table(path: str, topic: str, msgtype: str, found: list[Message]) -> Table:
     import pandas as pd
-    names = list(dict.fromkeys(name for row in rows for name in row))
-    columns = {f'{topic}{name}': pd.Series([row.get(name, np.nan) for row in rows], dtype=float)
-               for name in names}
-    return Table(path, columns, stamp_ns=np.array(stamps, dtype=np.int64))
+    names = dict.fromkeys(name for one in found for name in one.values)
+    columns = {f'{topic}{name}': pd.Series([one.values.get(name, np.nan) for one in found],
+                                           dtype=float) for name in names}
+    table = Table(path, columns, topic=topic,
+                  stamp_ns=np.array([one.stamp_ns for one in found], dtype=np.int64))
+    describe(table, msgtype)
+    return table
 
 
 def _stamp_ns(message: Any) -> int:
@@ -94,7 +117,7 @@ def _numbers(message: Any, name: str) -> Iterator[tuple[str, float]]:
     fields = getattr(message, '__dataclass_fields__', None)
     if fields is not None:
         for field in fields:
-            if field != 'header' and not field.startswith('__'):
+            if field not in ('header', 'layout') and not field.startswith('__'):
                 yield from _numbers(getattr(message, field), f'{name}.{field}')
     elif isinstance(message, (bool, int, float, np.number)):
         yield name, float(message)
