@@ -50,7 +50,7 @@ class Replay:
     driver : DriverReplay or None
         Recorded against replayed valve signals.
     plant : PlantReplay or None
-        Recorded against simulated signals, free run on the recorded valve signal.
+        Recorded against simulated signals, free run on the recorded input.
     chain : ChainReplay or None
         The experiment repeated in a closed loop.
     notes : dict of str to str
@@ -206,8 +206,10 @@ def _why_not(run: 'RecordedRun', name: str,
     elif name == 'driver':
         if 'valve_signal' not in run or not os.path.exists(run.path):
             return 'the run has no valve_signal or is not from a bag'
-    elif not run.metadata.get('rig') or 'valve_signal' not in run:
-        return 'the bag does not say which rig it is, or has no valve_signal'
+    elif not run.metadata.get('rig'):
+        return 'the bag does not say which rig it is'
+    elif 'valve_signal' not in run and not ('pressure' in run and 'contraction' in run):
+        return 'the bag has neither a valve_signal nor pressure and contraction'
     return ''
 
 

@@ -12,7 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Step the recorded rig's model on the recorded valve signal and compare the signals."""
+"""
+Step the recorded rig's model on the recorded valve signal and compare the signals.
+
+Without one the commanded pressure of a regulator is the input, or else the measured pressure
+drives muscle and load.
+"""
 
 from dataclasses import dataclass
 from typing import Any, TYPE_CHECKING
@@ -22,9 +27,9 @@ from pam_actuation.replay.difference import Difference, difference
 from pam_sim import load_rig
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.errors import InputError
-from pam_sim.gap.data.health import recorded_valve
+from pam_sim.gap.data.commanded import commanded
 from pam_sim.gap.data.recording import Recording
-from pam_sim.gap.data.signals import FIELD
+from pam_sim.gap.data.signals import FIELD, recorded_valve
 from pam_sim.gap.subsystems.simulation import free_run
 from pam_sim.short_repr import short_repr
 
@@ -33,6 +38,9 @@ if TYPE_CHECKING:
     from pam_sim.run import Run
 
 MIN_DURATION_S = 0.1         # the start is read from half of it
+# By whether the pressure is given, and whether a command stands for the valve signal.
+INPUTS = {(False, False): 'recorded valve signal', (False, True): 'recorded pressure command',
+          (True, False): 'measured pressure'}
 UNITS = {'pressure': 'Pa', 'contraction': 'm', 'force': 'N'}
 
 
@@ -43,7 +51,8 @@ class PlantReplay:
     Recorded and simulated signals at the recorded stamps.
 
     ``stamp_ns``, ``time_s``, ``recorded`` and ``simulated`` map signal name to arrays of equal
-    length, SI; ``start_ns`` is the first stamp of the recording.
+    length, SI; ``start_ns`` is the first stamp of the recording. ``input`` is what drives the
+    model.
     """
 
     rig: str
@@ -52,6 +61,7 @@ class PlantReplay:
     simulated: dict[str, FloatArray]
     stamp_ns: dict[str, IntArray]
     start_ns: int
+    input: str = INPUTS[False, False]
 
     @property
     def differences(self) -> list[Difference]:
@@ -66,7 +76,7 @@ class PlantReplay:
 
     def lines(self) -> list[str]:
         """Return one line a signal, for people."""
-        return [f'plant: {self.rig}, free run on the recorded valve signal (without sensor noise)',
+        return [f'plant: {self.rig}, free run on the {self.input} (without sensor noise)',
                 *(one.line() for one in self.differences)]
 
     def arrays(self) -> dict[str, FloatArray]:
@@ -81,7 +91,7 @@ class PlantReplay:
 
 def replay_plant(run: 'Run') -> PlantReplay:
     """
-    Run the model named in a recording's metadata on its valve signal.
+    Run the model named in a recording's metadata on the recorded input.
 
     Raises
     ------
@@ -93,23 +103,26 @@ def replay_plant(run: 'Run') -> PlantReplay:
     if not text:
         raise InputError('the recording does not say which rig it is', str(run.path))
     rig = load_rig(text)
+    given = run
+    (run,), _ = commanded([given], rig)
     _check(run, rig)
     recording = Recording(run, rig.valve, driven=rig.is_driven)
     simulated = free_run(rig, recording)
     return PlantReplay(
         rig.name, {s: recording.time_s[s] for s in recording.signals},
         {s: np.asarray(recording.measured[s]) for s in recording.signals}, simulated,
-        {s: recording.stamp_ns[s] for s in recording.signals}, run.start_ns)
+        {s: recording.stamp_ns[s] for s in recording.signals}, run.start_ns,
+        INPUTS[recording.pressure_given, run is not given])
 
 
 def _check(run: 'Run', rig: 'Rig') -> None:
-    """Raise InputError unless the run has the input of the rig and the signals of its start."""
+    """Raise InputError unless the run has an input of the rig and the signals of its start."""
     path = str(run.path)
     valve = recorded_valve(run)
-    if valve != rig.valve:
+    if 'valve_signal' in run and valve != rig.valve:
         raise InputError(f'the valve signal is of {valve or "no known"} valve, the rig has '
                          f'{rig.valve}', path)
-    used = [run.require('valve_signal')]
+    used = [run.require('valve_signal')] if valve else []
     for topic in ('pressure', 'contraction'):
         series = run.require(topic)
         if not np.isfinite(series.values[FIELD[topic]]).any():
@@ -119,5 +132,6 @@ def _check(run: 'Run', rig: 'Rig') -> None:
         int(np.min(one.stamp_ns)) for one in used)
     if common_ns < MIN_DURATION_S * 1e9:
         raise InputError(
-            f'pressure, contraction and valve signal have {max(common_ns, 0) * 1e-9:.3f} s in '
-            f'common, at least {MIN_DURATION_S:g} s are needed', path)
+            f'pressure, contraction{" and valve signal" if valve else ""} have '
+            f'{max(common_ns, 0) * 1e-9:.3f} s in common, at least {MIN_DURATION_S:g} s are '
+            'needed', path)

@@ -46,8 +46,9 @@ from pam_sim.errors import InputError
 from pam_sim.files import check_folder, StrPath, whole_files, write_json, write_text
 from pam_sim.gap import find_gap
 from pam_sim.gap.data.commanded import all_commanded, commanded
-from pam_sim.gap.data.health import check_for, dead_signals, recorded_valve
+from pam_sim.gap.data.health import check_for, dead_signals
 from pam_sim.gap.data.recording import Recording
+from pam_sim.gap.data.signals import recorded_valve
 from pam_sim.gap.propose.proposal import EFFECT_FILE, MODEL_FILE
 from pam_sim.gap.select.memory import memories
 from pam_sim.gap.subsystems.simulation import free_run
@@ -223,6 +224,9 @@ def write_compare(result: 'GapResult', namespace: str, path: StrPath) -> None:
             topic = f'{prefix}/{folder}/{signal}'
             rows += [(int(t), topic, signal, float(v))
                      for t, v in zip(trace.stamp_ns, values)]
+    for signal, (stamp_ns, values) in result.inputs.items():
+        rows += [(int(t), f'{prefix}/{FOLDERS[0]}/{signal}', signal, float(v))
+                 for t, v in zip(stamp_ns, values)]
     rows.sort(key=lambda row: row[:2])
     with tempfile.TemporaryDirectory(dir=path.parent, prefix='.compare') as folder:
         with BagWriter(Path(folder) / 'compare', {'verdict': result.verdict}) as bag:

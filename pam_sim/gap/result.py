@@ -190,8 +190,9 @@ class GapResult:
         Numbers found wrong.
     calibration : list of Calibrated
         All numbers that were calibrated, for the report.
-    traces : dict of str -> Trace
-        For compare.mcap and plots; not part of gap.json.
+    traces, inputs : dict of str -> Trace, dict of str -> (numpy.ndarray, numpy.ndarray)
+        For compare.mcap and plots; not part of gap.json. Inputs are stamps [ns] and values of
+        the measured signals that drive the model.
     model_yaml : str
         The final model.
     moved : dict of str -> float
@@ -207,8 +208,9 @@ class GapResult:
     at_one_speed : bool
         Whether creep and hysteresis are a set for want of a second speed.
     subsystems : dict of str -> SubsystemVerdict
-        By ``valve``, ``muscle``, ``load`` or ``sensor``; the last two where something of
-        them is named.
+        By ``valve``, ``muscle``, ``load`` or ``sensor``; the last two where they are named.
+    not_judged : dict of str -> str
+        By ``valve`` or ``muscle``, why the recordings tell nothing of it.
     noticed : list of Notice
         What is no noise, where it makes an answer ``unknown``.
     numbers_first : dict, optional
@@ -236,6 +238,7 @@ class GapResult:
     simulations: int = 0
     remarks: list[str] = field(default_factory=list)
     traces: dict[str, Trace] = field(default_factory=dict)
+    inputs: dict[str, tuple[IntArray, FloatArray]] = field(default_factory=dict)
     model_yaml: str = ''
     moved: dict[str, float] = field(default_factory=dict)
     rivals: list[Any] = field(default_factory=list)
@@ -243,6 +246,7 @@ class GapResult:
     evidence: list[dict[str, Any]] = field(default_factory=list)
     at_one_speed: bool = False
     subsystems: dict[str, SubsystemVerdict] = field(default_factory=dict)
+    not_judged: dict[str, str] = field(default_factory=dict)
     noticed: list[Any] = field(default_factory=list)
     numbers_first: dict[str, Any] | None = None
     first_lines: list[str] = field(default_factory=list)
@@ -256,8 +260,9 @@ class GapResult:
     def text(self) -> str:
         """Return the result in lines for a person."""
         rows = [*self.first_lines, *([self.place] if self.place else []),
-                f'{self.verdict}: {self.reason}']
-        rows += [f'  {name}: {found.text()}' for name, found in self.subsystems.items()]
+                f'{self.verdict}: {self.reason}',
+                *(f'  {name}: {found.text()}' for name, found in self.subsystems.items())]
+        rows += [f'  {s}: not judged: {why}' for s, why in self.not_judged.items()]
         for name, s in self.signals.items():
             factor, unit = READABLE[name]
             rows.append(
@@ -271,6 +276,7 @@ class GapResult:
         return _finite({
             'schema': SCHEMA, 'verdict': self.verdict,
             'subsystems': {name: one.to_dict() for name, one in self.subsystems.items()},
+            'not_judged': self.not_judged,
             'proposal': self.proposal.to_dict() if self.proposal else None,
             'effects': self.effects,
             'parameters': [p.to_dict() for p in self.parameters],

@@ -128,7 +128,7 @@ def _noticed(estimator: Estimator, validation: Validation, base: Fit, materialit
     """
     criteria, recording = estimator.criteria, validation.recording
     least = max(materiality, 1.0)
-    found = [one for one in [supply_notice(
+    found = [] if recording.pressure_given else [one for one in [supply_notice(
         recording, model_of(estimator, base), validation.noise['pressure'], least)]
         if one is not None and one.is_gap(criteria)]
     if runs is None:

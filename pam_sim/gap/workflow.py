@@ -57,6 +57,9 @@ SAME_EDGES = (
     'and does not show that other steps are followed; record other steps and give them as '
     '--certify')
 
+NOT_JUDGED = {'valve': 'the record has no valve command',
+              'muscle': 'its contraction is given, and the record has no force'}
+
 
 def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
              effects: Sequence[str] | None = None, seconds: float = 120.0,
@@ -115,7 +118,8 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
         return GapResult('refused', text[:1].upper() + text[1:] + '.', remarks=remarks,
                          runtime_s=time.perf_counter() - started, model_yaml=rig.to_yaml())
     recordings = [Recording(without_dead(run), rig.valve, driven) for run in runs]
-    if (rig.valve == 'hsv' and rig.fidelity == 'averaged'
+    given = any(r.pressure_given for r in recordings)
+    if (rig.valve == 'hsv' and rig.fidelity == 'averaged' and not given
             and shows_pulses(rig, recordings, criteria)):
         rig = rig.with_(fidelity='switching')
         remarks.append('The pressure shows single pulses of the valves, so the model follows '
@@ -124,15 +128,16 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
         rig, recordings, certify is None, seed, criteria), criteria=criteria)
     progress(0.1)
     deadline = started + seconds
-    # Its valve signal alone: what was measured on it stays untouched until the validation.
+    # Its input alone: what else was measured on it stays untouched until the validation.
     held_out = (Recording(without_dead(certify), rig.valve, driven) if certify
                 else recordings[0])
     split = split_of(held_out, criteria=criteria)
     settled = {s: held_out.time_s[s] > (settling_s(held_out, s) if certify else split.unused_s(s))
                for s in held_out.signals}
-    valve = estimator.problems[0]
-    if valve.is_dealt_short:
-        remarks.append((SAME_EDGES if certify is None else SHORT_STRETCHES).format(valve.block_s))
+    first_problem = estimator.problems[0]
+    if first_problem.is_dealt_short:
+        remarks.append((SAME_EDGES if certify is None else SHORT_STRETCHES).format(
+            first_problem.block_s))
 
     def matters(found: Fit, without: Fit) -> bool:
         bare = held_without(found, without.hypothesis.names)
@@ -165,7 +170,7 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
         outcome.named, estimator, base, final, validation, certify is not None)
     if final is not first:
         validation = validated(final)
-    result = GapResult('unknown', '', remarks=remarks)
+    result = GapResult('unknown', '', remarks=remarks, not_judged=_not_judged(estimator))
     while outcome.named:
         name, final = unconfirmed(
             outcome.named, estimator, base, final, validation, certify is not None)
@@ -213,7 +218,7 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     result.where = places(
         result, outcome, estimator, validation, own_runs, final, certify is not None)
     add_place(result)
-    result.traces = validation.traces()
+    result.traces, result.inputs = validation.traces(), validation.inputs()
     result.fingerprint = fingerprint(estimator, base, final)
     result.minimum_detectable = least_sizes(outcome.screened, rig, materiality)
     result.reason = explain(result, outcome, harms)
@@ -223,3 +228,9 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     progress(1.0)
     result.runtime_s = time.perf_counter() - started
     return result
+
+
+def _not_judged(estimator: Estimator) -> dict[str, str]:
+    """Return why a subsystem is not judged, by its name."""
+    judged = {p.subsystem for p in estimator.problems}
+    return {s: why for s, why in NOT_JUDGED.items() if s not in judged}

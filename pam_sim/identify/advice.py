@@ -203,7 +203,7 @@ def _noise(offers: Sequence[Offer]) -> dict[str, float]:
     """Return the noise of each signal: as recorded, else a typical one."""
     found = dict(TYPICAL_NOISE)
     for one in offers:
-        for s in one.recording.signals:
+        for s in dict.fromkeys(('pressure', *one.recording.signals)):
             found[s] = max(noise_sd(one.recording.measured[s]), 0.1 * TYPICAL_NOISE[s])
     return found
 

@@ -22,7 +22,7 @@ from pam_sim.errors import InputError
 from pam_sim.gap.data.health import missed_pulses
 from pam_sim.gap.data.noise import noise_of
 from pam_sim.gap.data.recording import Recording
-from pam_sim.gap.data.signals import VALVE_FIELDS
+from pam_sim.gap.data.signals import tells_of
 from pam_sim.gap.subsystems.mechanics import MechanicsProblem
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.gap.subsystems.valve import ValveProblem
@@ -116,8 +116,7 @@ def offer_of(run: Run, rig: Rig, added_kg: float = 0.0) -> Offer:
         raise InputError(
             f'has no `pressure` of at least {LEAST_SAMPLES} messages; every number is found '
             'from the pressure', where)
-    command = 'valve_signal' in run and all(
-        name in run['valve_signal'].values for name in VALVE_FIELDS[rig.valve])
+    command = tells_of(run, rig.valve)
     contraction, force = (
         name in run and len(run[name]) >= LEAST_SAMPLES for name in ('contraction', 'force'))
     held = rig.is_driven or (force and _is_held(run, rig))

@@ -118,7 +118,8 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
     law = [n.name for n in acting if n.of_law]
     if law and incomplete and not force_compared:
         if len(law) == len(wanted):
-            raise InputError(f'{LAW_AND_EFFECT}; {_tells_law(problems)}', 'force law')
+            raise InputError(f'{LAW_AND_EFFECT}; record a force, or let pam gap fit both',
+                             'force law')
         found = identify_beside(
             law, runs, rig, unknown=[name for name in unknown if name not in law],
             added_kg=added_kg, seed=seed, advise=advise, progress=progress,
@@ -257,13 +258,6 @@ def _starting_values(left: Squares, names: Sequence[str]) -> list[str]:
                          for _, name, square in left)
     return [f'{", ".join(names)}: a starting value. No effect of the library explains what is '
             f'left of {rests}, and it may act alike; the interval allows for that']
-
-
-def _tells_law(problems: Sequence[SubsystemProblem]) -> str:
-    """Return what tells a force law from a missing effect; a gap needs an input of the valve."""
-    if any(p.subsystem == 'valve' for p in problems):
-        return 'record a force, or let pam gap fit both'
-    return 'record a force, or the command of the valve, so that pam gap can fit both'
 
 
 def _of_another_law(rig: Rig, left: Squares) -> list[str]:

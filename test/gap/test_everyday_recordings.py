@@ -14,18 +14,23 @@
 
 """Recordings as people have them: pulses of valves, slow logs, the muscles of a joint."""
 
-from gap_runs import NOMINAL, nominal, recorded, voltages
+from gap_runs import assert_form, NOMINAL, nominal, recorded, voltages
 import numpy as np
+from pam_actuation.bags.load import load_run
+from pam_actuation.report.gap import write_compare
 from pam_actuation.report.joint_gap import contraction_of, questions
+from pam_actuation.report.sections.gap import gap_section
 from pam_sim.effects.valve_dead_zone_gradual import mean_opening_with_lift
 from pam_sim.gap import find_gap
-from pam_sim.gap.data.commanded import commanded
+from pam_sim.gap.criteria import CRITERIA
+from pam_sim.gap.data.commanded import all_commanded, commanded
 from pam_sim.gap.data.given_motion import given_motion
-from pam_sim.gap.data.health import check_health
+from pam_sim.gap.data.health import check_for, check_health
 from pam_sim.gap.data.jumps import jump_shares
 from pam_sim.gap.data.pulses import openings, Pulses
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.split import FIT
+from pam_sim.gap.select.candidates import candidates, within_reading
 from pam_sim.gap.subsystems.pulses_seen import shows_pulses
 from pam_sim.gap.subsystems.simulation import free_run
 from pam_sim.gap.subsystems.valve import ValveProblem
@@ -138,20 +143,73 @@ def test_of_a_regulator_the_commanded_pressure_is_the_input():
     result = find_gap(without, rig, effects=[])
     assert result.verdict == 'no_gap' and result.remarks[0] == remarks[0]
     # Nothing tells when on/off valves open.
-    refused = find_gap(without, load_rig(NOMINAL, valve='hsv'))
-    assert refused.verdict == 'refused' and 'behind a regulator' in refused.reason
+    assert 'valve' in find_gap(without, load_rig(NOMINAL, valve='hsv'), effects=[]).not_judged
 
 
-def test_the_measured_pressure_stands_in_for_a_command_that_nobody_recorded():
+def without_command(run):
+    return Run({name: one for name, one in run.topics.items() if name != 'valve_signal'})
+
+
+@pytest.fixture(scope='module')
+def muscle_alone():
+    """Return the answer to two recordings of a muscle with friction, without a valve command."""
     friction = {'name': 'coulomb_friction', 'parameters': {'force_n': 2.0}}
-    run = recorded(nominal().with_(effects=[friction]), voltages(12.0))
-    without = Run({name: s for name, s in run.topics.items() if name != 'valve_signal'})
-    quick = nominal().with_(parameters={'T_m': 0.001})
-    refused = find_gap(without, quick)
-    assert refused.verdict == 'refused' and 'the measured pressure as' in refused.reason
-    stand_in = Run(without.topics | {'pressure_command': without.topics['pressure']})
-    found = find_gap(stand_in, quick, effects=['coulomb_friction']).subsystems['muscle']
-    assert (found.verdict, found.names) == ('effects', ('coulomb_friction',))
+    run, other = (without_command(recorded(nominal().with_(effects=[friction]), voltages(
+        12.0, seed), seed=seed)) for seed in (3, 4))
+    # Whatever the valve of the model is, it plays no part.
+    rig = load_rig(NOMINAL, valve='hsv')
+    return find_gap(run, rig, other, effects=['coulomb_friction', 'valve_dead_time'])
+
+
+def test_without_a_valve_command_muscle_and_load_alone_are_named_and_proved(muscle_alone):
+    assert_form(muscle_alone)
+    told = muscle_alone.to_dict()
+    assert told['not_judged'] == {'valve': 'the record has no valve command'}
+    assert list(told['subsystems']) == ['muscle'] and list(told['signals']) == [
+        'contraction', 'force']
+    assert [e['name'] for e in muscle_alone.effects] == ['coulomb_friction'], muscle_alone.reason
+    # The proof is a free run of the whole other recording, from its pressure.
+    assert told['signals']['contraction']['shrink_percent'] > 95.0
+    assert muscle_alone.traces['contraction'].measured.size > 2000
+    assert {row['subsystem'] for row in told['where']} == {'muscle'}
+    assert '  valve: not judged: the record has no valve command' in muscle_alone.text()
+
+
+def test_the_page_without_a_valve_command_shows_the_pressure_as_an_input(muscle_alone, tmp_path):
+    page = gap_section(muscle_alone).body
+    for words in ('valve: not judged: the record has no valve command', 'recorded, an input',
+                  'on the measured pressure', 'Residuals by condition'):
+        assert words in page
+    write_compare(muscle_alone, '/muscle', tmp_path / 'compare.mcap')
+    compared = load_run(tmp_path / 'compare.mcap', namespace='/muscle/measured')
+    assert len(compared['pressure']) > 2000 < len(compared['contraction'])
+
+
+def test_where_one_recording_has_no_valve_command_none_is_used():
+    run = recorded(nominal(), voltages(6.0))
+    both, certify, remarks = all_commanded([run], without_command(run), nominal())
+    assert all('valve_signal' not in one for one in (*both, certify)) and len(remarks) == 1
+    assert 'valve_signal' in run
+    result = find_gap(both, nominal(), effects=['creep', 'leakage'])
+    assert result.verdict == 'no_gap' and list(result.subsystems) == ['muscle']
+
+
+def test_of_a_given_contraction_without_force_or_command_nothing_is_left():
+    run = without_command(recorded(nominal(), voltages(6.0), topics=('pressure', 'contraction')))
+    health = check_for(run, nominal().with_(load='driven'))
+    assert 'nothing is left to compare' in health.problems[0]
+    assert check_for(run, nominal()).usable
+
+
+def test_no_zero_of_the_sensor_puts_a_given_pressure_below_the_atmosphere():
+    run = without_command(recorded(nominal(), voltages(6.0)))
+    pool = candidates(nominal(), ('contraction',), ['pressure_bias', 'pressure_gain'])
+    assert within_reading(pool, [Recording(run, 'ppr')], CRITERIA) == pool     # never empty
+    values = run.topics['pressure'].values['pressure_pa']
+    values[:100] = P_ATM_PA + 700.0
+    found = {c.effect: c for c in within_reading(pool, [Recording(run, 'ppr')], CRITERIA)}
+    assert 700.0 < found['pressure_bias'].free[0].upper < 1500.0
+    assert found['pressure_gain'] in pool
 
 
 def test_of_on_off_valves_every_pulse_is_needed():

@@ -252,7 +252,7 @@ def test_two_frictions_over_a_narrow_band_stay_together():
 
 
 def test_a_refinement_alone_is_one_to_begin_with():
-    pool = candidates(nominal(), ('contraction',))
+    pool = candidates(nominal(), ('pressure', 'contraction'))
     first, refinements = split_refinements(pool)
     assert {c.name for c in refinements} == {
         'coulomb_friction', 'pressure_friction', 'guide_friction', 'tube_lag', 'end_taper',

@@ -138,7 +138,6 @@ def test_without_a_load_cell_the_gap_is_still_measured():
 
 
 @pytest.mark.parametrize('spoil, word', [
-    (lambda run: run.topics.pop('valve_signal'), 'no input'),
     (lambda run: run.topics.pop('contraction'), 'no contraction'),
     (lambda run: run.topics['pressure'].values['pressure_pa'].__setitem__(5, np.nan), 'finite'),
     (lambda run: run.topics['contraction'].values['contraction_m'].fill(0.01), 'hardly moves'),
@@ -241,7 +240,7 @@ def test_the_folder_holds_what_others_rely_on(two_effects):
         'schema', 'verdict', 'subsystems', 'proposal', 'effects', 'parameters',
         'ambiguity_set', 'next_experiment', 'where', 'signals', 'unexplained_fraction',
         'fingerprint', 'minimum_detectable', 'runtime_s', 'simulations', 'reason',
-        'numbers_first'}
+        'numbers_first', 'not_judged'}
     assert set(found['subsystems']) == {'valve', 'muscle'}
     assert set(found['subsystems']['valve']) >= {'verdict', 'names', 'unexplained', 'unit'}
     assert set(found['signals']['pressure']) == {

@@ -15,7 +15,7 @@
 """Write what was measured as a rosbag2 directory (MCAP), with the rosbags library alone."""
 
 import numpy as np
-from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 from rosbags.typesys import get_typestore, Stores
 
 START_NS = 1_760_000_000_000_000_000
@@ -92,3 +92,24 @@ def _message(types, topic, values, signal_names):
                               velocity=none, effort=np.array(values))
     return types[_JOINTS](header=header, name=['muscle'], position=np.array(values),
                           velocity=none, effort=none)
+
+
+def copy_without(path, out, topics):
+    """
+    Write a bag again without some of its topics.
+
+    Parameters
+    ----------
+    path, out : pathlib.Path
+        The bag, and the copy, which must not exist.
+    topics : set of str
+        Last parts of the names of what is left out.
+
+    """
+    store = get_typestore(Stores.ROS2_JAZZY)
+    with Reader(path) as reader, Writer(out, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
+        kept = {c.topic: bag.add_connection(c.topic, c.msgtype, typestore=store)
+                for c in reader.connections if c.topic.rpartition('/')[2] not in topics}
+        for connection, stamp_ns, raw in reader.messages():
+            if connection.topic in kept:
+                bag.write(kept[connection.topic], stamp_ns, raw)

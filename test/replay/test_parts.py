@@ -55,6 +55,17 @@ def test_a_simulated_bag_is_reproduced_to_the_bit_by_every_part(runs, case):
     assert result.plant.to_dict()['rmse']['contraction'] < 2e-4
 
 
+@pytest.mark.parametrize('case', CASES)
+def test_without_a_command_of_the_valve_the_pressure_drives_the_plant(runs, case):
+    bare = Run({name: one for name, one in runs[case].topics.items()
+                if name not in ('valve_signal', 'pressure_command')},
+               runs[case].metadata, path=runs[case].path)
+    result = replay_run(bare, only='plant')
+    assert {d.signal for d in result.plant.differences} == {'contraction', 'force'}
+    assert result.plant.to_dict()['rmse']['contraction'] < 2e-4
+    assert 'free run on the measured pressure' in result.plant.lines()[0]
+
+
 @pytest.mark.parametrize('bag', sorted(OLDER.glob('*.mcap')), ids=lambda bag: bag.stem)
 def test_controllers_of_older_recordings_are_reproduced_to_the_bit(bag):
     """Recordings without ``held_back`` are of versions that knew nothing of their driver."""

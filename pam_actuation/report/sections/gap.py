@@ -63,7 +63,7 @@ def gap_section(result: 'GapResult', key: str = 'gap', title: str = 'Recording a
         body += table([*SIZES, 'gap closed'],
                       [_size(name, s) for name, s in result.signals.items()])
         body += paragraph(
-            'RMS difference of whole free runs of the model on the recorded valve signal, on '
+            f'RMS difference of whole free runs of the model on the {_input(result)}, on '
             'data that neither the fit nor the choice used. The noise floor is what sensor noise '
             'and stamps explain. Gap closed: of what calibrating the numbers left.', 'note')
     body += _effects(result) + _evidence(result) + _next(result, command)
@@ -75,9 +75,15 @@ def gap_section(result: 'GapResult', key: str = 'gap', title: str = 'Recording a
     return Section(key, title, body)
 
 
+def _input(result: 'GapResult') -> str:
+    return 'measured pressure' if 'valve' in result.not_judged else 'recorded valve signal'
+
+
 def _subsystems(result: 'GapResult') -> str:
     if not result.subsystems:
         return ''
+    told = ''.join(paragraph(f'{name}: not judged: {why}.')
+                   for name, why in result.not_judged.items())
     return '<h3>By subsystem</h3>' + table(
         ['subsystem', 'verdict', 'named', *SIZES, 'unexplained'],
         [[name, VERDICT_TEXT.get(one.verdict, one.verdict), ', '.join(one.names) or None,
@@ -89,7 +95,7 @@ def _subsystems(result: 'GapResult') -> str:
         'contraction, muscle and load the measured pressure. The signal is the one with the '
         'largest gap. Load and sensors stand here where something of them is named, or where '
         'the gap lives.',
-        'note') + '<h3>The whole chain</h3>'
+        'note') + told + '<h3>The whole chain</h3>'
 
 
 def size(signal: str, value: float | None) -> str | None:
@@ -201,6 +207,11 @@ def _calibration(result: 'GapResult') -> str:
 def _overlay(result: 'GapResult', max_points: int) -> dict[str, Any]:
     start = min(int(t.stamp_ns[0]) for t in result.traces.values())
     rows: list[figures.Row] = []
+    for name, (stamp_ns, values) in result.inputs.items():
+        factor, offset, _, label = SHOWN[name]
+        rows.append((label, [figures.line(
+            (stamp_ns - start) * 1e-9, (values + offset) * factor, 'recorded, an input',
+            'measured', width=1.4, max_points=max_points)]))
     for name, trace in result.traces.items():
         factor, offset, unit, label = SHOWN[name]
         time_s = (trace.stamp_ns - start) * 1e-9

@@ -25,7 +25,7 @@ from pam_actuation.report.sections.replay import SHOWN
 from pam_sim.gap.report.fingerprint import CONDITIONS, conditions_of, MOTIONS
 
 if TYPE_CHECKING:
-    from pam_sim.annotations import FloatArray
+    from pam_sim.annotations import FloatArray, IntArray
     from pam_sim.gap.result import GapResult, Trace
 
 COLOURS = dict(zip(MOTIONS, ('simulated', 'residual', 'after')))
@@ -70,7 +70,7 @@ def _closed(result: 'GapResult') -> set[str]:
 
 def coloured_part(result: 'GapResult') -> str:
     """Return residuals of the proof over pressure and contraction, coloured by direction."""
-    if not {'pressure', 'contraction'} <= set(result.traces):
+    if not {'pressure', 'contraction'} <= set(_measured(result)):
         return ''
     body = '<h3>Residuals by condition</h3>'
     for abscissa in ('pressure', 'contraction'):
@@ -92,21 +92,26 @@ def _at(result: 'GapResult', trace: 'Trace', name: str, abscissa: str
         ) -> 'tuple[FloatArray, FloatArray]':
     """Return (abscissa as shown, -1, 0 or 1 by motion) at the stamps of a trace."""
     factor, offset, _, _ = SHOWN[abscissa]
-    recording = _Measured(result.traces)
+    measured = _measured(result)
+    recording = _Measured(measured)
     motion = conditions_of(recording, 'valve' if name == 'pressure' else 'muscle', (
         trace.stamp_ns - recording.start_ns) * 1e-9)['motion']
-    other = result.traces[abscissa]
-    value = np.interp(trace.stamp_ns, other.stamp_ns, other.measured)
+    value = np.interp(trace.stamp_ns, *measured[abscissa])
     return (value + offset) * factor, motion
 
 
-class _Measured:
-    """What :func:`conditions_of` reads of a recording, from the traces of a result."""
+def _measured(result: 'GapResult') -> 'dict[str, tuple[IntArray, FloatArray]]':
+    """Return stamps [ns] and values of all measured signals."""
+    return {s: (t.stamp_ns, t.measured) for s, t in result.traces.items()} | result.inputs
 
-    def __init__(self, traces: 'Mapping[str, Trace]') -> None:
-        self.start_ns = min(int(t.stamp_ns[0]) for t in traces.values())
+
+class _Measured:
+    """What :func:`conditions_of` reads of a recording, from stamps [ns] and values by signal."""
+
+    def __init__(self, signals: 'Mapping[str, tuple[IntArray, FloatArray]]') -> None:
+        self.start_ns = min(int(stamp_ns[0]) for stamp_ns, _ in signals.values())
         self.time_s: Mapping[str, FloatArray] = {
-            s: (t.stamp_ns - self.start_ns) * 1e-9 for s, t in traces.items()}
-        self.measured: Mapping[str, FloatArray] = {s: t.measured for s, t in traces.items()}
+            s: (stamp_ns - self.start_ns) * 1e-9 for s, (stamp_ns, _) in signals.items()}
+        self.measured: Mapping[str, FloatArray] = {s: y for s, (_, y) in signals.items()}
         end = max(float(t[-1]) for t in self.time_s.values())
         self.grid_s = np.arange(0.0, end, 1e-3)

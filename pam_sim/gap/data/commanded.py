@@ -12,13 +12,18 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The pressure command of a regulator as its valve signal, where nobody recorded that signal."""
+"""
+What the valve was told, where nobody recorded its signal: a pressure command, or nothing.
+
+The pressure command of a regulator becomes its valve signal. Where a recording tells nothing of
+the valve, muscle and load are compared alone.
+"""
 
 from collections.abc import Sequence
 import copy
 
 import numpy as np
-from pam_sim.gap.data.signals import FIELD, VALVE_FIELDS
+from pam_sim.gap.data.signals import FIELD, recorded_valve, VALVE_FIELDS
 from pam_sim.rig import Rig
 from pam_sim.run import Run, Series
 from pam_sim.units import P_ATM_PA
@@ -27,6 +32,8 @@ from pam_sim.valve.ppr import voltage_v
 COMMAND = 'pressure_command'
 TAKEN = ('The recording has no valve signal, so the pressure command is taken for the input of a '
          'pressure regulator, at {:.4g} kPa/V.')
+UNUSED = ('Some of the recordings tell nothing of the valve, so its signal is not used in the '
+          'others either.')
 
 
 def commanded(runs: Sequence[Run], rig: Rig) -> tuple[list[Run], list[str]]:
@@ -51,8 +58,16 @@ def commanded(runs: Sequence[Run], rig: Rig) -> tuple[list[Run], list[str]]:
 
 def all_commanded(runs: Sequence[Run], certify: Run | None, rig: Rig
                   ) -> tuple[list[Run], Run | None, list[str]]:
-    """Return (runs, certify, remarks): the same for a question with or without a proof."""
+    """
+    Return (runs, certify, remarks): the same for a question with or without a proof.
+
+    All of them are driven alike: where one has no command of the valve, that of the others is
+    left out.
+    """
     every, remarks = commanded([*runs, *([certify] if certify is not None else [])], rig)
+    has_signal = [bool(recorded_valve(run)) for run in every]
+    if any(has_signal) and not all(has_signal):
+        every, remarks = [_without_signal(run) for run in every], [UNUSED]
     return every[:len(runs)], None if certify is None else every[-1], remarks
 
 
@@ -71,4 +86,11 @@ def _with_signal(run: Run, rig: Rig) -> Run:
     found = copy.copy(run)
     found.topics = run.topics | {'valve_signal': Series(
         command.stamp_ns, {name: volts}, {name: 'V'}, command.start_ns)}
+    return found
+
+
+def _without_signal(run: Run) -> Run:
+    found = copy.copy(run)
+    found.topics = {name: series for name, series in run.topics.items()
+                    if name not in ('valve_signal', COMMAND)}
     return found

@@ -19,14 +19,15 @@ from dataclasses import dataclass, field
 import numpy as np
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.gap.criteria import CRITERIA, Criteria
-from pam_sim.gap.data.commanded import COMMAND
-from pam_sim.gap.data.signals import FIELD, READABLE, SIGNALS, VALVE_FIELDS
+from pam_sim.gap.data.signals import FIELD, READABLE, recorded_valve, SIGNALS
 from pam_sim.rig import Rig
 from pam_sim.run import Run
 from pam_sim.valve.ppr import MAX_VOLTAGE_V
 
 HOLE_PERIODS = 3.0           # of a slow log, from which on messages are missing
 OPTIONAL = ('force',)        # signals without which a comparison is possible
+ALONE = ('the recording has no command of the valve, so the measured pressure drives muscle and '
+         'load, and the valve is not judged')
 
 
 @dataclass
@@ -35,7 +36,8 @@ class Health:
     Outcome of the check.
 
     ``problems`` forbid a comparison, ``remarks`` weaken it; both are sentences. ``signals`` are
-    those that are compared, ``dead`` those whose sensor gives nothing.
+    those that are compared, ``dead`` those whose sensor gives nothing. Without a ``valve`` muscle
+    and load are compared alone.
     """
 
     problems: list[str] = field(default_factory=list)
@@ -82,10 +84,7 @@ def check_health(run: Run, valve: str, criteria: Criteria = CRITERIA,
     """
     health = Health()
     health.valve = recorded_valve(run)
-    if not health.valve:
-        health.problems.append(_no_input(run, valve))
-        return health
-    if health.valve != valve:
+    if health.valve and health.valve != valve:
         health.problems.append(
             f'the recording is of a rig with valve {health.valve}, the model has {valve}')
         return health
@@ -97,36 +96,33 @@ def check_health(run: Run, valve: str, criteria: Criteria = CRITERIA,
     health.dead = dead_signals(run)
     health.signals = tuple(s for s in SIGNALS if s in run and FIELD[s] in run.topics[s].values
                            and s not in health.dead)
+    health.remarks += [] if health.valve else [ALONE]
     health.remarks += [_dead(run, s) for s in health.dead]
     for needed in ('pressure', 'contraction'):
         if needed not in health.signals:
             health.problems.append(f'the recording has no {needed}')
-    if 'force' not in health.signals:
+    if driven and not health.valve and 'force' not in health.signals:
+        health.problems.append(
+            'the recording has neither a command of the valve nor a force, and the contraction is '
+            'given, so nothing is left to compare; record the force of the tendon, or the command')
+    elif 'force' not in health.signals:
         health.remarks.append(
             'without a load cell, nothing tells of a muscle whose contraction is given, so only '
             'its valve is compared; record the force of its tendon' if driven else
             'without a load cell, errors of the force map and of the load look alike')
     if health.usable:
         _check_duration(run, health, criteria)
-        for topic in health.signals + ('valve_signal',):
+        for topic in _compared(health):
             _check_stamps(run, topic, health, criteria)
         _check_motion(run, health, criteria)
-        _check_saturation(run, health, criteria, highest_v)
+        if health.valve:
+            _check_saturation(run, health, criteria, highest_v)
     return health
 
 
-def _no_input(run: Run, valve: str) -> str:
-    """Return the sentence on a recording that does not tell what the valve was given."""
-    if valve == 'ppr':
-        return ('the recording has neither a valve_signal with ppr_voltage nor a '
-                'pressure_command, so the model has no input; to compare muscle and load alone, '
-                'import the measured pressure as pressure_command too')
-    if COMMAND in run:
-        return ('the recording has a pressure_command and no valve_signal; it can be followed '
-                'behind a regulator (a model with valve ppr), while on/off valves need fill_duty '
-                'and vent_duty')
-    return ('the recording has no valve_signal with fill_duty and vent_duty, so the model has no '
-            'input')
+def _compared(health: Health) -> tuple[str, ...]:
+    """Return the topics that a comparison needs."""
+    return health.signals + (('valve_signal',) if health.valve else ())
 
 
 def dead_signals(run: Run) -> tuple[str, ...]:
@@ -159,17 +155,8 @@ def _dead(run: Run, signal: str) -> str:
             'connected, so it is not used')
 
 
-def recorded_valve(run: Run) -> str:
-    """Return ``ppr``, ``hsv`` or '' by what the valve signal of the run is named."""
-    if 'valve_signal' in run:
-        for valve, names in VALVE_FIELDS.items():
-            if all(name in run.topics['valve_signal'].values for name in names):
-                return valve
-    return ''
-
-
 def _check_duration(run: Run, health: Health, criteria: Criteria) -> None:
-    stamps = [run.topics[s].stamp_ns for s in health.signals + ('valve_signal',)]
+    stamps = [run.topics[s].stamp_ns for s in _compared(health)]
     common = (min(int(np.max(s)) for s in stamps) - max(int(np.min(s)) for s in stamps)) * 1e-9
     if common < criteria.min_duration_s:
         health.problems.append(

@@ -24,7 +24,7 @@ from pam_sim.gap.data.given_motion import given_motion
 from pam_sim.gap.data.jumps import jump_shares
 from pam_sim.gap.data.noise import SLOW_S
 from pam_sim.gap.data.pulses import openings, Pulses
-from pam_sim.gap.data.signals import FIELD, SIGNALS, VALVE_FIELDS
+from pam_sim.gap.data.signals import FIELD, SIGNALS, tells_of, VALVE_FIELDS
 from pam_sim.response import Response
 from pam_sim.run import Run, Series
 from pam_sim.units import P_ATM_PA
@@ -72,6 +72,8 @@ class Recording:
     ----------
     signals : tuple of str
         Recorded output signals.
+    pressure_given : bool
+        The measured pressure is an input of the model, no output: there is no valve signal.
     stamp_ns, time_s, measured : dict of str -> numpy.ndarray
         Stamps, seconds since the start and values of each signal, between start and end.
     start_ns : int
@@ -91,8 +93,10 @@ class Recording:
         self.valve = valve
         self.driven = driven
         known = tuple(s for s in SIGNALS if s in run and FIELD[s] in run.topics[s].values)
-        self.signals = tuple(s for s in known if not (driven and s == 'contraction'))
-        command = run.topics.get('valve_signal')
+        command = run.topics['valve_signal'] if tells_of(run, valve) else None
+        self.pressure_given = command is None
+        given = {'pressure': self.pressure_given, 'contraction': driven}
+        self.signals = tuple(s for s in known if not given.get(s))
         used = [run.topics[s].stamp_ns for s in known]
         used += [] if command is None else [command.stamp_ns]
         self.start_ns = max(int(np.min(s)) for s in used)

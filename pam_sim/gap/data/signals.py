@@ -14,9 +14,22 @@
 
 """The recorded signals: names, fields of a run, units."""
 
+from pam_sim.run import Run
+
 SIGNALS = ('pressure', 'contraction', 'force')
 FIELD = {'pressure': 'pressure_pa', 'contraction': 'contraction_m', 'force': 'force_n'}
 UNIT = {'pressure': 'Pa', 'contraction': 'm', 'force': 'N'}
 # For people: factor from SI and unit.
 READABLE = {'pressure': (1e-3, 'kPa'), 'contraction': (1e3, 'mm'), 'force': (1.0, 'N')}
 VALVE_FIELDS = {'ppr': ('ppr_voltage',), 'hsv': ('fill_duty', 'vent_duty')}
+
+
+def recorded_valve(run: Run) -> str:
+    """Return ``ppr``, ``hsv`` or '' by what the valve signal of the run is named."""
+    return next((valve for valve in VALVE_FIELDS if tells_of(run, valve)), '')
+
+
+def tells_of(run: Run, valve: str) -> bool:
+    """Return whether a run holds the signal of a valve."""
+    return 'valve_signal' in run and all(
+        name in run.topics['valve_signal'].values for name in VALVE_FIELDS[valve])

@@ -39,7 +39,7 @@ def supply_scatter(recording: Recording) -> tuple[float, float, float] | None:
     The first two are standard deviations of means over a second. None where it is not recorded
     or the recording is too short.
     """
-    if recording.supply is None or recording.valve != 'hsv':
+    if recording.supply is None or recording.valve != 'hsv' or recording.pressure_given:
         return None
     time_s, values = recording.supply
     if time_s.size < LEAST_MEANS:

@@ -52,6 +52,8 @@ def ranges_of(recordings: Sequence[Recording], estimator: Estimator, found: Fit
         add('v', v)
         if 'force' in r.signals:
             add('F', r.measured['force'])
+        if r.pressure_given:
+            continue
         signal = r.valve_signal()
         if rig.valve == 'ppr':
             aim = rig.parameters['K_m'] * np.clip(signal, 0.0, None)

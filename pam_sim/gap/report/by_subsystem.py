@@ -110,15 +110,16 @@ def _names(result: GapResult, named: list[NamedEffect]) -> dict[str, tuple[str, 
 def _own(s: str, names: tuple[str, ...], gaps: Mapping[str, Mapping[str, SignalGap]]
          ) -> dict[str, SignalGap]:
     """Return the gaps that tell of a subsystem; of sensors, those of the signals they read."""
+    of_valve = dict(gaps.get('valve', {}))
     if s == 'valve':
-        return dict(gaps['valve'])
+        return of_valve
     of_muscle = dict(gaps.get('muscle', {}))
     if s != 'sensor':
         return of_muscle
     # A zero of a sensor is a number of the rig that begins with the signal.
     read = {get_effect(n).fitting.sensor_signal if n in effects() else n.split('_')[0]
             for n in names}
-    return {signal: gap for signal, gap in {**of_muscle, **gaps['valve']}.items()
+    return {signal: gap for signal, gap in {**of_muscle, **of_valve}.items()
             if signal in read} or of_muscle
 
 

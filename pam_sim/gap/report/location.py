@@ -83,6 +83,9 @@ def locate(rig: Rig, recording: Recording, simulated: Mapping[str, FloatArray],
             parts = {only[signal]: 1.0}
         elif signal == 'pressure':
             parts = {'valve': 1.0}
+        elif recording.pressure_given:
+            parts = {'muscle': 1.0} if muscle_share is None else {
+                'muscle': muscle_share, 'load': 1.0 - muscle_share}
         else:
             parts = _split(residual, by_pressure[signal] - recording.measured[signal],
                            floor[signal], muscle_share, rig.load)

@@ -37,6 +37,10 @@ def explain(result: GapResult, outcome: Outcome, harms: Iterable[Harm] = ()) -> 
 
 
 def _told(result: GapResult, outcome: Outcome) -> str:
+    if result.verdict == 'no_gap' and 'valve' in result.not_judged:
+        return 'Muscle and load of the model, driven by the measured pressure, follow the ' \
+            'recording within sensor noise and stamps, their numbers calibrated within their ' \
+            'tolerance.'
     if result.verdict == 'no_gap' and tuple(result.signals) == ('pressure',):
         return 'The valve of the model follows the recorded pressure within sensor noise and ' \
             'stamps, its numbers calibrated within their tolerance. The muscle was not compared.'

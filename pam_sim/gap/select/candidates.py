@@ -20,10 +20,19 @@ name of that effect. What is fitted of each, from where and how far, is declared
 """
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+import math
 
 from pam_sim.effects.registry import effects, get_effect
+from pam_sim.gap.criteria import Criteria
+from pam_sim.gap.data.means import means_of
+from pam_sim.gap.data.noise import noise_of
+from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.fit.candidate import Candidate
 from pam_sim.rig import Rig
+from pam_sim.units import P_ATM_PA
+
+LOWEST_S = 0.1               # of the means of which the lowest counts
 
 
 def is_limit(simple: str, name: str) -> bool:
@@ -74,10 +83,52 @@ def candidates(rig: Rig, outputs: Sequence[str], only: Iterable[str] | None = No
             continue
         if effect.subsystem == 'load' and rig.is_driven:
             continue
-        if effect.subsystem == 'sensor' and effect.fitting.sensor_signal not in outputs:
+        if effect.subsystem == 'valve' and 'pressure' not in outputs:
+            continue
+        # The pressure is compared, or it drives muscle and load.
+        if effect.subsystem == 'sensor' and effect.fitting.sensor_signal not in (
+                'pressure', *outputs):
             continue
         found.append(candidate)
     return found
+
+
+def within_reading(pool: Iterable[Candidate], recordings: Sequence[Recording], criteria: Criteria
+                   ) -> list[Candidate]:
+    """
+    Return candidates of which none puts a given pressure below that of the atmosphere.
+
+    A zero of the sensor looks like a threshold pressure in muscle and load. A reading of an empty
+    muscle tells them apart: the sensor reads no more there than its zero.
+
+    Parameters
+    ----------
+    pool : list of Candidate
+        What may be added.
+    recordings : list of Recording
+        That are searched.
+    criteria : Criteria
+        Decision thresholds.
+
+    """
+    highest_pa = min((_lowest_pa(r, criteria) for r in recordings if r.pressure_given),
+                     default=math.inf)
+    found = []
+    for c in pool:
+        fitting = get_effect(c.effect).fitting
+        if (fitting.sensor_signal, fitting.sensor_change) == ('pressure', 'bias'):
+            c = replace(c, free=tuple(replace(f, upper=max(min(f.upper, highest_pa), f.lower))
+                                      for f in c.free))
+        found.append(c)
+    return found
+
+
+def _lowest_pa(recording: Recording, criteria: Criteria) -> float:
+    """Return the lowest reading of the pressure, above the atmosphere and with its noise."""
+    time_s, values = recording.time_s['pressure'], recording.measured['pressure']
+    noise = noise_of(time_s, values)
+    return (float(means_of(values, time_s, LOWEST_S).min()) - P_ATM_PA
+            + criteria.hint_sd * noise.sd)
 
 
 def relatives(rig: Rig, outputs: Sequence[str], name: str) -> list[Candidate]:

@@ -24,7 +24,7 @@ from pam_sim.gap.data.supply import supply_stands
 from pam_sim.gap.fit.candidate import Candidate
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit
-from pam_sim.gap.select.candidates import candidates, split_refinements
+from pam_sim.gap.select.candidates import candidates, split_refinements, within_reading
 from pam_sim.gap.select.comparison import gap
 from pam_sim.gap.select.ranking import Ranking
 from pam_sim.gap.select.rival import Rival
@@ -129,8 +129,10 @@ def context_of(estimator: Estimator, seen_gap: float, least_gap: float,
 
     """
     outputs: tuple[str, ...] = sum((problem.signals for problem in estimator.problems), ())
-    pool = candidates(estimator.rig, outputs, only)
-    if supply_stands(estimator.problems[0].recordings, estimator.criteria):
+    recordings = estimator.problems[0].recordings
+    pool = within_reading(
+        candidates(estimator.rig, outputs, only), recordings, estimator.criteria)
+    if supply_stands(recordings, estimator.criteria):
         pool = [c for c in pool if 'supply' not in get_effect(c.effect).hooks]
     base = estimator.base
     screened = screen(estimator, base, split_refinements(pool)[0])

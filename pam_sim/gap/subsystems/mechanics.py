@@ -25,8 +25,7 @@ from pam_sim.gap.data.recording import GRID_S, Recording, smoothed
 from pam_sim.gap.subsystems.effects import sensor_changes, SensorChanges, true_value, undone
 from pam_sim.gap.subsystems.known import Known, known_numbers, of_run, SKEW_MAX_S, SKEW_SD_S
 from pam_sim.gap.subsystems.problem import KEPT, SubsystemProblem
-from pam_sim.gap.subsystems.simulation import (
-    FAST_GAIN_PA_PER_V, FAST_T_S, pressure_driven, simulate_driven)
+from pam_sim.gap.subsystems.simulation import pressure_driven, pressure_input, simulate_driven
 from pam_sim.response import Response
 from pam_sim.rig import Rig
 from pam_sim.units import P_ATM_PA
@@ -102,10 +101,6 @@ class MechanicsProblem(SubsystemProblem):
     def _command_of(self, index: int, skew_s: float, changes: SensorChanges) -> FloatArray:
         """Return the voltage at which the stand-in for the valve gives the measured pressure."""
         recording = self.recordings[index]
-        time_s, rate = recording.time_s['pressure'], self._pressure[index][1]
-        p = undone('pressure', changes,
-                   recording.measured['pressure'] + self._noise_pa[index], rate)
-        # Midpoint of each step, ahead by the lag of the regulator that stands in for the valve.
-        at = recording.grid_s[:-1] + 0.5 * GRID_S + FAST_T_S - skew_s
-        command = (np.interp(at, time_s, p) - P_ATM_PA) / FAST_GAIN_PA_PER_V
-        return np.clip(command, 0.0, 6.0)
+        reading = recording.measured['pressure'] + self._noise_pa[index]
+        p = undone('pressure', changes, reading, self._pressure[index][1])
+        return pressure_input(recording, p, skew_s)

@@ -17,7 +17,8 @@ The subsystem problems that recordings allow.
 
 The valve gets the valve signal and the measured contraction and gives pressure; muscle and
 load get the measured pressure and give contraction and force. What is missing in one
-subsystem then leaves no trace in the other.
+subsystem then leaves no trace in the other. Without a valve signal, muscle and load are all
+there is.
 """
 
 from collections.abc import Sequence
@@ -33,8 +34,9 @@ from pam_sim.rig import Rig
 def subsystem_problems(rig: Rig, recordings: Sequence[Recording], holds_certify: bool = True,
                        seed: int = 0, criteria: Criteria = CRITERIA) -> list[SubsystemProblem]:
     """Return the subsystems that these recordings allow, the valve first."""
-    found: list[SubsystemProblem] = [
-        ValveProblem(rig, recordings, holds_certify, seed, criteria)]
+    found: list[SubsystemProblem] = []
+    if not any(r.pressure_given for r in recordings):
+        found.append(ValveProblem(rig, recordings, holds_certify, seed, criteria))
     if any(MechanicsProblem.outputs(r) for r in recordings):
         found.append(MechanicsProblem(rig, recordings, holds_certify, seed, criteria))
     return found

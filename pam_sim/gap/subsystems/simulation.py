@@ -15,6 +15,9 @@
 """
 The model on the recorded valve signal, or on the measured pressure.
 
+The measured pressure is the input where a recording has no valve signal, and where muscle and load
+are looked at alone.
+
 The valve signal holds between its header stamps. On the physics grid each step gets the
 mean of the held signal over the step, so that a shift of the whole signal acts smoothly.
 """
@@ -24,8 +27,8 @@ from collections.abc import Mapping
 import numpy as np
 from pam_sim.annotations import FloatArray
 from pam_sim.effects.registry import get_effect
-from pam_sim.gap.data.recording import GRID_S, Recording
-from pam_sim.gap.subsystems.effects import true_value
+from pam_sim.gap.data.recording import GRID_S, Recording, smoothed
+from pam_sim.gap.subsystems.effects import sensor_changes, true_value, undone
 from pam_sim.gap.subsystems.pulses import on_openings, pulses_of
 from pam_sim.response import Response
 from pam_sim.rig import Rig
@@ -35,15 +38,18 @@ from pam_sim.valve.ppr import MAX_VOLTAGE_V
 # Feeding a measured pressure: a regulator this fast follows it exactly enough.
 FAST_T_S = 0.001
 FAST_GAIN_PA_PER_V = 200e3   # so that 6 V reach 1.2 MPa gauge
+HIGHEST_INPUT_V = 6.0
 
 
 def free_run(rig: Rig, recording: Recording, delay_s: float = 0.0,
              stamp_shift_s: FloatArray | None = None, start_error_pa: float = 0.0,
-             late_s: Mapping[str, float] | None = None) -> dict[str, FloatArray]:
+             late_s: Mapping[str, float] | None = None,
+             pressure_noise_pa: float | FloatArray = 0.0) -> dict[str, FloatArray]:
     """
     Return the model's outputs at the measured stamps, by signal name.
 
-    The run starts from the recorded pressure and contraction.
+    The run starts from the recorded pressure and contraction. Where the pressure is given, it
+    is the input.
 
     Parameters
     ----------
@@ -58,8 +64,14 @@ def free_run(rig: Rig, recording: Recording, delay_s: float = 0.0,
         the error of its start.
     late_s : dict of str -> float, optional
         By how much the stamps of a signal are late.
+    pressure_noise_pa : float or numpy.ndarray
+        Added to the measured pressure where that is the input.
 
     """
+    if recording.pressure_given:
+        return recording.at_stamps(simulate(
+            pressure_driven(rig), recording, pressure_input(recording, read_pressure(
+                recording, rig, pressure_noise_pa))), late_s)
     signal = recording.valve_signal(delay_s, stamp_shift_s, pulses_of(rig))
     return recording.at_stamps(
         simulate(on_openings(rig), recording, signal, start_error_pa), late_s)
@@ -73,7 +85,8 @@ def run_from_pressure(rig: Rig, recording: Recording) -> dict[str, FloatArray]:
     load remain; valve effects of the model are left out.
     """
     return recording.at_stamps(simulate(
-        pressure_driven(rig), recording, _fast_command(recording)))
+        pressure_driven(rig), recording,
+        pressure_input(recording, recording.measured['pressure'])))
 
 
 def simulate_driven(rig: Rig, recording: Recording, contraction_m: FloatArray,
@@ -87,19 +100,44 @@ def simulate_driven(rig: Rig, recording: Recording, contraction_m: FloatArray,
     ``start_pa``, by default the recorded pressure.
     """
     if valve_signal is None:
-        valve_signal = _fast_command(recording)
+        valve_signal = pressure_input(recording, recording.measured['pressure'])
     start_pa = recording.start('pressure') if start_pa is None else start_pa
     return rig.with_(load='driven').simulate(
         valve_signal, contraction_m=np.maximum(contraction_m, 0.0),
         initial_pressure_pa=max(start_pa, P_ATM_PA), dt_s=GRID_S)
 
 
-def _fast_command(recording: Recording) -> FloatArray:
-    """Return the voltage at which the fast regulator gives the measured pressure."""
+def pressure_input(recording: Recording, pressure_pa: FloatArray, skew_s: float = 0.0
+                   ) -> FloatArray:
+    """
+    Return the voltage at which the fast regulator gives a pressure.
+
+    Parameters
+    ----------
+    recording : Recording
+        Its grid, and the stamps of its pressure.
+    pressure_pa : numpy.ndarray
+        At these stamps.
+    skew_s : float
+        By how much they are early.
+
+    """
     # Midpoint of each step, ahead by the lag of the regulator.
-    wanted = np.interp(recording.grid_s[:-1] + 0.5 * GRID_S + FAST_T_S,
-                       recording.time_s['pressure'], recording.measured['pressure'])
-    return (wanted - P_ATM_PA) / FAST_GAIN_PA_PER_V
+    at = recording.grid_s[:-1] + 0.5 * GRID_S + FAST_T_S - skew_s
+    wanted = np.interp(at, recording.time_s['pressure'], pressure_pa)
+    return np.clip((wanted - P_ATM_PA) / FAST_GAIN_PA_PER_V, 0.0, HIGHEST_INPUT_V)
+
+
+def read_pressure(recording: Recording, rig: Rig, noise_pa: float | FloatArray = 0.0
+                  ) -> FloatArray:
+    """Return what the measured pressure means by the sensor of a rig, at its stamps [Pa]."""
+    reading = recording.measured['pressure'] + noise_pa
+    changes = sensor_changes('pressure', rig)
+    if changes == (None, None, None):
+        return reading
+    rate = np.interp(recording.time_s['pressure'], recording.grid_s,
+                     smoothed(recording, 'pressure')[1])
+    return undone('pressure', changes, reading, rate)
 
 
 def pressure_driven(rig: Rig) -> Rig:

@@ -67,9 +67,9 @@ def late_by(measurement: Mapping[str, float]) -> dict[str, float]:
 
 
 def free_run_of(estimator: Estimator, found: Fit, recording: Recording,
-                start_error_pa: float = 0.0, stamp_shift_s: FloatArray | None = None
-                ) -> dict[str, FloatArray]:
+                start_error_pa: float = 0.0, stamp_shift_s: FloatArray | None = None,
+                pressure_noise_pa: float | FloatArray = 0.0) -> dict[str, FloatArray]:
     """Return the whole-chain free run of a fit at the stamps of a recording, by signal."""
     _, measurement = numbers_of(estimator, found)
-    return free_run(model_of(estimator, found), recording, measurement['latency'],
-                    stamp_shift_s, start_error_pa, late_by(measurement))
+    return free_run(model_of(estimator, found), recording, measurement.get('latency', 0.0),
+                    stamp_shift_s, start_error_pa, late_by(measurement), pressure_noise_pa)

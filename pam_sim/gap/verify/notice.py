@@ -288,8 +288,11 @@ def stamp_sd_s(recording: Recording) -> float:
     """
     Return the standard deviation [s] of the stamps of the valve signal.
 
-    Not more than by how much they scatter about even ones, as those of a loop are.
+    Not more than by how much they scatter about even ones, as those of a loop are. ``STAMP_SD_S``
+    where there is none.
     """
+    if recording.pressure_given:
+        return STAMP_SD_S
     steps = np.diff(recording.valve_stamps_s)
     usual = float(np.median(steps))
     # Of a difference of two; the median is blind to messages that are missing.

@@ -16,14 +16,14 @@
 The validation: whole-chain free runs on data that neither fit nor ranking has seen.
 
 The given model, the same with its numbers calibrated, and the final one run on the
-recorded valve signal alone.
+recorded valve signal alone, or, where nobody recorded it, on the measured pressure.
 """
 
 from collections.abc import Iterable, Mapping
 import math
 
 import numpy as np
-from pam_sim.annotations import FloatArray
+from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.gap.data.noise import (
     autocorrelation_time, noise_of, sensor_floor, STAMP_SD_S)
 from pam_sim.gap.data.recording import Recording, START_S
@@ -80,7 +80,8 @@ class Validation:
         Numbers calibrated alone, and the final model.
     seed : int
         Of the draws that carry stamp errors of the valve signal, and the error of the pressure
-        that a run of its own starts from, into the floor.
+        that a run of its own starts from, into the floor; or the noise of a pressure that is
+        given.
 
     """
 
@@ -103,11 +104,13 @@ class Validation:
         self.floor, self.highest_floor = self._floors()
 
     def run(self, found: Fit, whole: bool, stamp_shift_s: FloatArray | None = None,
-            start_error_pa: float = 0.0) -> dict[str, FloatArray]:
+            start_error_pa: float = 0.0, pressure_noise_pa: float | FloatArray = 0.0
+            ) -> dict[str, FloatArray]:
         """Return the free run of a fit at the stamps, by signal."""
         _, measurement = numbers_of(self.estimator, found)
         start = start_error_pa if whole else measurement.get('start_error', 0.0)
-        run = free_run_of(self.estimator, found, self.recording, start, stamp_shift_s)
+        run = free_run_of(self.estimator, found, self.recording, start, stamp_shift_s,
+                          pressure_noise_pa)
         return self._aligned(run, late_by(measurement)) if whole else run
 
     def _aligned(self, run: Mapping[str, FloatArray], late_s: Mapping[str, float]
@@ -143,6 +146,12 @@ class Validation:
         r = self.recording
         return {s: Trace(r.stamp_ns[s], r.measured[s], self.before[s], self.refit[s],
                          self.after[s]) for s in r.signals}
+
+    def inputs(self) -> dict[str, tuple[IntArray, FloatArray]]:
+        """Return stamps [ns] and values of the measured signals that drive the model."""
+        r = self.recording
+        return {s: (stamp_ns, r.measured[s]) for s, stamp_ns in r.stamp_ns.items()
+                if s not in r.signals}
 
     def floor_with(self, stamp_sd_s: float) -> dict[str, float]:
         """Return the noise floors where the stamps scatter by so much [s], by signal."""
@@ -237,13 +246,18 @@ class Validation:
         return float(np.sqrt(np.mean(error ** 2)))
 
     def _drift(self, final: Fit, whole: bool, seed: int) -> list[dict[str, FloatArray]]:
-        """Return by signal, for some draws, how far stamps and the start move the final run."""
+        """Return by signal, for some draws, how far errors of the input move the final run."""
         random, r = np.random.default_rng(seed), self.recording
         found: list[dict[str, FloatArray]] = []
         start_sd = start_error_sd(r)
+        noise = noise_of(r.time_s['pressure'], r.measured['pressure'])
         for _ in range(INPUT_DRAWS):
-            shift = r.stamp_sd_s(STAMP_SD_S) * random.standard_normal(r.messages)
-            moved = self.run(final, whole, shift, start_sd * random.standard_normal())
+            if r.pressure_given:
+                moved = self.run(final, whole, pressure_noise_pa=noise.draw(
+                    r.time_s['pressure'], random))
+            else:
+                shift = r.stamp_sd_s(STAMP_SD_S) * random.standard_normal(r.messages)
+                moved = self.run(final, whole, shift, start_sd * random.standard_normal())
             self.simulations += 1
             found.append({s: moved[s] - self.after[s] for s in r.signals})
         return found
