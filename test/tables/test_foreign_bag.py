@@ -19,6 +19,7 @@ from pam_actuation.bags.load import load_run
 from pam_actuation.cli.main import main
 from pam_sim.units import P_ATM_PA
 import pytest
+from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import Writer
 from rosbags.typesys import get_typestore, Stores
 
@@ -153,3 +154,24 @@ def test_joints_that_change_places_are_told_by_their_names(tmp_path, capsys):
     contraction = load_run(out)['contraction']
     assert contraction.stamp_ns.tolist() == (START_NS + STEP_NS * np.arange(ROWS)).tolist()
     np.testing.assert_allclose(contraction['contraction_m'], 0.412 - LENGTH_M, atol=1e-9)
+
+
+def test_a_bag_of_ros_1(tmp_path, capsys):
+    store, bag = get_typestore(Stores.ROS1_NOETIC), tmp_path / 'old.bag'
+    number = store.types['std_msgs/msg/Float64']
+    with Ros1Writer(bag) as writer:
+        for topic, values in (('/pam/pressure_kpa', 1e-3 * PRESSURE_PA),
+                              ('/pam/position_mm', 1e3 * (0.412 - LENGTH_M))):
+            connection = writer.add_connection(topic, number.__msgtype__, typestore=store)
+            for row, value in enumerate(values):
+                writer.write(connection, START_NS + row * STEP_NS, store.serialize_ros1(
+                    number(data=float(value)), number.__msgtype__))
+    out = str(tmp_path / 'bag')
+    assert main(['import', str(bag), '--out', out]) == 0
+    run = load_run(out)
+    np.testing.assert_allclose(run['pressure']['pressure_pa'], P_ATM_PA + PRESSURE_PA, atol=1e-6)
+    np.testing.assert_allclose(run['contraction']['contraction_m'], 0.412 - LENGTH_M, atol=1e-9)
+    bag.write_bytes(bag.read_bytes()[:2000])
+    capsys.readouterr()
+    assert main(['import', str(bag), '--preview']) == 2
+    assert 'is no readable bag' in capsys.readouterr().err
