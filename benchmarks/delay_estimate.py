@@ -19,11 +19,13 @@ Run ``python benchmarks/delay_estimate.py``, with ``--part`` for a part and ``--
 number. The self-organizing controllers track sines, a random motion, steps and a gait in closed
 loop, sensor noise on. Their rigs differ from the nominal one in dead time (0 to 80 ms) and lag (10
 to 150 ms). Gain and zero of the regulator are wrong by up to 5 % and 5 kPa. Every second pressure
-sensor has a lag of up to 20 ms. The estimate sees the command and the measured pressure alone.
+sensor has a lag of up to 20 ms. Behind a regulator the estimate sees the command and the measured
+pressure alone, behind on/off valves the duties, the measured pressure and the contraction.
 
 - ``ppr``, ``hsv``: the rigs of this package. Wanted is the first order model that answers best to
   random steps, in open loop and without noise.
-- ``hidden``: a simulator of other equations, behind a regulator, in closed loop.
+- ``command``: on/off valves, but of the command and the measured pressure alone.
+- ``hidden``, ``hidden_hsv``: simulators of other equations, behind a regulator and on/off valves.
 - ``change``: dead time and lag change after 30 s. When are the new ones found?
 """
 
@@ -36,6 +38,7 @@ import numpy as np
 from pam_actuation.control.config import load_controller
 from pam_actuation.control.delay_estimate import DelayEstimator
 from pam_actuation.control.pid import PidController
+from pam_actuation.control.valve_delay import ValveDelayEstimator
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.experiments import load_experiment
 from pam_actuation.tuning.closed_loop import ClosedLoop
@@ -46,7 +49,8 @@ from scipy.signal import lfilter
 
 sys.path.append(str(Path(__file__).resolve().parent.parent / 'test' / 'hidden'))
 
-import results_page  # noqa: E402, I100
+import hidden_rig as hidden_rigs  # noqa: E402, I100
+import results_page  # noqa: E402
 import tracking  # noqa: E402
 import truth_live  # noqa: E402
 import truth_rig  # noqa: E402
@@ -59,7 +63,7 @@ WINDOWS_S = {'from the start': (0.0, 13.0), 'later': (20.0, 30.0)}      # 3 s of
 NOISE_PA, NOISE_M = 300.0, 1e-5
 NEAR_S = 0.010
 DELAYS_S, LAGS_S = np.arange(0.0, 0.1205, 1e-3), np.geomspace(0.003, 0.3, 40)
-PARTS = ('ppr', 'hsv', 'hidden', 'change')
+PARTS = ('ppr', 'hsv', 'command', 'hidden', 'hidden_hsv', 'change')
 
 
 def motions():
@@ -136,9 +140,27 @@ def estimated(command_pa, pressure_pa):
     return sure, found.delay_s, found.lag_s, found.uncertainty_s
 
 
-def of_rigs(valve, count):
-    """Yield (controller, motion, window, estimate, wanted) on the rigs of this package."""
-    random = np.random.default_rng(SEED)
+def of_duties(run, measured, inside, random):
+    """Return what ``estimated`` does, of the duties; the lag is NaN."""
+    estimator = ValveDelayEstimator(RATE_HZ)
+    contraction = run.contraction_m[inside] + NOISE_M * random.standard_normal(measured.size)
+    estimator.steps(*run.signal[inside].T, measured, contraction)
+    sure, found = estimator.estimate() is not None, estimator.estimate(unsure=True)
+    return sure, found.delay_s, found.lag_s, found.uncertainty_s
+
+
+def driver_wait_s(nominal):
+    """Return how long a command waits for the driver on average, which takes one a period [s]."""
+    return 0.5 * (nominal.parameters['pwm_period_s'] - 1.0 / RATE_HZ)
+
+
+def of_rigs(valve, count, seed, duties):
+    """
+    Yield (controller, motion, window, estimate, wanted) on the rigs of this package.
+
+    ``duties``: the estimate is that of the duties, otherwise that of the command.
+    """
+    random, other = np.random.default_rng(seed), np.random.default_rng((seed, 1))
     nominal = load_rig(RIG, valve=valve)
     for k in range(count):
         rig, lag_s = drawn(nominal, random, k % 2 == 1)
@@ -152,8 +174,12 @@ def of_rigs(valve, count):
                     run.time_s.size)
                 for window, (first_s, last_s) in WINDOWS_S.items():
                     inside = slice(round(first_s * RATE_HZ), round(last_s * RATE_HZ))
-                    yield (name, motion, window,
-                           estimated(run.command_pa[inside], measured[inside]), want)
+                    if duties:
+                        found = of_duties(run, measured[inside], inside, other)
+                        wait_s = driver_wait_s(nominal)
+                    else:
+                        found, wait_s = estimated(run.command_pa[inside], measured[inside]), 0.0
+                    yield name, motion, window, found, (want[0] - wait_s, want[1])
 
 
 def hidden_rig(random):
@@ -192,9 +218,9 @@ def followed(live, controller, experiment, duration_s, at_tick=lambda k: None):
     return rows.T
 
 
-def of_hidden(count):
+def of_hidden(count, seed):
     """Yield what ``of_rigs`` does, on hidden rigs behind a regulator."""
-    random = np.random.default_rng(SEED + 1)
+    random = np.random.default_rng(seed + 1)
     nominal = load_rig(RIG)
     for k in range(count):
         seed = random.integers(2 ** 32)
@@ -210,7 +236,31 @@ def of_hidden(count):
                            (numbers['delay'], lag_s))
 
 
-def show(title, count, rows):
+def of_hidden_valves(count, seed):
+    """Yield what ``of_rigs`` does of the duties, on hidden rigs; wanted is their dead time."""
+    random = np.random.default_rng((seed, 2))
+    nominal = load_rig(RIG, valve='hsv')
+    for k in range(count):
+        rig = hidden_rigs.hidden_rig('hsv', int(random.integers(2 ** 31)))
+        rig.numbers['delay'] = 0.08 * random.uniform()
+        for motion, experiment in motions().items():
+            loop = hidden_rigs.hidden_loop(rig, experiment, seed=k, latency_s=LATENCY_S)
+            for name in controllers('hsv'):
+                run = loop.run(load_controller(name, nominal))
+                measured = run.pressure_pa + NOISE_PA * random.standard_normal(run.time_s.size)
+                for window, (first_s, last_s) in WINDOWS_S.items():
+                    inside = slice(round(first_s * RATE_HZ), round(last_s * RATE_HZ))
+                    yield (name, motion, window,
+                           of_duties(run, measured[inside], inside, random),
+                           (rig.numbers['delay'] + LATENCY_S, np.nan))
+
+
+def percent(share):
+    """Return a share as a whole number of percent, a dash for NaN."""
+    return '–' if np.isnan(share) else f'{100.0 * share:.0f}'
+
+
+def show(title, rows):
     """Print the shares of a row of (controller, motion, window, estimate, wanted)."""
     print(f'\n## {title}\n')
     print('| controller | motion | within 10 ms, from the start [%] | later [%] '
@@ -231,10 +281,10 @@ def show(title, count, rows):
                  100.0 * sure[late].mean(), 100.0 * near[sure].mean() if sure.any() else np.nan]
         print(f'| {name} | {motion} | ' + ' | '.join(f'{cell:.0f}' for cell in cells)
               + f' | {1e3 * np.median(np.abs(error_s)):.1f} '
-              f'| {100.0 * np.median(np.abs(lag)):.0f} |', flush=True)
+              f'| {percent(np.median(np.abs(lag)))} |', flush=True)
 
 
-def show_change(count):
+def show_change(count, seed):
     """Print how long after a change of dead time and lag the new ones are found."""
     print('\n## Change after 30 s\n')
     print('| motion | found again within 10 ms, median [s] | slowest [s] | never in 60 s [%] '
@@ -242,7 +292,7 @@ def show_change(count):
     print('|---|' + '---|' * 4)
     nominal = load_rig(RIG)
     for motion in ('sine', 'random'):
-        random = np.random.default_rng(SEED + 2)
+        random = np.random.default_rng(seed + 2)
         experiment = (tracking.sine(0.5, 48) if motion == 'sine'
                       else unrepeated.random_motion(12, 90.0))
         times, wrong = [], []
@@ -279,28 +329,41 @@ def show_speed():
     print(f'\nA tick of the estimator takes {(time.perf_counter() - began) / 0.02:.1f} us.')
 
 
+def show_part(part, count, seed):
+    """Print a part."""
+    few, fewer = max(1, count // 4), max(1, count // 16)
+    if part in ('ppr', 'hsv'):
+        show(f'{count} random rigs, {part}', of_rigs(part, count, seed, part == 'hsv'))
+    elif part == 'command':
+        show(f'{count} random rigs, hsv, of the command alone', of_rigs('hsv', count, seed, False))
+    elif part == 'hidden':
+        show(f'{few} hidden rigs of other equations, ppr', of_hidden(few, seed))
+    elif part == 'hidden_hsv':
+        show(f'{fewer} hidden rigs of other equations, hsv', of_hidden_valves(fewer, seed))
+    else:
+        show_change(max(1, count // 5), seed)
+        show_speed()
+
+
 def command_line():
     """Return the parser of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[1])
     parser.add_argument('--part', default=','.join(PARTS), help='tables, by commas')
     parser.add_argument('--rigs', type=int, default=100, help='number of random rigs')
+    parser.add_argument('--seed', type=int, default=SEED, help='of rigs and noise')
     results_page.add_write(parser, 'delay_estimate')
     return parser
 
 
 def main():
-    """Print the tables."""
+    """Print the tables, each part into its own of the page."""
     args = command_line().parse_args()
-    with results_page.printed(args, __file__):
-        for part in args.part.split(','):
-            if part in ('ppr', 'hsv'):
-                show(f'{args.rigs} random rigs, {part}', args.rigs, of_rigs(part, args.rigs))
-            elif part == 'hidden':
-                count = max(1, args.rigs // 4)
-                show(f'{count} hidden rigs of other equations, ppr', count, of_hidden(count))
-            else:
-                show_change(max(1, args.rigs // 5))
-        show_speed()
+    parts = args.part.split(',')
+    for part in parts:
+        results_page.check(args, __file__, part)
+    for part in parts:
+        with results_page.printed(args, __file__, part):
+            show_part(part, args.rigs, args.seed)
 
 
 if __name__ == '__main__':

@@ -279,7 +279,7 @@ class PathEstimate:
     delay_s : float
         Dead time, with that of driver and messages, without the hold of a command for a tick.
     lag_s : float
-        First order lag.
+        First order lag; NaN where the pressure has none of its own, behind on/off valves.
     explained : float
         Share of the pressure in the band that the model explains.
     uncertainty_s : float
@@ -297,8 +297,10 @@ class PathEstimate:
 
     def text(self) -> str:
         """Return the estimate as one line for people."""
-        return (f'dead time {1e3 * self.delay_s:.0f} ms (±{1e3 * self.uncertainty_s:.0f}), '
-                f'lag {1e3 * self.lag_s:.0f} ms')
+        size = f'{1e3 * self.delay_s:.0f} ms (±{1e3 * self.uncertainty_s:.0f})'
+        if math.isnan(self.lag_s):
+            return f'dead time of the valves {size}'
+        return f'dead time {size}, lag {1e3 * self.lag_s:.0f} ms'
 
 
 class DelayEstimator:

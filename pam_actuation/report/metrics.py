@@ -29,6 +29,7 @@ from numpy.typing import ArrayLike
 
 from pam_actuation.control.tick import RUNNING
 from pam_actuation.report import signals
+from pam_actuation.report.command_path import command_path
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.short_repr import short_repr
@@ -375,28 +376,6 @@ def air_fed(run: 'Run', conductance_m3_per_s_pa: float, critical_ratio: float,
     return float(np.sum(0.5 * (flow[1:] + flow[:-1]) * np.diff(time_s)))
 
 
-def command_path(run: 'Run') -> 'PathEstimate | None':
-    """
-    Return dead time and lag from pressure command to pressure, None where they are not sure.
-
-    The record is taken at its median command period.
-    """
-    from pam_actuation.control.delay_estimate import estimate_path
-    command, pressure = signals.series(run, 'pressure_command'), signals.series(run, 'pressure')
-    if command is None or pressure is None or min(command[0].size, pressure[0].size) < 3:
-        return None
-    period_s = float(np.median(np.diff(command[0])))
-    if not period_s > 0.0:
-        return None
-    first, last = max(command[0][0], pressure[0][0]), min(command[0][-1], pressure[0][-1])
-    ticks = np.arange(first, last, period_s)
-    held = np.searchsorted(command[0], ticks + 0.5 * period_s, side='right') - 1
-    try:
-        return estimate_path(command[1][held], np.interp(ticks, *pressure), 1.0 / period_s)
-    except InputError:
-        return None
-
-
 def run_metrics(run: 'Run', cycles: Cycles | None = None,
                 volume_m3: Callable[[FloatArray], FloatArray] | None = None,
                 rig: 'Rig | None' = None) -> RunMetrics:
@@ -412,7 +391,7 @@ def run_metrics(run: 'Run', cycles: Cycles | None = None,
     volume_m3 : callable, optional
         Muscle volume over contraction; without it air use is None.
     rig : pam_sim.rig.Rig, optional
-        Gives the data sheet of the fill valve; without it the air through it is None.
+        Gives the data sheet of the valves; without it the air through the fill valve is None.
 
     """
     cycles = find_cycles(run) if cycles is None else cycles
@@ -442,4 +421,4 @@ def run_metrics(run: 'Run', cycles: Cycles | None = None,
         max_error_n=None if pulled is None else float(np.max(np.abs(pulled[1]))),
         cycle_rmse_n=np.empty(0) if not cycles or pulled is None else split_rmse(
             *pulled, cycles[1], cycles[0], cycles[2]),
-        path=command_path(run))
+        path=command_path(run, rig))

@@ -115,7 +115,7 @@ def test_bad_input_is_refused_in_a_sentence(command, pressure, rate_hz, message)
 
 
 def test_a_report_names_them():
-    from pam_actuation.report.metrics import command_path
+    from pam_actuation.report.command_path import command_path
     command = commands(8.0, RATE_HZ)
     pressure = answered(command, RATE_HZ, 0.034, 0.06)
     stamps = (1e9 + 5e6 * np.arange(command.size)).astype(np.int64)
