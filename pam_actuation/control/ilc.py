@@ -192,7 +192,7 @@ def _tick(par: np.record, inverse: FloatArray, memory: FloatArray, st: np.record
     out.learned_pa = learned
     out.cycle_s = st.cycle_ticks * (1.0 / par.rate_hz)
     base = inverse_pressure_pa(inverse, inp.lead_reference_m - offset)
-    return command_of(par, st, inp, out, error, offset, base, learned)
+    return command_of(par, st, inp, out, error, offset, error, base, learned)
 
 
 @compiled

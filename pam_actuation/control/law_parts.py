@@ -90,6 +90,19 @@ def held_offset(
 
 
 @compiled
+def settled_part(error_m: float, offset_m: float) -> float:
+    """
+    Return the part of an error that the offset of a bumpless start does not cause.
+
+    While the offset fades, the reference runs after the one that is wanted, faster than that.
+    The error of this chase is not one that an integral should remember.
+    """
+    if offset_m == 0.0:
+        return error_m
+    return error_m * (abs(error_m) / (abs(error_m) + abs(offset_m)))
+
+
+@compiled
 def integral_growth(by_error: float, by_limits: float, held_back: float) -> float:
     """
     Return the rate at which an integral grows, by the error and by the limits of the law.

@@ -26,7 +26,8 @@ import numpy as np
 from pam_actuation.control.fixed_law import FixedLawController
 from pam_actuation.control.inputs import INPUT
 from pam_actuation.control.law_parts import (
-    faded_offset, filtered_change, first_command_pa, held_offset, integral_growth, limited)
+    faded_offset, filtered_change, first_command_pa, held_offset, integral_growth, limited,
+    settled_part)
 from pam_actuation.control.settings import parameter_record, setting
 from pam_actuation.control.static_inverse import inverse_pressure_pa
 from pam_sim.annotations import FloatArray
@@ -48,6 +49,8 @@ SETTINGS = (
     setting('max_pressure_gauge_pa', 'Pa', 6e5, 1e3, 1e6, 'highest command'),
     setting('slew_pa_per_s', 'Pa/s', 3e6, 1e4, 1e9, 'fastest change of the command'),
     setting('start_time_s', 's', 0.25, 0.01, 10.0, 'decay of the bumpless start offset'),
+    setting('forget_catch_up', '-', 0.0, 0.0, 1.0,
+            'share of the error of the way back after a fault that the integral leaves out'),
 )
 
 PARAMETERS = parameter_record(SETTINGS)
@@ -60,6 +63,7 @@ STATE = record(
     'command_pa',                     # of the tick before
     'history_ticks',                  # ticks since the start
     'error_m',                        # of the tick before
+    'catches_up',                     # 1 since the driver did not follow, until the offset is 0
 )
 # The names on topic ``controller_state``.
 OUTPUT = record(
@@ -75,6 +79,7 @@ def _start(par: np.record, st: np.record, inp: np.record) -> None:
     st.offset_m = inp.reference_m - inp.contraction_m
     st.change_m_per_s = 0.0
     st.history_ticks = 0.0
+    st.catches_up = 0.0
     st.command_pa = first_command_pa(
         inp.pressure_pa, P_ATM_PA + par.min_pressure_gauge_pa,
         P_ATM_PA + par.max_pressure_gauge_pa)
@@ -108,11 +113,12 @@ def tracking_error(par: np.record, st: np.record, inp: np.record, has_former: bo
 
 @compiled
 def command_of(par: np.record, st: np.record, inp: np.record, out: np.record, error: float,
-               offset: float, base_pa: float, added_pa: float) -> float:
+               offset: float, remembered: float, base_pa: float, added_pa: float) -> float:
     """
     Return the command [absolute Pa] for an error, write the outputs, let the integral grow.
 
-    ``base_pa`` is what the terms of the PID are added to, ``added_pa`` what comes beside them.
+    It grows on ``remembered``, that part of the error [m]. ``base_pa`` is what the terms of the
+    PID are added to, ``added_pa`` what comes beside them.
     Records as of ``tracking_error``, and ``OUTPUT``.
     """
     period = 1.0 / par.rate_hz
@@ -125,8 +131,8 @@ def command_of(par: np.record, st: np.record, inp: np.record, out: np.record, er
     inside, command = limited(wanted, st.command_pa, lowest, highest, par.slew_pa_per_s * period)
     st.command_pa = command
     st.integral_pa = integral + period * integral_growth(
-        par.integral_pa_per_m_s * error, (command - wanted) / par.anti_windup_time_s,
-        inp.held_back)
+        par.integral_pa_per_m_s * remembered,
+        (command - wanted) / par.anti_windup_time_s, inp.held_back)
     out.command_pa = command
     out.error_m = error
     out.change_of_error_m_per_s = st.change_m_per_s
@@ -143,6 +149,19 @@ def command_of(par: np.record, st: np.record, inp: np.record, out: np.record, er
 
 
 @compiled
+def _remembered(par: np.record, st: np.record, inp: np.record, error: float,
+                offset: float) -> float:
+    """Return the part of the error [m] that the integral grows on."""
+    if inp.held_back != 0.0:
+        st.catches_up = 1.0
+    elif offset == 0.0:
+        st.catches_up = 0.0
+    if st.catches_up < 0.5:
+        return error
+    return error + par.forget_catch_up * (settled_part(error, offset) - error)
+
+
+@compiled
 def _tick(par: np.record, inverse: FloatArray, st: np.record, inp: np.record,
           out: np.record) -> float:
     """Run one tick; see ``pid_step``."""
@@ -153,7 +172,8 @@ def _tick(par: np.record, inverse: FloatArray, st: np.record, inp: np.record,
     base = P_ATM_PA
     if par.use_static_inverse > 0.5:
         base = inverse_pressure_pa(inverse, inp.lead_reference_m - offset)
-    return command_of(par, st, inp, out, error, offset, base, 0.0)
+    remembered = _remembered(par, st, inp, error, offset)
+    return command_of(par, st, inp, out, error, offset, remembered, base, 0.0)
 
 
 @compiled
