@@ -20,15 +20,17 @@ recorded valve signal alone, or, where nobody recorded it, on the measured press
 """
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 import math
 
 import numpy as np
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.gap.data.noise import (
-    autocorrelation_time, noise_of, sensor_floor, STAMP_SD_S)
+    autocorrelation_time, Noise, noise_of, sensor_floor, STAMP_SD_S)
 from pam_sim.gap.data.recording import Recording, START_S
 from pam_sim.gap.data.signals import UNIT
 from pam_sim.gap.data.split import CERTIFY, settling_s, split_of
+from pam_sim.gap.data.supply import DRIFT_SD
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit
 from pam_sim.gap.result import SignalGap, Trace
@@ -250,10 +252,11 @@ class Validation:
         random, r = np.random.default_rng(seed), self.recording
         found: list[dict[str, FloatArray]] = []
         start_sd = start_error_sd(r)
-        noise = noise_of(r.time_s['pressure'], r.measured['pressure'])
+        noise = self._pressure_noise()
         for _ in range(INPUT_DRAWS):
             if r.pressure_given:
-                moved = self.run(final, whole, pressure_noise_pa=noise.draw(
+                drift_pa = DRIFT_SD * noise.sd * random.standard_normal()
+                moved = self.run(final, whole, pressure_noise_pa=drift_pa + noise.draw(
                     r.time_s['pressure'], random))
             else:
                 shift = r.stamp_sd_s(STAMP_SD_S) * random.standard_normal(r.messages)
@@ -261,6 +264,14 @@ class Validation:
             self.simulations += 1
             found.append({s: moved[s] - self.after[s] for s in r.signals})
         return found
+
+    def _pressure_noise(self) -> Noise:
+        """Return the noise of the pressure, its slow part from where the sensor shows one."""
+        own, *others = (noise_of(o.time_s['pressure'], o.measured['pressure']) for o in (
+            self.recording, *self.estimator.problems[0].recordings))
+        slow = max(others, key=lambda noise: noise.slow_sd)
+        return own if own.slow_sd > 0.0 else replace(
+            own, slow_sd=slow.slow_sd, memory_s=slow.memory_s)
 
     def _floors(self) -> list[dict[str, float]]:
         r = self.recording
