@@ -32,7 +32,7 @@ from pam_actuation.experiments.chain import DOMAINS, FORCE
 from pam_actuation.experiments.primitives.make import keys_of, PRIMITIVES, range_of
 from pam_actuation.hardware.back_ends import SENSOR_INPUTS, VALVE_OUTPUTS
 from pam_actuation.tables import mapping, units
-from pam_actuation.tables.signals import SIGNALS
+from pam_actuation.tables.signals import ANGLES, SIGNALS
 from pam_sim import model_file
 from pam_sim.effects.registry import effects
 from pam_sim.joint import model_file as joint_file, parameters as joint
@@ -208,7 +208,9 @@ def mapping_page():
         _table(('signal', 'topic', 'units', 'meaning'), [
             (f'`{one.name}`', f'`{one.topic}`',
              ', '.join(f'`{unit}`' for unit in units.names_of(one.quantity)), one.meaning)
-            for one in SIGNALS]),
+            for one in (*SIGNALS, *ANGLES)]),
+        'A joint has the angles, and the signals of its muscles after `flexor/` and `extensor/`, '
+        'such as `flexor/pressure`.',
         'Each entry holds:', keys(mapping.COLUMN_KEYS)])
 
 

@@ -31,7 +31,8 @@ from pam_actuation.bags.plausibility import Implausible, recorded_length_m, topi
 from pam_actuation.bags.source import Bag, read_bag, TopicData
 from pam_actuation.messages import Marker, ReferenceTrajectory, VALVE_NAMES, valve_of
 from pam_actuation.topics.codec import decode
-from pam_actuation.topics.table import BY_NAME, KEPT, OF_A_RUN, RECORDED, short_name, TOLD
+from pam_actuation.topics.table import (
+    BY_NAME, KEPT, OF_A_RUN, OFTEN_EMPTY, RECORDED, short_name, TOLD)
 from pam_sim.annotations import BoolArray, FloatArray, IntArray
 from pam_sim.errors import InputError
 from pam_sim.files import StrPath
@@ -299,8 +300,7 @@ def _held(stamp_ns: IntArray, values: Mapping[str, FloatArray], name: str,
 def _remark_not_finite(values: Mapping[str, FloatArray], name: str, remarks: list[str]) -> None:
     for key, column in values.items():
         count = int((~np.isfinite(column)).sum())
-        # A velocity that is never measured is the sensor's business, not an oddity.
-        if count and not (key == 'velocity_m_per_s' and count == len(column)):
+        if count and not (key in OFTEN_EMPTY and count == len(column)):
             remarks.append(f'{name}: {count} of {len(column)} {key} are not finite, kept as NaN.')
 
 

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pam_actuation.topics.table import (
-    NEEDED, OF_A_RUN, RECORDED, RECORDED_OF_JOINT, short_name, Topic, USED)
+    NEEDED, OF_A_RUN, OFTEN_EMPTY, RECORDED, RECORDED_OF_JOINT, short_name, Topic, USED)
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.joint.parameters import SIDES
 from pam_sim.units import allowed_range, gauge_kpa, P_ATM_PA
@@ -122,8 +122,8 @@ def missing_topics(namespaces: Mapping[str, Collection[str]],
     """
     Return (remarks, notes): sentences on topics that are not there.
 
-    A muscle of a joint has no reference of its own, and a rig with a regulator no supply
-    pressure: they are not told as missing.
+    A muscle of a joint has no reference of its own, and its contraction follows from the angle. A
+    rig with a regulator has no supply pressure. They are not told as missing.
 
     Parameters
     ----------
@@ -162,7 +162,8 @@ def _topics_of_muscle(namespace: str, namespaces: Collection[str]) -> list[Topic
     joint, _, side = namespace.rpartition('/')
     if side not in SIDES or not all(f'{joint}/{other}' in namespaces for other in SIDES):
         return [*OF_A_RUN.values()]
-    return [row for row in OF_A_RUN.values() if f'{side}/{row.name}' in RECORDED_OF_JOINT]
+    return [row for row in OF_A_RUN.values()
+            if row.name != 'contraction' and f'{side}/{row.name}' in RECORDED_OF_JOINT]
 
 
 def _time_remarks(topic: 'TopicData', info: 'TopicInfo', stamp_ns: IntArray) -> list[str]:
@@ -221,7 +222,7 @@ def value_findings(topic: str, name: str, column: FloatArray,
     finite = column[np.isfinite(column)]
     found = []
     bad = len(column) - len(finite)
-    if bad and not (name == 'velocity_m_per_s' and not len(finite)):
+    if bad and not (name in OFTEN_EMPTY and not len(finite)):
         what = 'none' if not len(finite) else f'{len(finite)} of {len(column)}'
         found.append(Implausible(
             f'{topic}: {bad} values of {name} are not finite (nan or inf), {what} can be used; '

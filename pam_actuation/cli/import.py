@@ -73,8 +73,8 @@ def add_arguments(parser: Parser) -> None:
                         help='take values that cannot be in the unit stated')
     parser.add_argument('--rig', type=source, default=None, metavar='NAME|FILE',
                         help='model of the rig that was measured, kept in the bag')
-    parser.add_argument('--namespace', type=source, default='/muscle', metavar='NS',
-                        help='namespace of the muscle in the bag (default: %(default)s)')
+    parser.add_argument('--namespace', type=source, default=None, metavar='NS',
+                        help='namespace in the bag (default: /muscle, of a joint /knee)')
     add_overwrite_option(parser, 'the bag that is there, once the new one is whole')
 
 
@@ -88,9 +88,10 @@ def run(args: argparse.Namespace) -> int:
     from pam_actuation.tables.importer import digest_of, recording_of, write_bag
     from pam_actuation.tables.preview import unread
     from pam_actuation.tables.resample import hint, resampled
-    from pam_sim import load_rig
     from pam_sim.files import write_text
-    rig = load_rig(args.rig) if args.rig else None
+    from pam_sim.joint import load_rig_or_joint
+    model = load_rig_or_joint(args.rig) if args.rig else None
+    rig: Any = getattr(model, 'flexor', model)      # of a joint: the lengths are checked by one
     out = args.out or os.path.join('runs', Path(args.files[0]).name.partition('.')[0])
     if not args.preview:
         check_bag_target(out, args.overwrite)
@@ -109,7 +110,7 @@ def run(args: argparse.Namespace) -> int:
         recording.told.append(said)
     recording.sources = {Path(file).name: digest_of(file) for file in args.files}
     with progress(args, 1.0, '', 'writing') as bar:
-        counts = write_bag(recording, out, rig=rig, namespace=args.namespace,
+        counts = write_bag(recording, out, rig=model, namespace=args.namespace or '',
                            overwrite=args.overwrite, progress=lambda s: bar.update(s - bar.n))
         bar.update(1.0 - bar.n)
     if args.save_mapping:

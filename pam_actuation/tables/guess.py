@@ -20,10 +20,11 @@ import re
 
 import numpy as np
 from pam_actuation.tables.mapping import column_of_text, ColumnMap, TableMapping
-from pam_actuation.tables.signals import BY_NAME, Signal, SIGNALS, TIME_WORDS
+from pam_actuation.tables.signals import (
+    ANGLES, are_of_joint, BY_NAME, of_words, Signal, TIME_WORDS)
 from pam_actuation.tables.table import Table
 from pam_actuation.tables.units import (
-    ABSOLUTE, FACTORS, GAUGE, LENGTH, names_of, PRESSURE, si_unit, Unit, unit_of_text,
+    ABSOLUTE, ANGLE, FACTORS, GAUGE, LENGTH, names_of, PRESSURE, si_unit, Unit, unit_of_text,
     VOLTAGE)
 from pam_actuation.tables.words import unit_in, words_of
 from pam_sim.units import P_ATM_PA
@@ -118,7 +119,11 @@ def guess(tables: Collection[Table], mapping: TableMapping,
             if answer is not None:
                 seen.setdefault(signal.name, {})[column] = answer
     signals = dict(mapping.signals)
+    joint = are_of_joint({*signals, *seen} - {one.name for one in ANGLES}) or any(
+        one.name in signals for one in ANGLES)
     for name, candidates in seen.items():
+        if are_of_joint([name]) != joint:       # such as the angle of a joint with one muscle
+            continue
         chosen = _chosen(name, candidates)
         if isinstance(chosen, Question):
             found.questions.append(chosen)
@@ -171,9 +176,9 @@ def ask(found: Guess, answer: Callable[[str, tuple[str, ...]], str | None]) -> G
 
 def _signal_of(column: str) -> Signal | None:
     """Return the signal that the name of a column means."""
-    words = words_of(column.rpartition('/')[2])
-    return next((signal for signal in SIGNALS if _is_exported(column, signal)), None) or next(
-        (signal for signal in SIGNALS if signal.is_named(words)), None)
+    path, _, name = column.rpartition('/')
+    return next((signal for signal in BY_NAME.values() if _is_exported(column, signal)),
+                None) or of_words(words_of(name), path)
 
 
 def _is_exported(column: str, signal: Signal) -> bool:
@@ -216,7 +221,8 @@ def _of_column(table: Table, column: str, signal: Signal, missing: Collection[st
 
 
 # The largest value that a rig of this kind has, SI; a tenth to a hundredth of it is usual.
-_LARGEST = {PRESSURE: 1e6, LENGTH: 0.12, 'force': 2000.0, VOLTAGE: 10.5, 'duty': 1.0}
+_LARGEST = {PRESSURE: 1e6, LENGTH: 0.12, 'force': 2000.0, VOLTAGE: 10.5, 'duty': 1.0,
+            ANGLE: 3.5}
 
 
 def _plausible(signal: Signal, low: float, high: float) -> list[str]:

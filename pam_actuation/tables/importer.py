@@ -26,17 +26,18 @@ from pam_actuation.bags.message_writer import MessageWriter
 from pam_actuation.bags.metadata import experiment_metadata
 from pam_actuation.bags.writer import BagWriter
 from pam_actuation.messages import START_NS, VALVE_NAMES
-from pam_actuation.namespaces import MUSCLE, namespace_of
+from pam_actuation.namespaces import JOINT, MUSCLE, namespace_of
 from pam_actuation.tables.clock import clock_of
 from pam_actuation.tables.mapping import TableMapping
 from pam_actuation.tables.plausible import Doubt, doubts
-from pam_actuation.tables.signals import SIGNALS
+from pam_actuation.tables.signals import are_of_joint, BY_NAME, of_muscles
 from pam_actuation.tables.table import no_column, Table
 from pam_actuation.topics.contents import Make
-from pam_actuation.topics.table import BY_NAME as TOPICS
+from pam_actuation.topics.table import topic_of
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.errors import InputError
 from pam_sim.files import StrPath
+from pam_sim.joint.parameters import SIDES
 
 _PROGRESS_EVERY = 20_000
 
@@ -73,7 +74,13 @@ class Recording:
     @property
     def valve(self) -> str:
         """Return 'ppr' or 'hsv' by the valve signals, '' without any."""
-        return messages.valve_of(self.signals)
+        return messages.valve_of(
+            own for names in of_muscles(self.signals).values() for own in names)
+
+    @property
+    def is_of_joint(self) -> bool:
+        """Return whether it is of a joint with two muscles."""
+        return are_of_joint(self.signals)
 
     @property
     def duration_s(self) -> float:
@@ -168,14 +175,11 @@ def _check(result: Recording, length_m: float, accept: bool) -> None:
     if not result.signals:
         raise InputError('no column is mapped to a signal; add --map pressure="COLUMN:bar_gauge" '
                          'and others', '--map')
-    if {'reference', 'reference_force'} <= {*result.signals}:
-        raise InputError('reference and reference_force are both mapped; a message wants a '
-                         'contraction or a force, so leave one out', '--map')
-    duties = {*VALVE_NAMES['hsv']} & {*result.signals}
-    if len(duties) == 1:
-        other, = {*VALVE_NAMES['hsv']} - duties
-        raise InputError(f'{duties.pop()} is mapped, {other} is not; a valve signal has both',
-                         '--map')
+    if result.is_of_joint and 'angle' not in result.signals:
+        raise InputError('the signals are of a joint, and none is its angle; add --map '
+                         'angle="COLUMN:deg"', '--map')
+    for place, names in of_muscles(result.signals).items():
+        _check_muscle(place, names, result.is_of_joint)
     found = doubts(result.signals, result.mapping.signals, length_m)
     wrong = next((one for one in found if one.is_wrong), None)
     if wrong is not None and not accept:
@@ -183,7 +187,24 @@ def _check(result: Recording, length_m: float, accept: bool) -> None:
     result.found += found
 
 
-def write_bag(recording: Recording, path: StrPath, *, rig: Any = None, namespace: str = MUSCLE,
+def _check_muscle(place: str, names: set[str], is_joint: bool) -> None:
+    """Raise InputError where the signals of a muscle do not go together."""
+    if is_joint and not place:
+        name = min(names)
+        raise InputError(
+            f'{name} is the signal of a muscle alone, and others are of a joint; write '
+            f'{" or ".join(f"{side}/{name}" for side in SIDES)}', '--map')
+    if {'reference', 'reference_force'} <= names:
+        raise InputError('reference and reference_force are both mapped; a message wants a '
+                         'contraction or a force, so leave one out', '--map')
+    duties = {*VALVE_NAMES['hsv']} & names
+    if len(duties) == 1:
+        other, = {*VALVE_NAMES['hsv']} - duties
+        raise InputError(f'{place}{duties.pop()} is mapped, {place}{other} is not; a valve signal '
+                         'has both', '--map')
+
+
+def write_bag(recording: Recording, path: StrPath, *, rig: Any = None, namespace: str = '',
               overwrite: bool = False, progress: Callable[[float], object] | None = None
               ) -> dict[str, int]:
     """
@@ -198,7 +219,7 @@ def write_bag(recording: Recording, path: StrPath, *, rig: Any = None, namespace
     rig : object, optional
         Model of the rig that was measured, kept in the bag.
     namespace : str
-        Of the muscle.
+        Of the muscle or the joint; by default ``/muscle`` or ``/knee``.
     overwrite : bool
         Replace a bag that is there.
     progress : callable, optional
@@ -217,7 +238,7 @@ def write_bag(recording: Recording, path: StrPath, *, rig: Any = None, namespace
         resampled_hz='' if recording.resampled_hz is None else f'{recording.resampled_hz:g}',
         sources='\n'.join(f'{name} sha256 {digest}'
                           for name, digest in recording.sources.items()))
-    space = namespace_of(namespace)
+    space = namespace_of(namespace or (JOINT if recording.is_of_joint else MUSCLE))
     streams = _streams(recording.signals)
     order = _by_time(streams)
     writer = BagWriter(path, metadata, overwrite)
@@ -249,9 +270,10 @@ class _Stream:
 def _streams(signals: Mapping[str, tuple[IntArray, FloatArray]]) -> list[_Stream]:
     """Return one stream a topic: without rows that say nothing, fields of one time together."""
     streams = []
-    for topic in TOPICS.values():
-        held = [(signal.field, *signals[signal.name]) for signal in SIGNALS
-                if signal.topic == topic.name and signal.name in signals]
+    for name in dict.fromkeys(signal.topic for signal in BY_NAME.values()):
+        topic = topic_of(name)
+        held = [(signal.field, *signals[signal.name]) for signal in BY_NAME.values()
+                if signal.topic == name and signal.name in signals]
         if not held or topic.numeric is None:
             continue
         said = [(stamps[np.isfinite(values)], values[np.isfinite(values)])
@@ -260,7 +282,7 @@ def _streams(signals: Mapping[str, tuple[IntArray, FloatArray]]) -> list[_Stream
         values = np.full((len(stamps), len(said)), np.nan)
         for column, (own, finite) in enumerate(said):
             values[np.searchsorted(stamps, own), column] = finite
-        streams.append(_Stream(topic.name, stamps, values, topic.numeric.maker(
+        streams.append(_Stream(name, stamps, values, topic.numeric.maker(
             tuple(field for field, *_ in held))))
     return streams
 

@@ -19,7 +19,7 @@ from dataclasses import dataclass, field, replace
 import math
 from typing import Any
 
-from pam_actuation.tables.signals import BY_NAME, signal_of
+from pam_actuation.tables.signals import ALLOWED, signal_of
 from pam_actuation.tables.units import checked_unit, DATE, TIME, Unit
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
@@ -145,8 +145,8 @@ class TableMapping:
             name, equals, rest = text.partition('=')
             name, where = name.strip(), f'--map {text}'
             if not equals or not rest.strip():
-                raise InputError(f'write --map NAME="{SYNTAX}", NAME one of time, '
-                                 f'{", ".join(BY_NAME)}', where)
+                raise InputError(
+                    f'write --map NAME="{SYNTAX}", NAME one of time, {ALLOWED}', where)
             if name == TIME:
                 time, rows_hz = _time_of_text(rest, where), None
             else:
@@ -252,4 +252,4 @@ def _number(text: str, key: str, where: str) -> float:
 
 def _usual(quantity: str) -> str:
     return {'pressure': 'kPa_gauge', 'length': 'mm', 'force': 'N', 'voltage': 'V',
-            'duty': '1'}[quantity]
+            'duty': '1', 'angle': 'deg'}[quantity]

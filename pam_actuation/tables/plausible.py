@@ -20,9 +20,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from pam_actuation.bags.plausibility import MAX_CONTRACTION, SHARE_HINT, value_findings
 from pam_actuation.tables.mapping import ColumnMap
-from pam_actuation.tables.signals import BY_NAME, Signal
+from pam_actuation.tables.signals import BY_NAME, of_muscles, Signal
 from pam_actuation.tables.units import (
-    ABSOLUTE, FORCE, GAUGE, LENGTH, names_of, PRESSURE, unit_of_text)
+    ABSOLUTE, ANGLE, FORCE, GAUGE, LENGTH, names_of, PRESSURE, unit_of_text)
 from pam_actuation.tables.words import unit_in
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.units import P_ATM_PA
@@ -36,7 +36,8 @@ SMALL_GAUGE_PA = 20e3                # no muscle moves below
 STAND_INS = {-9999.0, -999.0, -99.0, -99999.0, 9999.0, 99999.0, 999999.0, -32768.0, 32767.0,
              65535.0, 4294967295.0, 2147483647.0, -2147483648.0}
 HUGE = 1e30
-LEAST_MOVE = {PRESSURE: 200.0, LENGTH: 5e-5, FORCE: 0.2}       # below: another unit is likely
+# Below, another unit is likely.
+LEAST_MOVE = {PRESSURE: 200.0, LENGTH: 5e-5, FORCE: 0.2, ANGLE: 2e-3}
 NEAR_ATMOSPHERE_PA = 5e3
 EMPTY_PA = 10e3                      # gauge, below which no muscle holds a load up
 FEWEST_EMPTY = 3                     # values there
@@ -80,9 +81,13 @@ def doubts(signals: Mapping[str, tuple[IntArray, FloatArray]], mapped: Mapping[s
                                'left out'))
         found += [Doubt(f'{said}: {one.sentence}', one.is_wrong)
                   for one in _of_values(signal, mapped[name], finite, length_m)]
-    if {'pressure', 'contraction'} <= {*values}:
-        found += [one for one in (_held(values, mapped, length_m),
-                                  _zero(signals, mapped, length_m)) if one is not None]
+    for place, names in of_muscles(signals).items():
+        if {'pressure', 'contraction'} <= names:
+            own = {name: signals[f'{place}{name}'] for name in names}
+            read = {name: mapped[f'{place}{name}'] for name in names}
+            found += [one for one in (_held({name: column for name, (_, column) in own.items()},
+                                            read, length_m),
+                                      _zero(own, read, length_m)) if one is not None]
     return found
 
 
@@ -152,7 +157,8 @@ def _of_values(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: 
     if signal.quantity == FORCE and max(high, -low) > MUCH_N:
         found.append(Doubt(f'it reaches {_shown(signal, max(high, -low))}, more than a muscle '
                            f'pulls{_fix(signal, mapped, finite, length_m)}'))
-    if signal.name == 'force' and float(np.median(finite)) < -PUSH_N and -low > FAR * high:
+    if signal.name.rpartition('/')[2] == 'force' and (
+            float(np.median(finite)) < -PUSH_N and -low > FAR * high):
         other = replace(mapped, gain=-mapped.gain)
         found.append(Doubt(f'it is negative nearly throughout, down to {_shown(signal, low)}, and '
                            'a pull is positive; if it counts the other way, write '
@@ -246,4 +252,5 @@ def _shown(signal: Signal, value: float, difference: bool = False) -> str:
             f'{1e-3 * (value - P_ATM_PA):.4g} kPa gauge')
     if signal.quantity == LENGTH:
         return f'{1e3 * value:.4g} mm'
-    return f'{value:.4g} {({FORCE: "N", "voltage": "V"}.get(signal.quantity, ""))}'.strip()
+    unit = {FORCE: 'N', ANGLE: 'rad', 'voltage': 'V'}.get(signal.quantity, '')
+    return f'{value:.4g} {unit}'.strip()

@@ -12,13 +12,20 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a column of a table can be: a signal of the rig, with its topic and quantity."""
+"""
+What a column of a table can be: a signal of the rig, with its topic and quantity.
 
-from dataclasses import dataclass
+A joint has an angle, and the signals of a muscle twice: ``flexor/pressure`` and
+``extensor/pressure``.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 import re
 
-from pam_actuation.tables.units import DUTY, FORCE, LENGTH, PRESSURE, VOLTAGE
+from pam_actuation.tables.units import ANGLE, DUTY, FORCE, LENGTH, PRESSURE, VOLTAGE
 from pam_sim.errors import did_you_mean, InputError
+from pam_sim.joint.parameters import SIDES
 
 
 @dataclass(frozen=True)
@@ -31,7 +38,7 @@ class Signal:
     name : str
         As it is written in ``--map`` and in a mapping file.
     topic, field : str
-        Where its values go: short name of the topic, and name of the value.
+        Where its values go: name of the topic below the muscle or the joint, and of the value.
     quantity : str
         What it measures (``tables/units.py``).
     words : str
@@ -95,7 +102,25 @@ SIGNALS = (
            r'ao) ?(voltage|volt|v|signal|u|cmd|command|set ?point|input)|'
            r'voltage ?(ppr|valve|cmd|command|out)?|spannung', 'voltage to the regulator'),
 )
-BY_NAME = {signal.name: signal for signal in SIGNALS}
+ANGLES = (
+    Signal('reference_angle', 'joint_reference', 'angle_rad', ANGLE,
+           r'(joint |knee |elbow |ankle |hip )?(angle|theta|phi|q) ?(ref|reference|set|setpoint|'
+           r'des|desired|soll|target|d)|(desired|target|reference) (joint |knee )?angle',
+           'wanted angle'),
+    Signal('angle', 'joint_state', 'angle_rad', ANGLE,
+           r'(joint |knee |elbow |ankle |hip |measured |actual )?(angle|theta|phi|q|winkel)'
+           r' ?(1|is|ist|act|actual|meas|measured|joint|knee)?', 'angle of the joint'))
+JOINT_SIGNALS = (*ANGLES, *(
+    replace(one, name=f'{side}/{one.name}', topic=f'{side}/{one.topic}',
+            meaning=f'{one.meaning}, {side}')
+    for side in SIDES for one in SIGNALS if one.name not in ('reference', 'reference_force')))
+BY_NAME = {signal.name: signal for signal in (*SIGNALS, *JOINT_SIGNALS)}
+ALLOWED = (f'{", ".join(one.name for one in SIGNALS)}; of a joint '
+           f'{" and ".join(one.name for one in ANGLES)}, and those of a muscle after '
+           f'{" or ".join(f"{side}/" for side in SIDES)}')
+# Words that other programs have for the sides.
+_SIDE_WORDS = {'flexor': 'flexor', 'flex': 'flexor', 'agonist': 'flexor', 'extensor': 'extensor',
+               'antagonist': 'extensor'}
 TIME_WORDS = (r't|time|t ?(nominal|rel|s)|time ?stamp|stamp|zeit|elapsed( time)?|timer|clock|'
               r'seconds|sec|date ?time|date')
 
@@ -106,7 +131,43 @@ def signal_of(name: str, where: str) -> Signal:
         of_topic = [one.name for one in SIGNALS if one.topic == name]
         hint = (f' but a topic: {" or ".join(of_topic)}' if of_topic
                 else did_you_mean(name, BY_NAME))
-        raise InputError(
-            f'{name!r} is no signal of a rig{hint}; allowed: '
-            f'{", ".join(BY_NAME)}', where)
+        raise InputError(f'{name!r} is no signal of a rig{hint}; allowed: {ALLOWED}', where)
     return BY_NAME[name]
+
+
+def of_words(words: str, path: str = '') -> Signal | None:
+    """
+    Return the signal that a name means, None where it means none.
+
+    Parameters
+    ----------
+    words : str
+        Of the name, in lower case.
+    path : str
+        What stands before it, such as ``/knee/flexor``.
+
+    """
+    sides = {_SIDE_WORDS[word] for word in re.split(r'[\W_]+', f'{path.lower()} {words}')
+             if word in _SIDE_WORDS}
+    if not sides:
+        return next((one for one in (*SIGNALS, *ANGLES) if one.is_named(words)), None)
+    own = ' '.join(word for word in words.split() if word not in _SIDE_WORDS)
+    single = next((one for one in SIGNALS if one.is_named(own)), None)
+    if single is None or len(sides) > 1:
+        return None
+    return BY_NAME.get(f'{sides.pop()}/{single.name}')
+
+
+def of_muscles(names: Iterable[str]) -> dict[str, set[str]]:
+    """Return the signals of each muscle by its place, '' for a muscle alone, else ``flexor/``."""
+    found: dict[str, set[str]] = {}
+    for name in names:
+        if BY_NAME[name] not in ANGLES:
+            side, slash, own = name.rpartition('/')
+            found.setdefault(side + slash, set()).add(own)
+    return found
+
+
+def are_of_joint(names: Iterable[str]) -> bool:
+    """Return whether these are signals of a joint: an angle, or those of one of its muscles."""
+    return any(BY_NAME[name] in JOINT_SIGNALS for name in names)

@@ -15,13 +15,14 @@
 """Units in which other programs write pressures, lengths, forces, signals and times."""
 
 from dataclasses import dataclass
+import math
 
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.units import P_ATM_PA
 
-PRESSURE, LENGTH, FORCE, VOLTAGE, DUTY, TIME = (
-    'pressure', 'length', 'force', 'voltage', 'duty', 'time')
+PRESSURE, LENGTH, FORCE, VOLTAGE, DUTY, ANGLE, TIME = (
+    'pressure', 'length', 'force', 'voltage', 'duty', 'angle', 'time')
 # Size of one unit in SI, by quantity. psi, lbf, kgf, mmHg, in: exact or as NIST SP 811 has them.
 FACTORS: dict[str, dict[str, float]] = {
     PRESSURE: {'Pa': 1.0, 'hPa': 1e2, 'mbar': 1e2, 'kPa': 1e3, 'bar': 1e5, 'MPa': 1e6,
@@ -32,6 +33,7 @@ FACTORS: dict[str, dict[str, float]] = {
             'gf': 9.80665e-3},
     VOLTAGE: {'V': 1.0, 'mV': 1e-3},
     DUTY: {'1': 1.0, '%': 1e-2},
+    ANGLE: {'rad': 1.0, 'mrad': 1e-3, 'deg': math.pi / 180.0},
     TIME: {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'min': 60.0, 'h': 3600.0}}
 GAUGE, ABSOLUTE = 'gauge', 'abs'
 DATE = 'date'                       # of a time: text such as 2026-11-25T09:30:00.125
@@ -41,7 +43,8 @@ _OTHER_NAMES = {'µm': 'um', 'μm': 'um', 'µs': 'us', 'μs': 'us', 'sec': 's', 
                 'seconds': 's', 'second': 's', 'msec': 'ms', 'usec': 'us', 'nsec': 'ns',
                 'inch': 'in', 'volt': 'V', 'volts': 'V', 'newton': 'N', 'percent': '%',
                 'lb': 'lbf', 'kg': 'kgf', 'g': 'gf', '-': '1', 'kgf/cm²': 'kgf/cm2',
-                'at': 'kgf/cm2', 'torr': 'mmHg'}
+                'at': 'kgf/cm2', 'torr': 'mmHg', '°': 'deg', 'degree': 'deg', 'degrees': 'deg',
+                'grad': 'deg', 'radian': 'rad', 'radians': 'rad'}
 
 
 @dataclass(frozen=True)
@@ -110,8 +113,9 @@ def checked_unit(text: str, quantity: str, where: str) -> Unit:
     unit = unit_of_text(text, quantity)
     if unit is None:
         names = names_of(quantity)
+        article = 'an' if quantity == ANGLE else 'a'
         raise InputError(
-            f'{text!r} is no unit of a {quantity}{did_you_mean(text, names)}; allowed: '
+            f'{text!r} is no unit of {article} {quantity}{did_you_mean(text, names)}; allowed: '
             + ', '.join(names), where)
     if not unit.is_complete:
         raise InputError(

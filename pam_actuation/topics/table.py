@@ -40,6 +40,8 @@ NEEDED, USED, EXTRA = 'needed', 'used', 'extra'
 # What a number means that is missing or not finite: a fault to be told; that the one before it
 # still counts, as a valve takes it; or nothing, since what is not asked for may be missing.
 TOLD, KEPT, ALLOWED = 'told', 'kept', 'allowed'
+# Values beside a position, in one message, that nobody may measure.
+OFTEN_EMPTY = ('velocity_m_per_s', 'torque_n_m')
 
 RECORDER = 'experiment_recorder'
 EVERY_NODE = 'every node'

@@ -19,7 +19,7 @@ import re
 from typing import Any
 
 import numpy as np
-from pam_actuation.tables.signals import SIGNALS
+from pam_actuation.tables.signals import of_words
 from pam_actuation.tables.table import Table
 from pam_actuation.tables.words import words_of
 from pam_sim.units import P_ATM_PA
@@ -36,6 +36,7 @@ _UNITS = (
     ('geometry_msgs/msg/WrenchStamped', 'force', 'N'))
 _ABSOLUTE_FROM_PA = 0.9 * P_ATM_PA      # no muscle is evacuated: below, the values are gauge
 _VALVES = re.compile(r'valves?|duty|duties|pwm|solenoids?')
+_AXES = ('x', 'y', 'z')
 _MUSCLES = re.compile(r'pam|muscle|mckibben')
 # What a field of an item is called that is a muscle by its name.
 _OF_A_MUSCLE = {'position': 'position', 'effort': 'force'}
@@ -96,7 +97,7 @@ def describe(table: Table, msgtype: str) -> None:
 
     """
     changing = [name for name, values in table.columns.items() if values.nunique() > 1]
-    topic = table.topic.rpartition('/')[2]
+    place, _, topic = table.topic.rpartition('/')
     duties = _duty_unit(table, topic, changing)
     for column, values in table.columns.items():
         path = column.removeprefix(table.topic).lstrip('.')
@@ -110,14 +111,15 @@ def describe(table: Table, msgtype: str) -> None:
             table.by_type.add(column)
         if duties:
             # Which of the two fills is asked for.
-            table.called[column], table.units[column] = 'fill duty', duties
+            table.called[column], table.units[column] = f'{place}/fill duty', duties
         elif item:
             is_muscle = _MUSCLES.search(item.lower())
-            table.called[column] = _OF_A_MUSCLE.get(leaf, '') if is_muscle else ''
-        elif _is_signal(leaf) and leaf not in ('x', 'y', 'z'):
-            table.called[column] = leaf
+            own = _OF_A_MUSCLE.get(leaf, '') if is_muscle else ''
+            table.called[column] = f'{place}/{item}/{own}' if own else ''
+        elif leaf not in _AXES and of_words(words_of(leaf), place) is not None:
+            table.called[column] = f'{place}/{leaf}'
         elif len(changing) == 1:
-            table.called[column] = topic
+            table.called[column] = f'{place}/{topic}'
 
 
 def _unit(msgtype: str, path: str, values: Any) -> str:
@@ -139,8 +141,3 @@ def _duty_unit(table: Table, topic: str, changing: list[str]) -> str:
     if low < 0.0:
         return ''
     return '1' if high <= 1.0 else '%' if _FULL_PERCENT[0] < high <= _FULL_PERCENT[1] else ''
-
-
-def _is_signal(name: str) -> bool:
-    words = words_of(name)
-    return any(signal.is_named(words) for signal in SIGNALS)
