@@ -66,12 +66,14 @@ class ModelCheck:
     How a model's free run compares with a recording.
 
     ``share`` is the largest of pressure and contraction (of a joint: angle) errors, rms over
-    recorded range. ``signal`` is the one it belongs to, ``rms`` its size in SI.
+    recorded range. ``signal`` is the one it belongs to, ``rms`` its size in SI. Without
+    ``valve_judged`` the measured pressure was the input.
     """
 
     signal: str
     share: float
     rms: float
+    valve_judged: bool = True
 
     @property
     def verdict(self) -> str:
@@ -89,8 +91,10 @@ class ModelCheck:
             'doubtful': 'doubtful for tuning: tune on randomised rigs too, or correct the model '
                         'with pam gap first',
             'wrong': 'not trustworthy for tuning: correct it with pam gap first'}[self.verdict]
+        alone = '' if self.valve_judged else (
+            ' The recording has no command of the valve, so this says nothing of the valve.')
         return (f'The model misses the recorded {self.signal} by {size} rms, '
-                f'{100 * self.share:.1f} % of its range: {says}.')
+                f'{100 * self.share:.1f} % of its range: {says}.{alone}')
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data."""
@@ -186,17 +190,21 @@ def check_model(run: 'Run', rig: 'Rig | JointRig') -> ModelCheck:
     """
     modelled = replace(run, metadata={**run.metadata, 'rig': rig.to_yaml()})
     differences: list[Difference]
+    valve_judged = True
     if isinstance(rig, JointRig):
         _check_valves(run, rig)
         names = _OF_JOINT
         differences = replay_joint(modelled, only='plant').parts['plant'].differences
     else:
-        names, differences = _OF_MUSCLE, replay_plant(modelled).differences
+        replayed = replay_plant(modelled)
+        names, differences = _OF_MUSCLE, replayed.differences
+        valve_judged = 'pressure' in replayed.recorded
     worst = None
     for one in differences:
         if one.signal in names and one.span > 0.0:
             if worst is None or one.rms / one.span > worst.share:
-                worst = ModelCheck(names[one.signal], one.rms / one.span, one.rms)
+                worst = ModelCheck(
+                    names[one.signal], one.rms / one.span, one.rms, valve_judged)
     if worst is None:
         raise InputError('neither pressure nor contraction moves', str(run.path))
     return worst

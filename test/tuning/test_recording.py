@@ -67,6 +67,12 @@ def test_what_a_recording_cannot_tell_is_a_note(run, rig):
     foreign = Run({name: run.topics[name] for name in ('pressure', 'contraction')},
                   {}, '/muscle', 'foreign')
     found = check(foreign, rig, load_controller('pid', rig))
+    assert not found.model.valve_judged and found.model.verdict == 'trusted'
+    assert found.model.sentence().endswith('so this says nothing of the valve.')
+    assert found.counterfactual is None
+    assert len(found.notes) == 1 and found.notes[0].startswith('No counterfactual check')
+    silent = Run({'pressure': run.topics['pressure']}, {}, '/muscle', 'silent')
+    found = check(silent, rig, load_controller('pid', rig))
     assert found.model is None and found.counterfactual is None
     assert len(found.notes) == 2 and all(note.startswith('No ') for note in found.notes)
 
