@@ -165,7 +165,8 @@ def _show(args: argparse.Namespace, tables: 'list[Table]', found: 'Guess') -> in
     lines = [preview(tables, found, args.missing)]
     if found.questions:
         lines += ['', 'the file does not tell:', questions_text(found)]
-    lines += ['', *_mapping_lines(found)]
+    if found.mapping.signals or not found.questions:
+        lines += ['', *_mapping_lines(found)]
     emit(args, {
         'files': args.files, 'mapping': found.mapping.to_yaml(),
         'questions': [{'signal': one.signal, 'column': one.column, 'text': one.text,

@@ -30,6 +30,8 @@ from pam_actuation.tables.words import unit_in, words_of
 from pam_sim.units import P_ATM_PA
 
 BELOW_ATMOSPHERE = 0.9            # of it: no muscle on a rig is evacuated further
+# What names of other programs end in that says only where in a message the number stands.
+_PLACE = re.compile(r'(?<=.)/(data|value|[xyz])([.\[]\d+\]?)?$')
 FEW_BELOW = 0.02                  # share of the rows; fewer may be a sensor that drops out
 
 
@@ -111,7 +113,10 @@ def guess(tables: Collection[Table], mapping: TableMapping,
         for column in table.columns:
             if column in used or re.fullmatch(TIME_WORDS, words_of(column)):
                 continue
-            signal = _signal_of(table.called.get(column, column))
+            name = table.called.get(column, column)
+            if _PLACE.search(name):
+                name = _named(table, column, name)
+            signal = _signal_of(name)
             if signal is None or signal.name in mapping.signals or column in seen.get(
                     signal.name, {}):
                 continue
@@ -174,6 +179,11 @@ def ask(found: Guess, answer: Callable[[str, tuple[str, ...]], str | None]) -> G
     return Guess(replace(found.mapping, signals=signals), told)
 
 
+def _named(table: Table, column: str, name: str) -> str:
+    """Return the name before ``/data`` or ``/z``; '' for a column that never changes."""
+    return _PLACE.sub('', name) if table.columns[column].nunique() > 1 else ''
+
+
 def _signal_of(column: str) -> Signal | None:
     """Return the signal that the name of a column means."""
     path, _, name = column.rpartition('/')
@@ -192,7 +202,8 @@ def _of_column(table: Table, column: str, signal: Signal, missing: Collection[st
     if _is_exported(column, signal):
         si = si_unit(signal.quantity)
         return ColumnMap(column, si), f'unit {si.name} by name'
-    text = table.units.get(column, '') or unit_in(table.called.get(column, column))
+    text = table.units.get(column, '') or unit_in(
+        _PLACE.sub('', table.called.get(column, column)))
     unit = unit_of_text(text, signal.quantity) if text else None
     if unit is None and text and any(unit_of_text(text, one) for one in FACTORS):
         return None                                     # such as a pressure sensor's volts
@@ -227,7 +238,8 @@ _LARGEST = {PRESSURE: 1e6, LENGTH: 0.12, 'force': 2000.0, VOLTAGE: 10.5, 'duty':
 
 def _plausible(signal: Signal, low: float, high: float) -> list[str]:
     """Return the units in which a range fits a rig; all of them where none does."""
-    largest = max(abs(low), abs(high))
+    # A length may count from anywhere.
+    largest = high - low if signal.quantity == LENGTH else max(abs(low), abs(high))
     fitting = []
     for name in names_of(signal.quantity):
         unit: Unit | None = unit_of_text(name, signal.quantity)

@@ -175,3 +175,21 @@ def test_a_bag_of_ros_1(tmp_path, capsys):
     capsys.readouterr()
     assert main(['import', str(bag), '--preview']) == 2
     assert 'is no readable bag' in capsys.readouterr().err
+
+
+def test_a_table_of_plotjuggler(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    wrench = '/exo/left/load_cell/wrench/force'
+    columns = {'__time': 1.7e9 + TIME_S, '/exo/left/pressure/fluid_pressure': PRESSURE_PA,
+               '/exo/joint_states/left_pam/position': LENGTH_M, f'{wrench}/x': 0.0 * TIME_S,
+               f'{wrench}/z': PULL_N, '/exo/left/valve_cmd/data.0': 3.0 + TIME_S}
+    np.savetxt('pj.csv', np.column_stack([*columns.values()]), '%.6f', ',', comments='',
+               header=','.join(columns))
+    assert main(['import', 'pj.csv', '--preview']) == 0
+    said = capsys.readouterr().out
+    for part in ('--map pressure="/exo/left/pressure/fluid_pressure:Pa_gauge"',
+                 '--map contraction="/exo/joint_states/left_pam/position:m"',
+                 f'--map force="{wrench}/z:N"',
+                 '--map ppr_voltage="/exo/left/valve_cmd/data.0:V"'):
+        assert part in said, part
+    assert f'{wrench}/x:' not in said and 'no column is known' not in said
