@@ -32,7 +32,6 @@ HELP = """Make a bag of a table measured elsewhere: CSV, TSV, Parquet, MAT, HDF5
 
 Without --map the columns are found by name, unit and range; --preview shows how. What the file
 cannot tell is asked for. Several files are one recording: the next part, or other signals."""
-COMMANDS = {'ppr_voltage', 'fill_duty', 'vent_duty', 'pressure_command'}
 _MOST_LEFT = 12                     # names of columns that are told
 EXAMPLE = 'pam import run7.csv --map pressure="p_bar:bar_gauge" --out runs/run7'
 
@@ -195,8 +194,8 @@ def _tell(args: argparse.Namespace, recording: 'Recording', found: 'Guess',
     if left:
         lines.append('  not imported: ' + ', '.join(f'"{column}"' for column in left[:_MOST_LEFT])
                      + (f' and {len(left) - _MOST_LEFT} more' if len(left) > _MOST_LEFT else ''))
-    if {'pressure', 'contraction'} <= set(found.mapping.signals) and not COMMANDS & set(
-            found.mapping.signals):
+    if {'pressure', 'contraction'} <= set(found.mapping.signals) and not (
+            recording.valve or 'pressure_command' in found.mapping.signals):
         lines.append('  no command of the valve: pam gap and pam identify compare muscle and '
                      'load, driven by the pressure')
     lines += [f'remark: {text}' for text in remarks]

@@ -24,7 +24,7 @@ from pam_actuation.tables.signals import (
     ANGLES, are_of_joint, BY_NAME, of_words, Signal, TIME_WORDS)
 from pam_actuation.tables.table import Table
 from pam_actuation.tables.units import (
-    ABSOLUTE, ANGLE, FACTORS, GAUGE, LENGTH, names_of, PRESSURE, si_unit, Unit, unit_of_text,
+    ABSOLUTE, ANGLE, checked_unit, FACTORS, GAUGE, LENGTH, names_of, PRESSURE, si_unit, Unit, unit_of_text,
     VOLTAGE)
 from pam_actuation.tables.words import unit_in, words_of
 from pam_sim.units import P_ATM_PA
@@ -113,10 +113,7 @@ def guess(tables: Collection[Table], mapping: TableMapping,
         for column in table.columns:
             if column in used or re.fullmatch(TIME_WORDS, words_of(column)):
                 continue
-            name = table.called.get(column, column)
-            if _PLACE.search(name):
-                name = _named(table, column, name)
-            signal = _signal_of(name)
+            signal = _signal_of(_name_of(table, column))
             if signal is None or signal.name in mapping.signals or column in seen.get(
                     signal.name, {}):
                 continue
@@ -124,8 +121,7 @@ def guess(tables: Collection[Table], mapping: TableMapping,
             if answer is not None:
                 seen.setdefault(signal.name, {})[column] = answer
     signals = dict(mapping.signals)
-    joint = are_of_joint({*signals, *seen} - {one.name for one in ANGLES}) or any(
-        one.name in signals for one in ANGLES)
+    joint = are_of_joint(signals) or are_of_joint(seen.keys() - {one.name for one in ANGLES})
     for name, candidates in seen.items():
         if are_of_joint([name]) != joint:       # such as the angle of a joint with one muscle
             continue
@@ -179,8 +175,11 @@ def ask(found: Guess, answer: Callable[[str, tuple[str, ...]], str | None]) -> G
     return Guess(replace(found.mapping, signals=signals), told)
 
 
-def _named(table: Table, column: str, name: str) -> str:
-    """Return the name before ``/data`` or ``/z``; '' for a column that never changes."""
+def _name_of(table: Table, column: str) -> str:
+    """Return what a column is called before ``/data`` or ``/z``; '' for one that stands still."""
+    name = table.called.get(column, column)
+    if _PLACE.search(name) is None:
+        return name
     return _PLACE.sub('', name) if table.columns[column].nunique() > 1 else ''
 
 
@@ -202,8 +201,7 @@ def _of_column(table: Table, column: str, signal: Signal, missing: Collection[st
     if _is_exported(column, signal):
         si = si_unit(signal.quantity)
         return ColumnMap(column, si), f'unit {si.name} by name'
-    text = table.units.get(column, '') or unit_in(
-        _PLACE.sub('', table.called.get(column, column)))
+    text = table.units.get(column, '') or unit_in(_name_of(table, column))
     unit = unit_of_text(text, signal.quantity) if text else None
     if unit is None and text and any(unit_of_text(text, one) for one in FACTORS):
         return None                                     # such as a pressure sensor's volts
@@ -220,11 +218,13 @@ def _of_column(table: Table, column: str, signal: Signal, missing: Collection[st
         by = 'message type' if column in table.by_type else 'name'
         return ColumnMap(column, unit), f'unit {unit.name} by {by}'
     below = finite * unit.factor < BELOW_ATMOSPHERE * P_ATM_PA
+    if column in table.by_type and not below.any():         # as the type of the message says
+        chosen = checked_unit(f'{unit.name}_{ABSOLUTE}', PRESSURE, column)
+        return ColumnMap(column, chosen), f'unit {chosen.name} by message type'
     if below.any() and float(below.mean()) < FEW_BELOW:
         shown += f', below 1 atmosphere in {int(below.sum())} of {len(finite)} rows only'
     elif below.any():
-        chosen = unit_of_text(f'{unit.name}_{GAUGE}', PRESSURE)
-        assert chosen is not None
+        chosen = checked_unit(f'{unit.name}_{GAUGE}', PRESSURE, column)
         return ColumnMap(column, chosen), f'gauge, since it falls to {low:.3g} {unit.name}'
     return Question(signal.name, column,
                     f'{shown}: gauge (0 when vented) or absolute?',

@@ -68,8 +68,7 @@ def doubts(signals: Mapping[str, tuple[IntArray, FloatArray]], mapped: Mapping[s
 
     """
     found = []
-    values = {name: column for name, (_, column) in signals.items()}
-    for name, column in values.items():
+    for name, (_, column) in signals.items():
         signal, finite = BY_NAME[name], column[np.isfinite(column)]
         said = f'{name} (column "{mapped[name].column}" in {mapped[name].unit.name})'
         lost = len(column) - len(finite)
@@ -85,19 +84,18 @@ def doubts(signals: Mapping[str, tuple[IntArray, FloatArray]], mapped: Mapping[s
         if {'pressure', 'contraction'} <= names:
             own = {name: signals[f'{place}{name}'] for name in names}
             read = {name: mapped[f'{place}{name}'] for name in names}
-            found += [one for one in (_held({name: column for name, (_, column) in own.items()},
-                                            read, length_m),
-                                      _zero(own, read, length_m)) if one is not None]
+            both = _held(own, read, length_m), _zero(own, read, length_m)
+            found += [one for one in both if one is not None]
     return found
 
 
-def _held(values: Mapping[str, FloatArray], mapped: Mapping[str, ColumnMap], length_m: float
-          ) -> Doubt | None:
+def _held(signals: Mapping[str, tuple[IntArray, FloatArray]], mapped: Mapping[str, ColumnMap],
+          length_m: float) -> Doubt | None:
     """Return a doubt on a muscle that hardly moves under much pressure, None without."""
-    if not all(np.isfinite(values[name]).any() for name in ('pressure', 'contraction')):
+    both = [signals[name][1] for name in ('pressure', 'contraction')]
+    if not all(np.isfinite(column).any() for column in both):
         return None
-    risen_pa, moved_m = (float(np.nanmax(values[name]) - np.nanmin(values[name]))
-                         for name in ('pressure', 'contraction'))
+    risen_pa, moved_m = (float(np.nanmax(column) - np.nanmin(column)) for column in both)
     if risen_pa < MUCH_PA or not LEAST_MOVE[LENGTH] <= moved_m < LITTLE * length_m:
         return None
     one = mapped['contraction']

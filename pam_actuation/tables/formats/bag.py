@@ -85,9 +85,9 @@ def _tables(path: str, topic: str, msgtype: str, found: list[Message]) -> list[T
         return [_table(path, topic, msgtype, found)] if found else []
     tables = []
     for name in dict.fromkeys(name for one in found for name in one.names):
-        own = [one.of(name) for one in found if name in one.names]
-        table = _table(path, topic, msgtype, own)
-        places = {one.names.index(name) for one in found if name in one.names}
+        own = [one for one in found if name in one.names]
+        table = _table(path, topic, msgtype, [one.of(name) for one in own])
+        places = {one.names.index(name) for one in own}
         if len(places) == 1:            # the number of the item says the same as its name
             place = f'[{places.pop()}]'
             table.aliases = {column.replace(f'[{name}]', place): column

@@ -18,15 +18,14 @@ from dataclasses import dataclass
 import re
 from typing import Any
 
-import numpy as np
 from pam_actuation.tables.signals import of_words
 from pam_actuation.tables.table import Table
 from pam_actuation.tables.words import words_of
-from pam_sim.units import P_ATM_PA
 
 # Fields in which messages name the items of their arrays (sensor_msgs, trajectory_msgs, ...).
 _NAMES = ('name', 'names', 'joint_names')
-# Units that the definitions of standard messages state: type and field to unit.
+# Units that the definitions of standard messages state: type and field to unit. A pressure is
+# absolute by its definition; many senders put gauge values there.
 _UNITS = (
     ('sensor_msgs/msg/FluidPressure', 'fluid_pressure', 'Pa'),
     ('sensor_msgs/msg/JointState', 'position', 'm'),
@@ -34,7 +33,6 @@ _UNITS = (
     ('sensor_msgs/msg/Range', 'range', 'm'),
     ('geometry_msgs/msg/Wrench', 'force', 'N'),
     ('geometry_msgs/msg/WrenchStamped', 'force', 'N'))
-_ABSOLUTE_FROM_PA = 0.9 * P_ATM_PA      # no muscle is evacuated: below, the values are gauge
 _VALVES = re.compile(r'valves?|duty|duties|pwm|solenoids?')
 _AXES = ('x', 'y', 'z')
 _MUSCLES = re.compile(r'pam|muscle|mckibben')
@@ -99,13 +97,13 @@ def describe(table: Table, msgtype: str) -> None:
     changing = [name for name, values in table.columns.items() if values.nunique() > 1]
     place, _, topic = table.topic.rpartition('/')
     duties = _duty_unit(table, topic, changing)
-    for column, values in table.columns.items():
+    for column in table.columns:
         path = column.removeprefix(table.topic).lstrip('.')
         leaf, _, item = re.sub(r'\[\d+\]$', '', path).rpartition('.')[2].partition('[')
         table.called[column] = ''
         if column not in changing:
             continue
-        unit = _unit(msgtype, path, values)
+        unit = _unit(msgtype, path)
         if unit:
             table.units[column] = unit
             table.by_type.add(column)
@@ -122,13 +120,10 @@ def describe(table: Table, msgtype: str) -> None:
             table.called[column] = f'{place}/{topic}'
 
 
-def _unit(msgtype: str, path: str, values: Any) -> str:
+def _unit(msgtype: str, path: str) -> str:
     """Return the unit that the definition of a message states; '' without."""
-    for of_type, field, unit in _UNITS:
-        if msgtype == of_type and field in re.split(r'[.\[]', path):
-            is_absolute = unit == 'Pa' and float(np.nanmin(values)) >= _ABSOLUTE_FROM_PA
-            return 'Pa_abs' if is_absolute else unit
-    return ''
+    return next((unit for of_type, field, unit in _UNITS
+                 if msgtype == of_type and field in re.split(r'[.\[]', path)), '')
 
 
 def _duty_unit(table: Table, topic: str, changing: list[str]) -> str:

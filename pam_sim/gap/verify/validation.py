@@ -252,9 +252,9 @@ class Validation:
         random, r = np.random.default_rng(seed), self.recording
         found: list[dict[str, FloatArray]] = []
         start_sd = start_error_sd(r)
-        noise = self._pressure_noise()
+        noise = self._pressure_noise() if r.pressure_given else None
         for _ in range(INPUT_DRAWS):
-            if r.pressure_given:
+            if noise is not None:
                 drift_pa = DRIFT_SD * noise.sd * random.standard_normal()
                 moved = self.run(final, whole, pressure_noise_pa=drift_pa + noise.draw(
                     r.time_s['pressure'], random))
