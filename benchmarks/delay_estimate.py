@@ -24,7 +24,7 @@ pressure alone, behind on/off valves the duties, the measured pressure and the c
 
 - ``ppr``, ``hsv``: the rigs of this package. Wanted is the first order model that answers best to
   random steps, in open loop and without noise.
-- ``command``: on/off valves, but of the command and the measured pressure alone.
+- ``command``: on/off valves. The estimate sees the command and the measured pressure alone.
 - ``hidden``, ``hidden_hsv``: simulators of other equations, behind a regulator and on/off valves.
 - ``change``: dead time and lag change after 30 s. When are the new ones found?
 """

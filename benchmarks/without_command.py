@@ -141,9 +141,9 @@ def show(found):
     alarms = sum(counts(f, 'without')[2] for f in found)
     valve = sum('valve' not in f['answers']['without'].get('not_judged', {}) for f in found)
     met = right['without'] >= 0.95 * right['with'] and alarms == 0 and valve == 0
-    print(f'\nBar: without the command at least 95 % as many right or in a set as with it '
-          f'({right["without"]} and {right["with"]}), no wrong name ({alarms}), the valve judged '
-          f'nowhere ({valve}): {"met" if met else "**missed**"}.')
+    print(f'\nBar: {"met" if met else "**missed**"}. Without the command at least 95 % as many '
+          f'are right or in a set as with it ({right["without"]} and {right["with"]}). There is '
+          f'no wrong name ({alarms}), and the valve is judged nowhere ({valve}).')
     return int(not met)
 
 

@@ -24,8 +24,8 @@ from pam_actuation.tables.signals import (
     ANGLES, are_of_joint, BY_NAME, of_words, Signal, TIME_WORDS)
 from pam_actuation.tables.table import Table
 from pam_actuation.tables.units import (
-    ABSOLUTE, ANGLE, checked_unit, FACTORS, GAUGE, LENGTH, names_of, PRESSURE, si_unit, Unit, unit_of_text,
-    VOLTAGE)
+    ABSOLUTE, ANGLE, checked_unit, FACTORS, GAUGE, LENGTH, names_of, PRESSURE, si_unit, Unit,
+    unit_of_text, VOLTAGE)
 from pam_actuation.tables.words import unit_in, words_of
 from pam_sim.units import P_ATM_PA
 

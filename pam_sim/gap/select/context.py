@@ -150,7 +150,7 @@ def first_gap_of(problem: SubsystemProblem, base: Fit, screened: Iterable[Screen
 
     Both the fitted and the judging part must show it. One that is below the floor
     can still be seen, if an effect promises to explain a part of the errors. Where stretches of
-    the same edges are dealt out, errors of the measured pressure are the same in all parts; a gap
+    the same edges are dealt out, errors of the measured pressure are the same in all parts. A gap
     of muscle and load no larger than the floor may be theirs, and is none.
     """
     found = _seen_gap_of(problem, base, screened, seen_gap)
