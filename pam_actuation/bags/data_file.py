@@ -14,7 +14,7 @@
 
 """One data file of a bag while it is written: stream, lock, topics and counts."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 import contextlib
 import functools
 import os
@@ -23,8 +23,9 @@ import tempfile
 from typing import Any, BinaryIO
 
 from pam_actuation.bags import disk, layout
-from pam_actuation.bags.mcap_write import McapWriter
+from pam_actuation.bags.mcap_write import McapWriter, MessageSeries
 from pam_actuation.topics.definitions import schema_text
+from pam_sim.annotations import ByteArray, IntArray
 
 LIBRARY = 'pam_actuation'
 
@@ -101,6 +102,17 @@ class DataFile:
             self.end_ns = log_time_ns
         elif log_time_ns < self.start_ns:
             self.start_ns = log_time_ns
+
+    def write_series(self, series: Mapping[str, tuple[IntArray, ByteArray]]) -> None:
+        """Append messages by topic, see ``BagWriter.write_series``."""
+        self.mcap.add_series([MessageSeries(self._channels[name], time_ns, data)
+                              for name, (time_ns, data) in series.items()])
+        for time_ns, _ in series.values():
+            if time_ns.size:
+                self.count += time_ns.size
+                ends = [int(time_ns.min()), int(time_ns.max())]
+                known = [t for t in (self.start_ns, self.end_ns) if t is not None]
+                self.start_ns, self.end_ns = min(ends + known), max(ends + known)
 
     @property
     def size(self) -> int:

@@ -21,10 +21,10 @@ clock and needs a few microseconds per message. Recovery copies chunks as they a
 https://mcap.dev/spec.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 import io
 import struct
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NamedTuple
 import zlib
 
 from mcap.data_stream import ReadDataStream, RecordBuilder
@@ -35,6 +35,7 @@ from mcap.records import (
     SummaryOffset)
 import numpy as np
 from pam_actuation.bags import disk
+from pam_sim.annotations import ByteArray, IntArray
 import zstandard
 
 MAGIC = b'\x89MCAP0\r\n'
@@ -42,11 +43,35 @@ CHUNK_BYTES = 128 * 1024           # of unpacked records: what one damaged place
 RECORD = struct.Struct('<BQ')
 MESSAGE = struct.Struct('<BQHIQQ')
 MESSAGE_OVERHEAD = MESSAGE.size - RECORD.size
+_MESSAGE_FIELDS = np.dtype([
+    ('opcode', 'u1'), ('length', '<u8'), ('channel', '<u2'), ('sequence', '<u4'),
+    ('log_time_ns', '<u8'), ('publish_time_ns', '<u8')])
 CHUNK_HEAD = struct.Struct('<QQQI')
 _TEXT_LENGTH = struct.Struct('<I')
 _DATA_LENGTH = struct.Struct('<Q')
 _INDEX_HEAD = struct.Struct('<BQHI')
 _CONTENT_CRC = struct.Struct('<BQQQ')
+
+
+class MessageSeries(NamedTuple):
+    """
+    Messages of equal length of one channel: times [ns], shape (N,), and bytes, shape (N, B).
+
+    They were received when they were sent.
+    """
+
+    channel: int
+    time_ns: IntArray
+    data: ByteArray
+
+    def records(self) -> ByteArray:
+        """Return the records of the messages, one a row."""
+        count, size = self.data.shape
+        heads = np.zeros(count, _MESSAGE_FIELDS)
+        heads['opcode'], heads['length'] = Opcode.MESSAGE, MESSAGE_OVERHEAD + size
+        heads['channel'] = self.channel
+        heads['log_time_ns'] = heads['publish_time_ns'] = self.time_ns
+        return np.hstack([heads.view(np.uint8).reshape(count, MESSAGE.size), self.data])
 
 
 class McapWriter:
@@ -136,6 +161,39 @@ class McapWriter:
         self.pending += MESSAGE.size + size
         if self.pending >= self._chunk_bytes:
             self.close_chunk()
+
+    def add_series(self, series: Sequence[MessageSeries]) -> None:
+        """
+        Append many messages in the order of their times, and of the series where these are equal.
+
+        The file is the same as after ``add_message`` for each of them. This works on arrays.
+        """
+        if not series:
+            return
+        records = [one.records() for one in series]
+        which = np.repeat(np.arange(len(series)), [len(one) for one in records])
+        row = np.concatenate([np.arange(len(one)) for one in records])
+        time_ns = np.concatenate([one.time_ns for one in series])
+        order = np.lexsort((which, time_ns))
+        which, row, time_ns = which[order], row[order], time_ns[order]
+        ends = np.cumsum(np.array([one.shape[1] for one in records])[which])
+        first, done = 0, 0
+        while first < which.size:
+            full = done + self._chunk_bytes - self.pending
+            last = min(int(np.searchsorted(ends, full)) + 1, which.size)
+            size = int(ends[last - 1]) - done
+            part, times = np.empty(size, np.uint8), time_ns[first:last]
+            for place in dict.fromkeys(which[first:last].tolist()):
+                own, record = which[first:last] == place, records[place]
+                begin = ends[first:last][own] - record.shape[1] - done
+                part[begin[:, np.newaxis] + np.arange(record.shape[1])] = record[
+                    row[first:last][own]]
+                self._index.setdefault(series[place].channel, []).extend(np.column_stack(
+                    [times[own], begin + self.pending]).ravel().tolist())
+            self._append(part.tobytes())
+            if self.pending >= self._chunk_bytes:
+                self.close_chunk()
+            first, done = last, done + size
 
     def add_metadata(self, name: str, texts: dict[str, str]) -> None:
         """Append a named record of texts, after the chunk before it."""

@@ -30,6 +30,7 @@ from pam_actuation.bags import disk, layout
 from pam_actuation.bags.data_file import DataFile
 from pam_actuation.bags.place import BagPlace
 from pam_actuation.topics.definitions import type_hash
+from pam_sim.annotations import ByteArray, IntArray
 from pam_sim.errors import InputError
 from pam_sim.files import StrPath
 
@@ -174,6 +175,29 @@ class BagWriter:
             file = self._open
         file.write(full_name, cdr_bytes, log_time_ns, publish_time_ns)
         self._topics[full_name]['count'] += 1
+
+    def write_series(self, series: Mapping[str, tuple[IntArray, ByteArray]]) -> None:
+        """
+        Append many messages at once, each received when it was sent; to the newest file.
+
+        Parameters
+        ----------
+        series : dict of str -> (numpy.ndarray, numpy.ndarray)
+            By full topic name: times [ns], shape (N,), and CDR bytes of equal length, shape
+            (N, B), as of ``codec.encode_series``. Messages are ordered by time, at equal times
+            as the topics are here.
+
+        Raises
+        ------
+        KeyError
+            Unknown topic.
+        OSError
+            The file system refuses; what was written before stays.
+
+        """
+        self._open.write_series(series)
+        for name, (time_ns, _) in series.items():
+            self._topics[name]['count'] += time_ns.size
 
     def add_metadata(self, name: str, values: Mapping[str, object]) -> None:
         """Append a named metadata record of texts."""

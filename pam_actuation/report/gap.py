@@ -39,9 +39,10 @@ from pam_actuation.report.sections.numbers_first import numbers_section
 from pam_actuation.report.sections.provenance import provenance
 from pam_actuation.report.sections.replay import Overlay
 from pam_actuation.report.signals import start_ns
-from pam_actuation.topics.codec import encode
+from pam_actuation.topics.codec import encode_series
 from pam_actuation.topics.table import topic_of
 from pam_sim import load_rig, preset_names
+from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.errors import InputError
 from pam_sim.files import check_folder, StrPath, whole_files, write_json, write_text
 from pam_sim.gap import find_gap
@@ -216,25 +217,20 @@ def write_compare(result: 'GapResult', namespace: str, path: StrPath) -> None:
     """Write measured and simulated signals and their residuals as one MCAP file."""
     path = Path(path)
     prefix = '/' + namespace.strip('/') if namespace.strip('/') else ''
-    rows: list[tuple[int, str, str, float]] = []
+    curves: dict[str, tuple[str, IntArray, FloatArray]] = {}
     for signal, trace in result.traces.items():
-        curves = (trace.measured, trace.before, trace.refit, trace.after,
-                  trace.measured - trace.before, trace.measured - trace.after)
-        for folder, values in zip(FOLDERS, curves):
-            topic = f'{prefix}/{folder}/{signal}'
-            rows += [(int(t), topic, signal, float(v))
-                     for t, v in zip(trace.stamp_ns, values)]
+        for folder, values in zip(FOLDERS, (
+                trace.measured, trace.before, trace.refit, trace.after,
+                trace.measured - trace.before, trace.measured - trace.after)):
+            curves[f'{prefix}/{folder}/{signal}'] = signal, trace.stamp_ns, values
     for signal, (stamp_ns, values) in result.inputs.items():
-        rows += [(int(t), f'{prefix}/{FOLDERS[0]}/{signal}', signal, float(v))
-                 for t, v in zip(stamp_ns, values)]
-    rows.sort(key=lambda row: row[:2])
+        curves[f'{prefix}/{FOLDERS[0]}/{signal}'] = signal, stamp_ns, values
     with tempfile.TemporaryDirectory(dir=path.parent, prefix='.compare') as folder:
         with BagWriter(Path(folder) / 'compare', {'verdict': result.verdict}) as bag:
-            for topic, signal in sorted({(row[1], row[2]) for row in rows}):
-                bag.add_topic(topic, topic_of(signal).type_name)
-            for stamp, topic, signal, value in rows:
-                message = topic_of(signal).content.message(stamp, value)
-                bag.write(topic, encode(signal, message), stamp, stamp)
+            for topic in sorted(curves):
+                bag.add_topic(topic, topic_of(topic).type_name)
+            bag.write_series({topic: (stamp_ns, encode_series(signal, stamp_ns, values))
+                              for topic, (signal, stamp_ns, values) in sorted(curves.items())})
         os.replace(bag.file, path)
 
 

@@ -26,10 +26,12 @@ import math
 import struct
 from typing import Any
 
+import numpy as np
 from pam_actuation.topics import cdr
 from pam_actuation.topics.contents import Encode, Make, Numeric
 from pam_actuation.topics.definitions import little_endian
 from pam_actuation.topics.table import topic_of
+from pam_sim.annotations import ByteArray, FloatArray, IntArray
 from pam_sim.errors import InputError
 
 # What bytes raise that are not the message they are said to be.
@@ -65,6 +67,36 @@ def encode(topic: str, message: Any) -> bytes:
 
     """
     return _encoder(topic)(message)
+
+
+def encode_series(topic: str, stamp_ns: IntArray, values: FloatArray) -> ByteArray:
+    """
+    Return the CDR bytes of many messages that carry one number each.
+
+    Parameters
+    ----------
+    topic : str
+        Short or full name of a topic of numbers.
+    stamp_ns : numpy.ndarray of int, shape (N,)
+        Header stamps [ns].
+    values : numpy.ndarray, shape (N,)
+        The first number of each message; others are left out.
+
+    Returns
+    -------
+    numpy.ndarray of uint8, shape (N, B)
+        A row is what ``encode`` returns.
+
+    """
+    content = topic_of(topic).numeric
+    assert content is not None, topic
+    sample = encode(topic, content.maker(content.always[:1])(0, [0.0]))
+    begin, = [place for place in content.places(sample).offsets[:1] if place is not None]
+    found = np.tile(np.frombuffer(sample, np.uint8), (len(values), 1))
+    stamps = np.column_stack(np.divmod(np.asarray(stamp_ns, np.int64), cdr.NS_PER_S))
+    found[:, cdr.START:cdr.START + 8] = stamps.astype('<u4').view(np.uint8)
+    found[:, begin:begin + 8] = np.asarray(values, '<f8').reshape(-1, 1).view(np.uint8)
+    return found
 
 
 def decode(topic: str, raw: bytes) -> Any:

@@ -49,6 +49,18 @@ def test_bytes_are_those_of_the_reference_encoder(short):
     assert raw == bytes(again)
 
 
+@pytest.mark.parametrize('short', ['pressure', 'contraction', 'force', 'pressure_command'])
+def test_bytes_of_a_series_are_those_of_its_messages(short):
+    stamp_ns = np.array([0, 999_999_999, 1_700_000_000_123_456_789])
+    values = np.array([0.25, NAN, -3.5e-5])
+    message = codec.decode(short, codec.encode(short, example_messages(0)[short]))
+    first = codec.topic_of(short).numeric.always[0]
+    rows = codec.encode_series(short, stamp_ns, values)
+    assert [row.tobytes() for row in rows] == [
+        codec.encode(short, type(message)(stamp, **{first: value}))
+        for stamp, value in zip(stamp_ns.tolist(), values.tolist())]
+
+
 @pytest.mark.parametrize('names', [
     (), ('a',), ('ab', 'abc'), ('abcd', '', 'x' * 17), ('größe_m',)])
 def test_joint_states_of_any_names_are_aligned_as_the_reference_encoder_does(names):

@@ -19,6 +19,7 @@ import tracemalloc
 
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
+import numpy as np
 from pam_actuation.bags import layout
 from pam_actuation.bags.check import independent_readers
 from pam_actuation.bags.source import read_bag
@@ -82,6 +83,36 @@ def test_mcap_ros2_decodes_with_the_embedded_definitions(bag):
     assert seen['/muscle/contraction'][0][1].name == ['muscle']
     assert seen['/diagnostics'][0][1].status[0].values[1].value == '200.0'
     assert seen['/muscle/reference_trajectory'][0][1].points[1].positions == [0.015]
+
+
+def test_a_file_of_series_is_that_of_their_messages(tmp_path):
+    """Equal times, chunks that close in between, and a message before and after."""
+    steps = {'pressure': 3, 'contraction': 2, 'force': 5}
+    series = {}
+    for short, step in steps.items():
+        stamp_ns = np.arange(START_NS, START_NS + 6000 * STEP_NS, step * STEP_NS)
+        series[f'/muscle/{short}'] = stamp_ns, codec.encode_series(
+            short, stamp_ns, np.sin(stamp_ns - START_NS + step))
+    rows = sorted((int(t), place, name, row.tobytes())
+                  for place, (name, (stamp_ns, data)) in enumerate(series.items())
+                  for t, row in zip(stamp_ns, data))
+    other = next(iter(series['/muscle/pressure'][1])).tobytes()
+    for folder in 'series', 'messages':
+        with BagWriter(tmp_path / folder / 'run') as bag:
+            for name in series:
+                bag.add_topic(name, RECORDED[name.rsplit('/')[-1]].type_name)
+            bag.write('/muscle/pressure', other, START_NS - 7, START_NS - 7)
+            if folder == 'series':
+                bag.write_series(series)
+            else:
+                for stamp, _, name, data in rows:
+                    bag.write(name, data, stamp, stamp)
+            bag.write('/muscle/pressure', other, START_NS + 5, START_NS + 5)
+            assert sum(bag.counts.values()) == len(rows) + 2
+    one, two = ({path.name: path.read_bytes() for path in (tmp_path / folder / 'run').iterdir()}
+                for folder in ('series', 'messages'))
+    assert one == two and len(one) == 2
+    assert len(one['run_0.mcap']) > 100_000
 
 
 def test_file_is_laid_out_as_jazzy_does(bag):
