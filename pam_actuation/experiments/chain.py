@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 CHECK_EVERY_S = 0.01        # as often as the reference is sent
 _MOST_CHECKS = 100_000
-_SHOWN = {'pa': 'Pa'}       # units as people write them
+_SHOWN = {'pa': 'Pa', 'n': 'N', 'v': 'V'}       # units as people write them
 LONGEST_S = 6 * 3600.0
 
 
@@ -56,7 +56,7 @@ DOMAINS = {d.name: d for d in (
     Domain('force', 'n', 0.0, 0.0, 10_000.0, 1e5),
     Domain('joint_angle', 'rad', 0.0, -3.15, 3.15, 50.0),
     Domain('pressure', 'pa', P_ATM_PA, P_ATM_PA, 1_300_000.0, 2e7),
-    Domain('ppr_voltage', 'v', 0.0, 0.0, 6.0, 200.0),
+    Domain('ppr_voltage', 'v', 0.0, 0.0, 12.0, 200.0),      # a rig: to its ppr_highest_v
     Domain('hsv_duty', 'duty', -1.0, -1.0, 1.0, 100.0),
 )}
 FORCE = Domain('disturbance', 'n', 0.0, -200.0, 200.0, 10_000.0)

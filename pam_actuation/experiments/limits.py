@@ -45,8 +45,8 @@ def check_rig(experiment: 'Experiment', rig: 'JointRig | Rig') -> None:
     Contraction: the stroke of the muscle. Force: what the muscle gives at the limit of the
     driver where its load holds it, and a load whose contraction is prescribed. Joint angle: a
     joint, and its range. Pressure: the limit of the driver and the supply
-    of the valves. Raw valve signal: the valve it is meant for. Disturbance: a load that
-    moves freely. Measured topics it needs.
+    of the valves. Raw valve signal: the valve it is meant for, and the input range of a
+    regulator. Disturbance: a load that moves freely. Measured topics it needs.
     """
     place = f'experiment "{experiment.name}"'
     if experiment.domain == 'joint_angle' or isinstance(rig, JointRig):
@@ -62,6 +62,8 @@ def check_rig(experiment: 'Experiment', rig: 'JointRig | Rig') -> None:
         raise InputError(
             f'its values are the raw signal {experiment.domain} of the valve type '
             f'{_VALVE_OF[experiment.domain]}, the rig {rig.name} has {rig.valve}', place)
+    elif experiment.domain == 'ppr_voltage':
+        _check_voltage(experiment, rig, place)
     if experiment.disturbance and 'mass_kg' not in rig.parameters:
         raise InputError(
             f'it pushes on the load, and the load `{rig.load}` of {rig.name} has no mass that '
@@ -175,3 +177,12 @@ def _check_pressure(experiment: 'Experiment', rig: 'Rig', place: str) -> None:
         raise InputError(
             f'asks for {gauge_kpa(worst):.1f} kPa gauge; {rig.name} allows 0 to '
             f'{gauge_kpa(highest):.1f} kPa (driver limit and supply)', place)
+
+
+def _check_voltage(experiment: 'Experiment', rig: 'Rig', place: str) -> None:
+    highest = rig.parameters['ppr_highest_v']
+    worst = experiment.chain.extremes()[1]
+    if worst > highest:
+        raise InputError(
+            f'asks for {worst:g} V; the regulator of {rig.name} allows 0 to {highest:g} V '
+            '(ppr_highest_v)', place)

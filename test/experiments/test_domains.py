@@ -160,6 +160,7 @@ NEEDY = 'name: needy\ndomain: pressure\nneeds: [supply_pressure]\nsegments:\n  -
 @pytest.mark.parametrize('text, rig, valve, says', [
     (DUTY, 'dmsp_5_300_realistic', 'ppr', 'raw signal hsv_duty of the valve type hsv'),
     (VOLTAGE, 'dmsp_5_300_realistic', 'hsv', 'raw signal ppr_voltage of the valve type ppr'),
+    (VOLTAGE.replace('3.0', '9.0'), 'dmsp_5_300_realistic', 'ppr', 'allows 0 to 6 V'),
     (HIGH % 751325.0, 'dmsp_5_300_realistic', 'hsv', '650.0 kPa gauge'),
     (HIGH % 751325.0, 'dmsp_5_300_realistic', 'ppr', 'allows 0 to 600.0 kPa'),
     (FAR, 'dmsp_5_300_realistic', 'ppr', '90.0 mm'),

@@ -16,8 +16,11 @@
 
 import math
 import os
+from pathlib import Path
+import re
 import subprocess
 import sys
+import textwrap
 
 from pam_actuation.experiments import load_experiment
 from pam_actuation.experiments.primitives import make_primitive, PRIMITIVES
@@ -25,6 +28,7 @@ from pam_actuation.resources import list_config
 from pam_sim.errors import InputError
 import pytest
 
+GUIDE = (Path(__file__).parents[2] / 'docs/guides/experiments.md').read_text(encoding='utf-8')
 EXAMPLES = {
     'rest': {'duration_s': 1.0},
     'hold': {'duration_s': 1.0},
@@ -149,23 +153,22 @@ def test_pulses_begin_each_interval_and_end_at_the_base():
     assert primitive.end == 0.003
 
 
-def test_a_file_in_a_folder_of_ones_own_is_a_primitive(tmp_path):
-    (tmp_path / 'sawtooth.py').write_text(
-        'from dataclasses import dataclass\n'
-        'from pam_actuation.experiments.primitives.base import Primitive\n'
-        '@dataclass\n'
-        'class Sawtooth(Primitive):\n'
-        '    start: float\n'
-        '    duration_s: float\n'
-        '    def at(self, t_s):\n'
-        '        return self.start + 0.001 * (t_s % 1.0), 0.001\n'
-        'PRIMITIVE = Sawtooth\n')
+def test_the_file_that_the_guide_shows_is_a_primitive(tmp_path):
+    (tmp_path / 'sawtooth.py').write_text(re.search('```python\n(.*?)```', GUIDE, re.S)[1])
     code = ('from pam_actuation.experiments.primitives import PRIMITIVES, make_primitive\n'
-            'print(make_primitive("sawtooth", {"duration_s": 2.0}, 0.0, 0.0, "m").at(1.5)[0])')
+            'keys = {"height_m": 0.003, "duration_s": 3.0}\n'
+            'print(make_primitive("sawtooth", keys, 0.0, 0.0, "m").at(1.5)[0])')
     done = subprocess.run(
         [sys.executable, '-c', code], capture_output=True, text=True,
         env={**os.environ, 'PAM_PRIMITIVES_PATH': str(tmp_path)})
-    assert done.stdout.strip() == '0.0005', done.stderr
+    assert done.stdout.strip() == '0.0015', done.stderr
+
+
+def test_the_guide_shows_an_experiment_and_names_all():
+    shown = re.search('^    name: my_loops\n(?:    .*\n)+', GUIDE, re.M)[0]
+    experiment = load_experiment(textwrap.dedent(shown))
+    assert (experiment.duration_s, experiment.needs) == (20.0, ('force',))
+    assert not [name for name in NAMED if f'`{name}`' not in GUIDE]
 
 
 def test_random_steps_follow_their_seed():
@@ -229,10 +232,10 @@ BAD = {
     'segments:\n  - knee_gait: {low_m: 0, high_m: 0.01, frequency_hz: 3, cycles: 1}\n':
         'walking is 0.5 to 1.2 Hz',
     'segments:\n  - decay: {duration_s: 1.0}\n': 'makes no sense in the domain contraction',
-    'domain: ppr_voltage\nsegments:\n  - step: {to_v: 7, duration_s: 1}\n': '0 to 6 v',
+    'domain: ppr_voltage\nsegments:\n  - step: {to_v: 13, duration_s: 1}\n': '0 to 12 V',
     'domain: hsv_duty\nsegments:\n  - step: {to_duty: -2, duration_s: 1}\n': '-1 to 1 duty',
     'disturbance:\n  - hold: {duration_s: 2.0}\n': 'disturbance lasts 2 s',
-    'disturbance:\n  - step: {to_n: 900, duration_s: 0.5}\n': '-200 to 200 n',
+    'disturbance:\n  - step: {to_n: 900, duration_s: 0.5}\n': '-200 to 200 N',
     'needs: [torque]\n': '`torque`',
 }
 
