@@ -26,6 +26,8 @@ from pam_sim.files import check_file
 
 if TYPE_CHECKING:
     from pam_actuation.rigging.node_spec import NodeSpec
+    from pam_sim.joint.rig import JointRig
+    from pam_sim.rig import Rig
 
 HELP = 'Bring up the nodes of a muscle, a joint or both knees, in order; vent first at the end.'
 EXAMPLE = 'pam up knee --valve hsv --experiment joint_sine'
@@ -35,9 +37,12 @@ def add_arguments(parser: Parser) -> None:
     """Declare the options of the verb."""
     parser.add_argument('what', choices=('rig', 'knee', 'exo'),
                         help='one muscle, a joint with two, two joints')
-    parser.add_argument('--valve', choices=('ppr', 'hsv'), default='ppr')
-    parser.add_argument('--model', type=source, default=None, metavar='NAME',
-                        help='rig or joint: preset, or path of a model file')
+    parser.add_argument('--valve', choices=('ppr', 'hsv'), default=None,
+                        help='valve type (default: that of the rig or joint)')
+    parser.add_argument('--model', '--rig', dest='model', type=source, default=None,
+                        metavar='NAME|FILE',
+                        help='rig or joint: preset, or path of a model file (default: '
+                             'dmsp_5_300_realistic, joint_dmsp_5_300_realistic)')
     parser.add_argument('--controller', type=source, default=None, metavar='NAME',
                         help='controller preset or file, or none: one of your own commands the '
                              'pressure (default: that of valve and experiment)')
@@ -80,6 +85,7 @@ def run(args: argparse.Namespace) -> int:
     from pam_actuation.rigging.transitions import SessionFailed, termination_as_interrupt
     if args.policy is not None:
         check_file(args.policy, args.overwrite, ours='Made from the code, as docs/')
+    args.valve = args.valve or _model(args).valve
     nodes = _nodes(args)
     if args.policy is None:
         for node in nodes:
@@ -114,19 +120,22 @@ def run(args: argparse.Namespace) -> int:
     return EXIT_FINDING if failure or problems else EXIT_DONE
 
 
+def _model(args: argparse.Namespace) -> 'JointRig | Rig':
+    """Return rig or joint that is asked for."""
+    from pam_sim import load_rig
+    from pam_sim.joint import load_joint
+    if args.what == 'rig':
+        return load_rig(args.model or 'dmsp_5_300_realistic', valve=args.valve)
+    return load_joint(args.model or 'joint_dmsp_5_300_realistic', valve=args.valve)
+
+
 def _check_controller(args: argparse.Namespace) -> None:
     """Raise InputError for a controller that its node would refuse, before any node starts."""
     from pam_actuation.control.config import load_controller
     from pam_actuation.rigging.layouts import NO_CONTROLLER
     if args.controller in (None, NO_CONTROLLER):
         return
-    from pam_sim import load_rig
-    from pam_sim.joint import load_joint
-    if args.what == 'rig':
-        model = load_rig(args.model or 'dmsp_5_300_realistic', valve=args.valve)
-    else:
-        model = load_joint(args.model or 'joint_dmsp_5_300_realistic', valve=args.valve)
-    load_controller(args.controller, model, accept_other_rig=args.accept_other_rig)
+    load_controller(args.controller, _model(args), accept_other_rig=args.accept_other_rig)
 
 
 def _tell_remarks(args: argparse.Namespace) -> None:

@@ -107,6 +107,13 @@ def test_a_mistake_is_one_sentence(arguments, words, capsys):
     assert words in capsys.readouterr().err
 
 
+def test_the_valve_is_that_of_the_rig_file(tmp_path, capsys):
+    (tmp_path / 'mine.yaml').write_text('rig: dmsp_5_300_hanging_mass\nvalve: hsv\n')
+    assert main(['up', 'rig', '--rig', str(tmp_path / 'mine.yaml'),
+                 '--experiment', 'voltage_steps']) == 2
+    assert 'mine has hsv' in capsys.readouterr().err
+
+
 def test_without_a_controller_the_rest_stays_as_it_is(tmp_path):
     with_one = layouts.rig(experiment='short_sine', record='bag')
     without = layouts.rig(experiment='short_sine', record='bag', controller='none')
