@@ -25,6 +25,7 @@ import importlib.util
 import os
 from pathlib import Path
 import sys
+import traceback
 from types import ModuleType
 from typing import TypeVar
 
@@ -70,7 +71,7 @@ def plugin_module(path: Path, own_folder: Path, package: str, prefix: str) -> Mo
     Raises
     ------
     InputError
-        A file from elsewhere is not Python, or declares what is not allowed.
+        A file from elsewhere is not Python, fails, or declares what is not allowed.
 
     """
     if path.parent == Path(own_folder):
@@ -83,12 +84,17 @@ def plugin_module(path: Path, own_folder: Path, package: str, prefix: str) -> Mo
     sys.modules[name] = module
     try:
         spec.loader.exec_module(module)
-    except (SyntaxError, InputError) as error:
+    except Exception as error:      # whatever the code of somebody else raises
         del sys.modules[name]
         if isinstance(error, InputError):
             raise InputError(error.problem, error.where or path) from error
-        raise InputError(
-            f'is not valid Python: {error.msg}', f'{error.filename}:{error.lineno}') from error
+        if isinstance(error, SyntaxError):
+            raise InputError(f'is not valid Python: {error.msg}',
+                             f'{error.filename}:{error.lineno}') from error
+        lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__)
+                 if frame.filename == os.path.abspath(path)]
+        raise InputError(f'cannot be loaded: {type(error).__name__}: {error}',
+                         ':'.join(map(str, [path, *lines[-1:]]))) from error
     return module
 
 

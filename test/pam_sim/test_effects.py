@@ -291,6 +291,12 @@ def test_a_file_that_is_not_python_is_told_with_its_line(tmp_path, monkeypatch):
     assert error.problem.startswith('is not valid Python: ')
 
 
+def test_a_file_that_fails_is_told_with_its_line(tmp_path, monkeypatch):
+    error = refused(tmp_path, monkeypatch, '\nEFFECT = Effect(name="ripple")\n')
+    assert error.where == f'{tmp_path / "ripple.py"}:2'
+    assert error.problem == "cannot be loaded: NameError: name 'Effect' is not defined"
+
+
 @pytest.mark.parametrize('arguments, named', [
     ('force_n, p, x, v, dx, elapsed, state, i, par, k', 'p'),
     ('force_n, contraction_m, state, par', 'state'), ('force_n, strain, par', 'strain')])

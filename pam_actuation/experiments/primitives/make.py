@@ -39,8 +39,13 @@ _LARGEST_SEED = 2**32 - 1
 def _found() -> 'dict[str, type[Primitive]]':
     """Return name to class of all primitives there are."""
     files = plugin_files(_FOLDER, 'PAM_PRIMITIVES_PATH', not_plugins=('base', 'make'))
-    return {path.stem: plugin_module(
-        path, _FOLDER, __package__, 'pam_primitive').PRIMITIVE for path in files}
+    found: 'dict[str, type[Primitive]]' = {}
+    for path in files:
+        module = plugin_module(path, _FOLDER, __package__, 'pam_primitive')
+        if not hasattr(module, 'PRIMITIVE'):
+            raise InputError('defines no PRIMITIVE, a subclass of Primitive', str(path))
+        found[path.stem] = module.PRIMITIVE
+    return found
 
 
 PRIMITIVES = _found()
