@@ -57,7 +57,8 @@ class OwnController(Node):
             error_m = fresh['reference'] - fresh['contraction']
             integral_pa = self.integral_pa + INTEGRAL_PA_PER_M_S * error_m * PERIOD_S
             self.integral_pa = min(max(integral_pa, LOWEST_PA), HIGHEST_PA)
-            self.command_pa = self.integral_pa + PROPORTIONAL_PA_PER_M * error_m
+            command_pa = self.integral_pa + PROPORTIONAL_PA_PER_M * error_m
+            self.command_pa = min(max(command_pa, LOWEST_PA), HIGHEST_PA)
         message = FluidPressure(fluid_pressure=self.command_pa)
         message.header.stamp = now.to_msg()
         self.publisher.publish(message)
