@@ -240,8 +240,14 @@ def _numbers_text(rig: 'Rig') -> list[str]:
     lines = [f'  {p.name}: unknown, {p.allowed}' for p in rig.number_list
              if p.name in rig.unknown]
     return lines + [
-        f'  {p.name}: {rig.number(p.name):g} ± {rig.prior_sd(p.name):.3g} {p.unit}'
-        for p in _inexact(rig)]
+        f'  {p.name}: {rig.number(p.name):.6g} ± {_short(rig.prior_sd(p.name))} {p.unit}'
+        .removesuffix(' -') for p in _inexact(rig)]
+
+
+def _short(sd: float) -> str:
+    """Return a standard deviation in three digits, without a power of ten where it is large."""
+    text = f'{sd:.3g}'
+    return f'{float(text):.0f}' if 'e+' in text else text
 
 
 def _law_text(rig: 'Rig') -> list[str]:

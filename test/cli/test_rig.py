@@ -223,7 +223,9 @@ def test_check_tells_what_is_unknown_and_how_well_the_rest_is_known(capsys):
     assert told['unknown'] == ['mass_kg']
     assert {'name': 'pressure_zero_pa', 'unit': 'Pa', 'value': 0.0, 'sd': 500.0} in told['about']
     assert main(['rig', 'check', 'made.yaml']) == 0
-    assert 'mass_kg: unknown, 0.1 to 500 kg' in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert 'mass_kg: unknown, 0.1 to 500 kg' in printed
+    assert 'force_map_gain: 1 ± 0.02\n' in printed and '± 2000 Pa/V\n' in printed
     assert main(['rig', 'check']) == 2 and main(['rig', 'check', 'none.yaml']) == 2
 
 
