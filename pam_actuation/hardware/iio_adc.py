@@ -22,6 +22,8 @@ from pam_actuation.hardware.sensor_input import SensorInput, TOPICS
 from pam_actuation.hardware.sysfs import DeviceError
 from pam_sim.parameters import Parameter
 
+# Units of the names of parameters, as people write them.
+_SHOWN = {'pa': 'Pa', 'n': 'N'}
 # Topic: name and unit in its parameters, what it is, default at 0 V and per volt.
 QUANTITIES = {
     'pressure': ('pressure', 'pa', 'absolute pressure of the muscle', 101_325.0, 100_000.0),
@@ -34,13 +36,14 @@ QUANTITIES = {
 
 def _parameters(name: str, unit: str, what: str, at_0_v: float,
                 per_v: float) -> tuple[Parameter, Parameter, Parameter]:
+    shown = _SHOWN.get(unit, unit)
     return (
         node_parameter(f'{name}.channel', -1, f'analog input of the {what}; -1: not connected',
                        -1, 255),
-        node_parameter(f'{name}.{unit}_at_0_v', at_0_v, f'reading at 0 V: {what} [{unit}]',
+        node_parameter(f'{name}.{unit}_at_0_v', at_0_v, f'reading at 0 V: {what} [{shown}]',
                        -1e9, 1e9),
         node_parameter(f'{name}.{unit}_per_v', per_v,
-                       f'change of the reading per volt: {what} [{unit}/V]', -1e9, 1e9),
+                       f'change of the reading per volt: {what} [{shown}/V]', -1e9, 1e9),
     )
 
 
