@@ -28,6 +28,7 @@ from pam_actuation.replay.controller import replay_controller, ReplayResult
 from pam_actuation.replay.difference import Difference, difference
 from pam_actuation.replay.driver import DriverReplay, replay_driver
 from pam_actuation.replay.plant import PlantReplay, replay_plant
+from pam_actuation.replay.settings import preview_remark
 from pam_sim.errors import InputError
 from pam_sim.files import whole_file
 
@@ -172,8 +173,9 @@ def replay_run(run: 'RecordedRun', controller: 'Controller | str | os.PathLike[s
         What was asked for cannot be replayed, or nothing can; the controller is unusable.
 
     """
+    preview = () if chain else preview_remark(run, controller)
     result = Replay(counterfactual=controller is not None, start_ns=run.start_ns,
-                    remarks=tuple(early_sentences([run])))
+                    remarks=(*early_sentences([run]), *preview))
     if chain:
         result.chain = replay_chain(run, controller)
         return result

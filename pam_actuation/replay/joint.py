@@ -37,6 +37,7 @@ from pam_actuation.drivers.recorded import as_recorded
 from pam_actuation.replay.arrivals import recorded_topics_of_joint
 from pam_actuation.replay.chain import ChainReplay, recorded_seed, RepeatedLoops, replay_chain
 from pam_actuation.replay.joint_controller import replay_joint_controller, states_suffice
+from pam_actuation.replay.settings import preview_remark
 from pam_sim.errors import InputError
 from pam_sim.files import whole_file
 from pam_sim.joint import JointRig, load_joint
@@ -175,6 +176,7 @@ def replay_joint(run: Run, controller: 'Controller | str | os.PathLike[str] | No
         if name == 'controller' and isinstance(law, JointController) and states_suffice(run):
             alone = replay_joint_controller(run, law, joint)
             parts[name], internals = alone.commands, alone.differing
+            remarks += preview_remark(run, controller)
             continue
         loops = RepeatedLoops(joint, law, recorded_seed(run), run.namespace.rpartition('/')[2],
                               (name,), as_recorded(run.metadata, run.path))

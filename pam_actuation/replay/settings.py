@@ -77,6 +77,22 @@ def changed_controller(run: 'Run', wanted: list[str] | None,
         raise InputError(error.problem, f'--set {" ".join(changes)}') from None
 
 
+def preview_remark(run: 'Run', controller: object) -> tuple[str, ...]:
+    """
+    Return a sentence where a controller looks further or less far ahead than the recorded one.
+
+    The recorded ticks hold the reference at the recorded preview, and at no other.
+    """
+    ahead_s, text = getattr(controller, 'lead_s', None), run.metadata.get('controller')
+    settings = load_yaml(text, name='recorded controller').plain().get('settings') if text else {}
+    recorded_s = (settings or {}).get('lead_s')
+    if ahead_s is None or recorded_s is None or ahead_s == recorded_s:
+        return ()
+    return (f'the recorded ticks hold the reference {recorded_s:g} s ahead, and this controller '
+            f'takes it {ahead_s:g} s ahead (lead_s): the commands do not show what that changes; '
+            'with --chain they do',)
+
+
 def _number(text: str) -> float | str:
     """Return the number in a text, or the text itself (some settings are words)."""
     try:
