@@ -172,7 +172,8 @@ def _explain(args: argparse.Namespace) -> int:
     least = found['least']
     lines = [in_full(entry)]
     if least:
-        lines.append(f'shows from {least["quantity"]} = {least["value"]:.3g} {least["unit"]} on '
+        unit = '' if least['unit'] == '-' else f' {least["unit"]}'
+        lines.append(f'shows from {least["quantity"]} = {least["value"]:.3g}{unit} on '
                      '(one noise floor, rms, after calibration)')
     lines.append('looks like: ' + (', '.join(
         f'{name} ({cosine:.2f})' for name, cosine in found['alike']) or 'no other effect here'))

@@ -309,4 +309,4 @@ def _shown(size: dict[str, Any] | None) -> str:
     values = size['equivalent'] or size['parameters']
     name, quantity = next((pair for pair in values.items() if pair[1]['value'] != 0.0),
                           next(iter(values.items())))
-    return f'{name} {quantity["value"]:.3g} {quantity["unit"]}'
+    return f'{name} {quantity["value"]:.3g} {quantity["unit"]}'.removesuffix(' -')
