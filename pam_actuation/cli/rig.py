@@ -94,6 +94,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _new(args: argparse.Namespace) -> int:
+    from pam_actuation.rig_files.force_map import size_in_table
     from pam_actuation.rig_files.questions import ask_description
     from pam_actuation.rig_files.text import rig_file
     from pam_sim.errors import InputError
@@ -106,6 +107,8 @@ def _new(args: argparse.Namespace) -> int:
         described = ask_description(_read_line, print)
     with _force_map(args) as table:
         described.force_map = table or described.force_map
+        if table is not None and args.muscle is None and not described.dimensions:
+            described.dimensions.update(size_in_table(table))
         described.work_out()
         text, rig = rig_file(described, args.out)
         write_text(args.out, text)

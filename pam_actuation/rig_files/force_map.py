@@ -17,6 +17,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 import os
+import re
 
 from pam_sim.characterise import characterise_table
 from pam_sim.characterise.dimensions import Dimensions
@@ -24,6 +25,20 @@ from pam_sim.characterise.tables import read_measured_table
 from pam_sim.errors import InputError
 from pam_sim.files import check_file
 from pam_sim.muscle.lookup_table import COLUMNS, read_commented_csv, read_table
+
+
+_SIZE = re.compile(r'^muscle of length (\d+(?:\.\d+)?) mm(?:, bore (\d+(?:\.\d+)?) mm)?', re.M)
+
+
+def size_in_table(path: str) -> dict[str, float]:
+    """
+    Return ``length_m`` and ``bore_m`` of the muscle as far as the comments of a table say them.
+
+    ``pam characterise`` writes them; a table of another source gives an empty dict.
+    """
+    found = _SIZE.search(read_commented_csv(path)[1])
+    sizes = zip(('length_m', 'bore_m'), found.groups() if found else ())
+    return {name: round(1e-3 * float(mm), 12) for name, mm in sizes if mm is not None}
 
 
 @contextmanager

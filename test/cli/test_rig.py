@@ -157,6 +157,16 @@ def test_a_force_map_from_60_kpa_on_gives_no_warning(folder):
     assert new('--force-map', 'map.csv').muscle.law.name == 'lookup'
 
 
+def test_a_table_of_pam_characterise_tells_the_size_of_its_muscle(folder):
+    from pam_sim.muscle.laws.lookup import SHIPPED
+    text = (SHIPPED / 'dmsp_5_300.csv').read_text(encoding='utf-8')
+    (folder / 'map.csv').write_text(text.replace('300 mm, bore 5 mm', '250 mm, bore 10 mm', 1))
+    muscle = new('--force-map', 'map.csv').muscle
+    assert (muscle.length_m, muscle.bore_m) == (0.25, 0.01)
+    stated = new('--force-map', 'map.csv', '--length-mm', '200', '--overwrite').muscle
+    assert (stated.length_m, stated.bore_m) == (0.2, 0.005)
+
+
 @pytest.mark.parametrize('name', regulator_names())
 def test_a_data_sheet_gives_the_pressures_and_asks_for_what_it_lacks(name, capsys):
     sheet = get_regulator(name)
