@@ -18,13 +18,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import Field, fields, MISSING
 import math
 from pathlib import Path
-from typing import Any, TYPE_CHECKING
+from typing import Any
 
+from pam_actuation.experiments.primitives.base import Primitive
 from pam_sim.errors import InputError
 from pam_sim.plugins import pick, plugin_files, plugin_module
-
-if TYPE_CHECKING:
-    from pam_actuation.experiments.primitives.base import Primitive
 
 _FOLDER = Path(__file__).parent
 _FILLED_IN = ('start', 'rest_value')
@@ -36,22 +34,24 @@ _LARGEST_COUNT = 1000
 _LARGEST_SEED = 2**32 - 1
 
 
-def _found() -> 'dict[str, type[Primitive]]':
-    """Return name to class of all primitives there are."""
-    files = plugin_files(_FOLDER, 'PAM_PRIMITIVES_PATH', not_plugins=('base', 'make'))
-    found: 'dict[str, type[Primitive]]' = {}
-    for path in files:
+def _found() -> dict[str, type[Primitive]]:
+    """Return name to class of all primitives there are; InputError for a file without one."""
+    found: dict[str, type[Primitive]] = {}
+    for path in plugin_files(_FOLDER, 'PAM_PRIMITIVES_PATH', not_plugins=('base', 'make')):
         module = plugin_module(path, _FOLDER, __package__, 'pam_primitive')
-        if not hasattr(module, 'PRIMITIVE'):
+        cls = getattr(module, 'PRIMITIVE', None)
+        if not (isinstance(cls, type) and issubclass(cls, Primitive)):
             raise InputError('defines no PRIMITIVE, a subclass of Primitive', str(path))
-        found[path.stem] = module.PRIMITIVE
+        if path.stem in found:
+            raise InputError(f'primitive `{path.stem}` is defined twice', str(path))
+        found[path.stem] = cls
     return found
 
 
 PRIMITIVES = _found()
 
 
-def keys_of(cls: 'type[Primitive]', suffix: str) -> dict[str, Field[Any]]:
+def keys_of(cls: type[Primitive], suffix: str) -> dict[str, Field[Any]]:
     """Return key in the file to dataclass field of a primitive, in the order of the class."""
     return {f'{f.name}_{suffix}' if f.name in cls.QUANTITIES else f.name: f for f in fields(cls)
             if f.init and f.name not in _FILLED_IN}
@@ -66,7 +66,7 @@ def range_of(field: Field[Any]) -> tuple[float, float, str]:
 
 
 def make_primitive(name: str, arguments: Mapping[str, Any], start: float, rest_value: float,
-                   suffix: str, where: str = '', domain: str | None = None) -> 'Primitive':
+                   suffix: str, where: str = '', domain: str | None = None) -> Primitive:
     """
     Build a primitive from the keys of an experiment file.
 
