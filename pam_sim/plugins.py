@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Finding things that are registered by standing in a folder: effects, muscle laws.
+Finding things that are registered by standing in a folder: effects, laws, loads, primitives.
 
 A folder of this package and the folders an environment variable names are searched;
 a module is a plug-in by being there.

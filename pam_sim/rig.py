@@ -24,6 +24,7 @@ from pam_sim.annotations import FloatArray, Number
 from pam_sim.effects.registry import get_effect
 from pam_sim.errors import InputError
 from pam_sim.load import LOADS
+from pam_sim.load.registry import has_force, load_force_n
 from pam_sim.muscle.coefficients import coefficients, own_value, PREFIX, with_coefficients
 from pam_sim.muscle.muscle import get_muscle, LawChoice, Muscle
 from pam_sim.parameters import check_parameters, Parameter
@@ -87,7 +88,7 @@ class Rig:
     ----------
     name : str
     load : str
-        ``hanging_mass``, ``isometric`` or ``driven``.
+        ``hanging_mass``, ``isometric``, ``driven``, or another of ``pam_sim.load.LOADS``.
     valve : str
         ``ppr`` or ``hsv``.
     fidelity : str
@@ -187,7 +188,7 @@ class Rig:
     @property
     def is_driven(self) -> bool:
         """Whether the contraction is given, as at a held length or in a joint."""
-        return self.load != 'hanging_mass'
+        return not LOADS[self.load].MOVES_FREELY
 
     @property
     def signal_names(self) -> tuple[str, ...]:
@@ -281,7 +282,7 @@ class Rig:
         contraction_m : float or ndarray
             Contraction to hold, m.
         load_n : float or ndarray, optional
-            Tension to hold, N; by default weight and spring of a hanging mass.
+            Tension to hold, N; by default what the load asks for at rest.
 
         Raises
         ------
@@ -319,8 +320,8 @@ class Rig:
 
         """
         if load_n is None:
-            if self.parameters.get('spring_n_per_m', 0.0) > 0.0:
-                return self._rest_with_spring_m(pressure_pa)
+            if self.parameters.get('spring_n_per_m', 0.0) > 0.0 or has_force(LOADS[self.load]):
+                return self._rest_against_load_m(pressure_pa)
             load_n = self.tension_n(0.0)
         strain = self.muscle.law.law.max_strain(
             np.maximum(np.asarray(pressure_pa, float) - P_ATM_PA, 0.0),
@@ -332,7 +333,8 @@ class Rig:
         """
         Return the tension [N] that the load asks for at rest at a contraction [m].
 
-        Weight, and what the spring beside it adds; scalar or array.
+        Weight, and what the spring beside it adds, or the own force of the load; scalar or
+        array.
 
         Raises
         ------
@@ -342,11 +344,36 @@ class Rig:
         """
         if 'mass_kg' not in self.parameters:
             raise InputError(f'load `{self.load}` has no weight; give load_n', self.name)
+        if has_force(LOADS[self.load]):
+            return load_force_n(LOADS[self.load], self.parameters, contraction_m,
+                                0.0 * contraction_m)
         return (self.parameters['mass_kg'] * GRAVITY_M_PER_S2
                 + self.parameters['spring_n_per_m'] * contraction_m)
 
-    def _rest_with_spring_m(self, pressure_pa: FloatArray | float) -> FloatArray | float:
-        """Return the contraction at rest against weight and spring, by bisection."""
+    def force_of_motion_n(self, contraction_m: FloatArray, velocity_m_per_s: FloatArray,
+                          acceleration_m_per_s2: FloatArray) -> FloatArray:
+        """
+        Return the force [N] at the load cell that a motion of a free load asks for.
+
+        Inertia and weight of a hanging mass, its spring excepted; inertia and own force of any
+        other load.
+        """
+        mass_kg: float = self.parameters['mass_kg']
+        if not has_force(LOADS[self.load]):
+            return mass_kg * (acceleration_m_per_s2 + GRAVITY_M_PER_S2)
+        return mass_kg * acceleration_m_per_s2 + load_force_n(
+            LOADS[self.load], self.parameters, contraction_m, velocity_m_per_s)
+
+    def load_stiffness_n_per_m(self, contraction_m: float) -> float:
+        """Return by how much the force of a free load rises with contraction, N/m."""
+        if not has_force(LOADS[self.load]):
+            return self.parameters['spring_n_per_m']
+        half = 1e-3 * self.muscle.stroke_m
+        return (self.tension_n(contraction_m + half)
+                - self.tension_n(contraction_m - half)) / (2.0 * half)
+
+    def _rest_against_load_m(self, pressure_pa: FloatArray | float) -> FloatArray | float:
+        """Return the contraction at rest where the load's force changes with it, by bisection."""
         given_pa = np.asarray(pressure_pa, float)
         low = np.zeros(given_pa.shape)
         high = low + self.muscle.stroke_m

@@ -14,6 +14,7 @@
 
 """The numbers a rig has besides those of its effects."""
 
+from pam_sim.errors import InputError
 from pam_sim.load import LOADS
 from pam_sim.muscle.muscle import MUSCLE_PARAMETERS
 from pam_sim.parameters import Parameter
@@ -21,6 +22,13 @@ from pam_sim.sensors.zeros import ZEROS
 from pam_sim.valve import hsv, ppr
 
 VALVES = ('ppr', 'hsv')
+_OF_ALL_LOADS = {p.name for group in (
+    MUSCLE_PARAMETERS, ppr.PARAMETERS, hsv.PARAMETERS, ZEROS) for p in group}
+for _load in LOADS.values():
+    for _parameter in _load.PARAMETERS:
+        if _parameter.name in _OF_ALL_LOADS:
+            raise InputError(f'`{_parameter.name}` is a number of muscle, valve or sensor; give '
+                             'that of the load another name', str(_load.__file__))
 
 
 def rig_parameters(load: str) -> tuple[Parameter, ...]:

@@ -20,6 +20,7 @@ from typing import Any, TYPE_CHECKING
 from pam_sim.located_yaml import dump_yaml
 from pam_sim.muscle.coefficients import PREFIX
 from pam_sim.muscle.muscle import get_muscle
+from pam_sim.named_files import NamedFiles
 from pam_sim.rig_parameters import rig_parameters
 from pam_sim.sensors import SENSOR_PARAMETERS
 from pam_sim.tolerance import plain_tolerance
@@ -28,16 +29,19 @@ if TYPE_CHECKING:
     from pam_sim.joint.rig import JointRig
     from pam_sim.rig import Rig
 
-_MUSCLE = 'dmsp_5_300'         # whose presets exist for every load
+_MUSCLE = 'dmsp_5_300'         # whose presets exist for the loads that ship
+_PRESETS = NamedFiles('presets')
 
 
 def _base(rig: 'Rig') -> dict[str, Any]:
     """Return the lines that choose muscle, law and load."""
-    nominal = get_muscle(_MUSCLE)
+    nominal, preset = get_muscle(_MUSCLE), f'{_MUSCLE}_{rig.load}'
+    if preset not in _PRESETS.names():
+        return {'muscle': rig.muscle.plain(), 'load': rig.load}
     if rig.muscle == nominal:
-        return {'rig': f'{_MUSCLE}_{rig.load}'}
+        return {'rig': preset}
     if rig.muscle == replace(nominal, law=rig.muscle.law):
-        return {'rig': f'{_MUSCLE}_{rig.load}', 'law': rig.muscle.law.plain()}
+        return {'rig': preset, 'law': rig.muscle.law.plain()}
     return {'muscle': rig.muscle.plain(), 'load': rig.load}
 
 

@@ -24,7 +24,7 @@ from pam_sim.plugins import plugin_files
 # Talk to people and to rigs; nothing that works on a recording imports them.
 LEFT_OUT = ('cli', 'hardware', 'investigate', 'nodes', 'rigging', 'view')
 KINDS = ('.py', '.yaml', '.csv', '.json')       # code, presets, tables, schemas
-OWN = ('PAM_EFFECTS_PATH', 'PAM_MUSCLE_LAWS_PATH', 'PAM_PRIMITIVES_PATH')
+OWN = ('PAM_EFFECTS_PATH', 'PAM_MUSCLE_LAWS_PATH', 'PAM_LOADS_PATH', 'PAM_PRIMITIVES_PATH')
 LIBRARIES = ('numpy', 'scipy', 'numba', 'plotly')
 
 

@@ -56,7 +56,8 @@ def add_arguments(parser: Parser) -> None:
                         help='static table of the muscle, as "pam characterise" writes it, or '
                         'force over pressure and length as others measure it')
     parser.add_argument('--load', default='hanging_mass', metavar='NAME',
-                        help='hanging_mass, isometric or driven (default: %(default)s)')
+                        help='hanging_mass, isometric, driven or a load of your own '
+                        '(default: %(default)s)')
     parser.add_argument('--valve', metavar='ppr|hsv', default='ppr',
                         help='regulator or pair of on/off valves (default: %(default)s)')
     parser.add_argument('--regulator', type=source, default=None, metavar='NAME',

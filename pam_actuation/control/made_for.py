@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 _ANY = 'any'
 SIZE_TOLERANCE = 0.05         # of length and bore: a muscle is cut and measured to that
 LOAD_FACTOR = 2.0             # of mass or inertia
+_KINDS = (*(name for name, load in LOADS.items() if load.MOVES_FREELY), 'prescribed', 'joint')
 KEYS = (
     Key('muscle_length_m', float, 'Length of the muscle at rest.', unit='m', lower=1e-2,
         upper=20.0, otherwise=_ANY),
@@ -48,8 +49,7 @@ KEYS = (
     Key('inertia_kg_m2', float, 'Inertia of the limb about the joint axis.', unit='kg m^2',
         lower=1e-9, upper=1e6, otherwise=_ANY),
     Key('valve', str, 'Type of the valve.', choices=('ppr', 'hsv'), otherwise=_ANY),
-    Key('load', str, 'Kind of the load.', choices=('hanging_mass', 'prescribed', 'joint'),
-        otherwise=_ANY),
+    Key('load', str, 'Kind of the load.', choices=_KINDS, otherwise=_ANY),
 )
 _TEXTS = ('valve', 'load')
 _OF_THE_LOAD = ('mass_kg', 'inertia_kg_m2')

@@ -150,5 +150,5 @@ def _swing_hz(rig: 'Rig', gauge_pa: float) -> float:
     down = rig.static_contraction_m(P_ATM_PA + gauge_pa, held_n + h_n)
     if up <= down or x_m <= 0.0:
         return _UNKNOWN_SWING_HZ
-    stiffness = 2.0 * h_n / (up - down) + rig.parameters['spring_n_per_m']
+    stiffness = 2.0 * h_n / (up - down) + rig.load_stiffness_n_per_m(x_m)
     return math.sqrt(stiffness / rig.parameters['mass_kg']) / (2.0 * math.pi)

@@ -32,6 +32,7 @@ from pam_actuation.experiments.offline import simulate_experiment
 from pam_actuation.parallel import in_processes
 from pam_sim import load_rig
 from pam_sim.errors import InputError
+from pam_sim.load.registry import HANGING_MASS
 from pam_sim.rig import Rig
 from pam_sim.units import GRAVITY_M_PER_S2
 
@@ -121,7 +122,7 @@ def simulate_loads(rig: Rig, folder: str | os.PathLike[str], seed: int = 0,
         written.
 
     """
-    if 'mass_kg' not in rig.parameters:
+    if rig.load != HANGING_MASS:
         raise InputError(f'the rig {rig.name} has no hanging mass: its load is `{rig.load}`')
     if load_experiment(experiment).domain != 'pressure':
         raise InputError(f'the experiment {experiment} is not in the pressure domain')

@@ -266,7 +266,7 @@ def _joined(names: Iterable[str], valve: str) -> Segments:
 
 def _experiment(names: Iterable[str], segments: Segments, rig: Rig,
                 with_force: bool) -> dict[str, Any]:
-    needs = ['pressure', *(['contraction'] if rig.load == 'hanging_mass' else []),
+    needs = ['pressure', *([] if rig.is_driven else ['contraction']),
              *(['force'] if with_force else [])]
     start: Segments = [
         {'rest': {'duration_s': 1.0}},

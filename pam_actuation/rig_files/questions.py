@@ -28,8 +28,6 @@ from pam_sim.sensors import SENSOR_PARAMETERS
 from pam_sim.valve.regulator_presets import get_regulator, regulator_names
 
 OWN = 'own'
-ASKED = {'hanging_mass': ('mass_kg', 'spring_n_per_m'), 'isometric': ('contraction_m',),
-         'driven': ()}
 SENSORS = ('pressure_noise_pa', 'contraction_noise_m', 'force_noise_n')
 Ask = Callable[[str], str]
 Tell = Callable[[str], None]
@@ -61,8 +59,8 @@ def ask_description(ask: Ask, tell: Tell) -> Description:
     else:
         found.muscle = muscle
     found.load = _choice(ask, tell, 'load', tuple(LOADS), found.load)
-    for name in ASKED[found.load]:
-        _stated(ask, tell, found, name)
+    for parameter in LOADS[found.load].PARAMETERS:
+        _stated(ask, tell, found, parameter.name)
     found.valve = _choice(ask, tell, 'valve', VALVES, found.valve)
     if found.valve == 'ppr':
         _regulator(ask, tell, found)

@@ -21,6 +21,7 @@ import numpy as np
 from pam_sim.annotations import FloatArray
 from pam_sim.characterise.holds import find_holds, Hold
 from pam_sim.errors import InputError
+from pam_sim.load.registry import HANGING_MASS
 from pam_sim.rig import Rig
 from pam_sim.run import Run
 from pam_sim.short_repr import short_repr
@@ -137,9 +138,10 @@ def _load(
         if mean < -SCATTER_N:
             raise InputError(f'the load cell reads {mean:.1f} N; pull must be positive', path)
         return (round(max(mean, 0.0), 4), round(spread / np.sqrt(len(force)), 4), 'load cell')
-    mass = None if rig is None else rig.parameters.get('mass_kg')
+    mass = rig.parameters['mass_kg'] if rig is not None and rig.load == HANGING_MASS else None
     if rig is None or mass is None:
-        raise InputError('has no force and no rig with a mass; give the load with --load-n', path)
+        raise InputError('has no force and no rig with a hanging mass; give the load with '
+                         '--load-n', path)
     return mass * GRAVITY_M_PER_S2, rig.prior_sd('mass_kg') * GRAVITY_M_PER_S2, 'rig'
 
 

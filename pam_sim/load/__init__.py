@@ -12,8 +12,14 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Loads the muscle pulls on; each file states its parameters and its kind in the kernel."""
+"""
+Loads the muscle pulls on, one file each; being in this folder is being registered.
 
-from pam_sim.load import driven, hanging_mass, isometric
+A file states its parameters, and whether the load moves freely; then also its force
+(see :mod:`pam_sim.load.registry`). Further folders can be named in the environment variable
+``PAM_LOADS_PATH``.
+"""
 
-LOADS = {module.NAME: module for module in (hanging_mass, isometric, driven)}
+from pam_sim.load.registry import find_loads
+
+LOADS = find_loads()

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-The calls of effects and force laws in a step, written from what is registered.
+The calls of effects, force laws and loads in a step, written from what is registered.
 
 These functions are known at run time only. numba cannot compile a call through a table of
 functions without losing its cache or the speed of a direct call. So the calls are written as text,
@@ -30,17 +30,19 @@ from pam_sim.effects.registry import all_effects, effects
 from pam_sim.generated import generated_module
 from pam_sim.muscle.registry import laws
 from pam_sim.rollout.hooks import HOOKS
-from pam_sim.rollout.places import law_codes
+from pam_sim.rollout.places import law_codes, load_codes
 
-_HEAD = '''"""Calls of the registered effects and laws; written by pam_sim.rollout.dispatch."""
+_HEAD = '''"""Calls of the registered effects, laws, loads; by pam_sim.rollout.dispatch."""
 
 from pam_sim.compiled import compiled, inlined
 from pam_sim.effects.registry import all_effects
+from pam_sim.load import LOADS
+from pam_sim.load.registry import packed_of
 from pam_sim.muscle.registry import laws
 from pam_sim.records import part
 from pam_sim.rollout.layout import EFFECTS, NOMINAL, TERMS
 from pam_sim.rollout.places import (
-    ACTING, ACTING_PLACE, LAW_PLACE, PACKED, PACKED_PLACE, STATES, STATES_PLACE)
+    ACTING, ACTING_PLACE, LAW_PLACE, LOAD_PLACE, PACKED, PACKED_PLACE, STATES, STATES_PLACE)
 
 _EFFECTS = all_effects()
 _LAWS = laws()
@@ -130,9 +132,31 @@ def _law_calls() -> Iterator[str]:
     yield '    return 0.0'
 
 
+def _load_calls() -> Iterator[str]:
+    """Write the calls of the loads that have a force of their own."""
+    own = {name: code for name, code in load_codes().items() if code}
+    for name in own:
+        yield f'_load_{name} = LOADS[{name!r}].load_force_n'
+        yield f'_packed_load_{name} = packed_of(LOADS[{name!r}])'
+    if own:
+        yield from ('', '', '@compiled', 'def _own_force(contraction_m, velocity_m_per_s, par):')
+        for name, code in own.items():
+            yield f'    if par.load == {code}:'
+            yield (f'        return _load_{name}(contraction_m, velocity_m_per_s, '
+                   f'part(par, LOAD_PLACE, _packed_load_{name}))')
+        yield '    return 0.0'
+    yield from ('', '', '@inlined',
+                'def load(force_n, external_n, contraction_m, velocity_m_per_s, beyond, par):',
+                '    """Force of the load and the external one against contraction [N]."""')
+    if own:
+        yield '    if beyond > NOMINAL and par.load > 0.0:'
+        yield '        return external_n + _own_force(contraction_m, velocity_m_per_s, par)'
+    yield '    return force_n'
+
+
 def dispatch_source() -> str:
     """Return the text of the module with the calls."""
-    lines = [*_functions(), *_law_calls()]
+    lines = [*_functions(), *_law_calls(), *_load_calls()]
     for hook in HOOKS:
         lines += _hook(hook)
     return _HEAD + '\n'.join(lines) + '\n'

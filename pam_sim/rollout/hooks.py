@@ -114,7 +114,7 @@ HOOKS = {
         'The dry friction level inside the muscle [N], not negative.',
         ('level_n',), ('pressure_pa', *_MOTION)),
     'load_force': Hook(
-        'The force of the load side against contraction [N], weight and F_ext excepted.',
+        'The force of the load side against contraction [N]: weight, springs and F_ext.',
         ('force_n',), (*_MOTION, *_STEP)),
     'load_friction': Hook(
         'The dry friction level of the guide [N], not negative.', ('level_n',), _MOTION),

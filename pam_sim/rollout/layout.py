@@ -17,7 +17,7 @@ Records of the four arrays of the kernel.
 
 ``step(state, par, inp, out)`` reads ``par`` and ``inp``, advances ``state`` and fills ``out``.
 All are float64, SI, absolute pressures. ``state`` begins with :data:`STATE`, ``par`` with
-:data:`PARAMETERS`; the records of the effects and of the force law follow behind, see
+:data:`PARAMETERS`; the records of effects, load and force law follow behind, see
 :mod:`pam_sim.rollout.places`.
 """
 
@@ -73,7 +73,7 @@ PARAMETERS = record(
     'substeps',                     # physics steps in it
     'substep_s',
     'valve',                        # PPR, HSV_AVERAGED or HSV_SWITCHING
-    'free_load',                    # 1: hanging mass, 0: contraction prescribed
+    'free_load',                    # 1: the load moves freely, 0: contraction prescribed
     'atmosphere_pa',
     'length_m',
     'force_gain',
@@ -104,6 +104,7 @@ PARAMETERS = record(
     'inverse_rt_kg_per_j',
     'law',                          # number of the force law, see places.law_codes
     'law_damper',                   # 1: the law has a damper of its own
+    'load',                         # number of a load with its own force, see places.load_codes
     'beyond_nominal',               # how far the rig is beyond the nominal one, see below
     ('used', record(*HOOKS)),       # 1: an effect with this hook acts
 )

@@ -25,10 +25,12 @@ from pam_sim.effects.effect import Numbers
 from pam_sim.effects.registry import all_effects
 from pam_sim.errors import InputError
 from pam_sim.load import LOADS
+from pam_sim.load.registry import has_force, packed_of, steepest
 from pam_sim.records import put, put_some, size_of
 from pam_sim.rollout import kernel, layout
 from pam_sim.rollout.places import (
-    BEYOND, BEYOND_PLACE, FLAGS, law_codes, LAW_PLACE, PLACES, STATE_SIZE)
+    BEYOND, BEYOND_PLACE, FLAGS, law_codes, LAW_PLACE, load_codes, LOAD_PLACE, PLACES,
+    STATE_SIZE)
 from pam_sim.units import (
     GAS_CONSTANT_AIR, GRAVITY_M_PER_S2, P_ATM_PA, RHO_REFERENCE, T_REFERENCE_K, TEMPERATURE_K)
 from pam_sim.valve import hsv, ppr
@@ -37,7 +39,7 @@ from pam_sim.valve.flow import flow_function, RATIO_LINEAR
 if TYPE_CHECKING:
     from pam_sim.rig import Rig
 
-_LAW_CODES = law_codes()
+_LAW_CODES, _LOAD_CODES = law_codes(), load_codes()
 _RT_J_PER_KG = GAS_CONSTANT_AIR * TEMPERATURE_K
 _DENSITY_FACTOR = math.sqrt(T_REFERENCE_K / TEMPERATURE_K)
 
@@ -51,6 +53,9 @@ def pack_rig(rig: 'Rig', dt_s: float, initial_pressure_pa: float,
     state = np.zeros(STATE_SIZE)
     par = np.zeros(LAW_PLACE + size_of(law.PACKED))
     put(par, law.PACKED, law.pack(), LAW_PLACE)
+    if has_force(LOADS[rig.load]):
+        packed = packed_of(LOADS[rig.load])
+        put(par, packed, {name: rig.parameters[name] for name in packed.names or ()}, LOAD_PLACE)
     _pack_base(rig, numbers, state, par)
     _pack_effects(rig, numbers, state, par)
     if initial_contraction_m is None and LOADS[rig.load].MOVES_FREELY:
@@ -104,8 +109,13 @@ def _numbers(rig: 'Rig', dt_s: float, pressure: float, contraction: float | None
         float(dt_s), _substep(rig, dt_s), rig.valve,
         rig.fidelity if rig.valve == 'hsv' else 'averaged',
         {**value, 'p_atm': P_ATM_PA}, tuple(map(float, signal)),
-        float(pressure), float(contraction), value.get('mass_kg', 0.0) * GRAVITY_M_PER_S2,
-        rig.muscle)
+        float(pressure), float(contraction), _force_at_start(rig, contraction), rig.muscle)
+
+
+def _force_at_start(rig: 'Rig', contraction_m: float) -> float:
+    if has_force(LOADS[rig.load]):
+        return rig.tension_n(contraction_m)
+    return rig.parameters.get('mass_kg', 0.0) * GRAVITY_M_PER_S2
 
 
 def _substep(rig: 'Rig', dt_s: float) -> float:
@@ -113,9 +123,11 @@ def _substep(rig: 'Rig', dt_s: float) -> float:
     value = rig.parameters
     fastest = 0.0                # 1/s, of lag, damping and swing
     if LOADS[rig.load].MOVES_FREELY:
-        stiffness = (value['force_map_gain'] * rig.muscle.stiffness_n_per_m
-                     + value['spring_n_per_m'])
-        fastest = max(value['damping_n_s_per_m'] / value['mass_kg'],
+        load = LOADS[rig.load]
+        of_load, damping = (steepest(load, value, rig.muscle.stroke_m) if has_force(load)
+                            else (value['spring_n_per_m'], 0.0))
+        stiffness = value['force_map_gain'] * rig.muscle.stiffness_n_per_m + of_load
+        fastest = max((value['damping_n_s_per_m'] + damping) / value['mass_kg'],
                       2.0 * math.sqrt(stiffness / value['mass_kg']))
     if rig.valve == 'ppr':
         return dt_s / max(1, math.ceil(dt_s * max(fastest, 1.0 / value['T_m'])))
@@ -139,7 +151,7 @@ def _pack_base(rig: 'Rig', numbers: Numbers, state: FloatArray, par: FloatArray)
         valve = (layout.HSV_SWITCHING if rig.fidelity == 'switching'
                  else layout.HSV_AVERAGED)
     mass = value.get('mass_kg', 1.0)
-    law = _LAW_CODES[muscle.law.name]
+    law, load = _LAW_CODES[muscle.law.name], _LOAD_CODES[rig.load]
     put(par, layout.PARAMETERS, {
         'dt_s': numbers.dt_s,
         'substeps': substeps,
@@ -176,7 +188,8 @@ def _pack_base(rig: 'Rig', numbers: Numbers, state: FloatArray, par: FloatArray)
         'inverse_rt_kg_per_j': 1.0 / _RT_J_PER_KG,
         'law': law,
         'law_damper': type(muscle.law.law).COMPILED_DAMPER is not None,
-        'beyond_nominal': layout.EFFECTS if law != 0.0 else layout.NOMINAL,
+        'load': load,
+        'beyond_nominal': layout.EFFECTS if law != 0.0 or load != 0.0 else layout.NOMINAL,
         'used': 0.0,
     })
     put_some(state, layout.STATE, {

@@ -13,13 +13,15 @@
 # limitations under the License.
 
 """
-What stands behind the rig's own records in ``state`` and ``par``: effects and force law.
+What stands behind the rig's own records in ``state`` and ``par``: effects, load, force law.
 
 ``state`` holds ``layout.STATE``, then ``STATES``. ``par`` holds ``layout.PARAMETERS``, then
-``ACTING``, ``PACKED``, and last the record of the law, which may be of any length.
+``ACTING``, ``PACKED``, the record of a load with a force of its own, and last that of the law.
 """
 
 from pam_sim.effects.registry import all_effects, effects
+from pam_sim.load import LOADS
+from pam_sim.load.registry import has_force, packed_of
 from pam_sim.muscle.registry import laws
 from pam_sim.records import place_of, record, size_of
 from pam_sim.rollout.layout import EFFECTS, PARAMETERS, STATE, TERMS
@@ -33,7 +35,9 @@ STATES = record(*((name, effect.states) for name, effect in _EFFECTS.items()
 STATES_PLACE = size_of(STATE)
 ACTING_PLACE = size_of(PARAMETERS)
 PACKED_PLACE = ACTING_PLACE + size_of(ACTING)
-LAW_PLACE = PACKED_PLACE + size_of(PACKED)
+LOAD_PLACE = PACKED_PLACE + size_of(PACKED)
+LAW_PLACE = LOAD_PLACE + max(
+    (size_of(packed_of(load)) for load in LOADS.values() if has_force(load)), default=0)
 STATE_SIZE = STATES_PLACE + size_of(STATES)
 
 # Where each effect has its packed parameters in ``par`` and its states in ``state``.
@@ -60,3 +64,9 @@ def law_codes() -> dict[str, float]:
     usable = [name for name, law in laws().items() if law.COMPILED is not None]
     return {name: float(code) for code, name in enumerate(
         sorted(usable, key=lambda name: (name != _FAST_LAW, name)))}
+
+
+def load_codes() -> dict[str, float]:
+    """Return {load name: its number in ``par.load``}, 0 for those whose force the step has."""
+    own = [name for name, load in LOADS.items() if has_force(load)]
+    return {name: float(own.index(name) + 1 if name in own else 0) for name in LOADS}

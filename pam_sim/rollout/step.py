@@ -77,8 +77,9 @@ def muscle_force(tension: float, p: float, x: float, v: float, dx: float, elapse
 def load_force(x: float, v: float, dx: float, elapsed: float, external: float, beyond: int,
                state: np.record, par: np.record) -> float:
     """Return the force of weight, spring, external load and load effects on the load [N]."""
-    return hooks.load_force(
-        par.weight_n + external + par.spring_n_per_m * x, x, v, dx, elapsed, beyond, state, par)
+    own = hooks.load(
+        par.weight_n + external + par.spring_n_per_m * x, external, x, v, beyond, par)
+    return hooks.load_force(own, x, v, dx, elapsed, beyond, state, par)
 
 
 @inlined

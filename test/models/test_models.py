@@ -28,7 +28,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 ENTRIES = catalogue()
-PLUG_INS = ('PAM_EFFECTS_PATH', 'PAM_MUSCLE_LAWS_PATH')
+PLUG_INS = ('PAM_EFFECTS_PATH', 'PAM_LOADS_PATH', 'PAM_MUSCLE_LAWS_PATH')
 
 
 @pytest.mark.skipif(any(os.environ.get(name) for name in PLUG_INS), reason='plug-ins are set')

@@ -173,7 +173,7 @@ def _fits(stand_in: StandIn, learning: Estimator, problem: SubsystemProblem) -> 
     rig = learning.rig
     return (rig.valve in stand_in.valves
             and (stand_in.subsystem == 'valve') == (problem.subsystem == 'valve')
-            and (stand_in.subsystem != 'load' or rig.load == 'hanging_mass')
+            and (stand_in.subsystem != 'load' or not rig.is_driven)
             and (not stand_in.signal or stand_in.signal in problem.signals))
 
 

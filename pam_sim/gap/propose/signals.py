@@ -38,7 +38,7 @@ from pam_sim.gap.report.location import AT_STOP_M, MOVING_M_PER_S, smooth_motion
 from pam_sim.gap.subsystems.simulation import pressure_driven, simulate_driven
 from pam_sim.gap.verify.model import model_of
 from pam_sim.rig import Rig
-from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
+from pam_sim.units import P_ATM_PA
 
 LATE_S = 1e-3                # of two topics against each other
 LEAST_SAMPLES = 200
@@ -182,8 +182,7 @@ def _cell(rig: Rig, r: Recording) -> FloatArray:
 
 
 def _weight(rig: Rig, r: Recording) -> FloatArray:
-    _, _, a = smooth_motion(r)
-    force = rig.parameters['mass_kg'] * (a + GRAVITY_M_PER_S2)
+    force = rig.force_of_motion_n(*smooth_motion(r))
     if r.external_force_n is not None:
         force = force + np.append(r.external_force_n, 0.0)
     return _thinned(force)

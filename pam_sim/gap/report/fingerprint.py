@@ -46,7 +46,7 @@ from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.gap.subsystems.simulation import pressure_driven, simulate_driven
 from pam_sim.gap.verify.model import model_of
 from pam_sim.rig import Rig
-from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
+from pam_sim.units import P_ATM_PA
 
 BINS = 10                    # of a condition alone; half as many of each in a pair
 LEAST_SAMPLES = 20           # in a bin; emptier ones predict nothing
@@ -239,7 +239,7 @@ def _errors_of(estimator: Estimator, problem: SubsystemProblem
         return [('valve', lambda index, fits: _valve_errors(problem, index, fits))]
     found = [('muscle', lambda index, fits: _force_errors(
         estimator, problem, index, fits, 'muscle'))]
-    if 'force' in problem.signals and estimator.rig.load == 'hanging_mass':
+    if 'force' in problem.signals and not estimator.rig.is_driven:
         found.append(
             ('load', lambda index, fits: _force_errors(estimator, problem, index, fits, 'load')))
     return found
@@ -267,7 +267,7 @@ def _force_errors(estimator: Estimator, problem: SubsystemProblem, index: int, f
     time_s, part = problem.time_s[chosen], problem.part[chosen]
     values = conditions_of(recording, subsystem, time_s)
     free = values['motion'] != 0
-    if estimator.rig.load == 'hanging_mass':
+    if not estimator.rig.is_driven:
         free &= values['contraction'] > AT_STOP_M
     values = {n: v[free] for n, v in values.items()}
     time_s, part = time_s[free], part[free]
@@ -283,7 +283,7 @@ def _force_errors(estimator: Estimator, problem: SubsystemProblem, index: int, f
 
 def _sides(rig: Rig, recording: Recording, subsystem: str) -> tuple[FloatArray, FloatArray, float]:
     """Return both sides of a balance of forces [N] on the grid, and the noise of their error."""
-    x, _, a = smooth_motion(recording)
+    x, v, a = smooth_motion(recording)
     cell = None
     if 'force' in recording.signals:
         cell = np.interp(recording.grid_s, recording.time_s['force'],
@@ -291,7 +291,7 @@ def _sides(rig: Rig, recording: Recording, subsystem: str) -> tuple[FloatArray, 
     noise = [noise_sd(recording.measured['force'])] if cell is not None else []
     weight: FloatArray = np.zeros(0)
     if subsystem == 'load' or cell is None:
-        weight = rig.parameters['mass_kg'] * (a + GRAVITY_M_PER_S2)
+        weight = rig.force_of_motion_n(x, v, a)
         if recording.external_force_n is not None:
             weight = weight + np.append(recording.external_force_n, 0.0)
         noise.append(rig.parameters['mass_kg'] * noise_sd(a[::SMOOTH_EVERY]))

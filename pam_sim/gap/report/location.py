@@ -32,8 +32,9 @@ from pam_sim.gap.data.recording import GRID_S, Recording
 from pam_sim.gap.result import Share
 from pam_sim.gap.subsystems.simulation import (
     FAST_GAIN_PA_PER_V, FAST_T_S, pressure_driven, run_from_pressure, simulate_driven)
+from pam_sim.load import LOADS
 from pam_sim.rig import Rig
-from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
+from pam_sim.units import P_ATM_PA
 
 SMOOTH_S = 0.1               # window of the derivatives of measured contraction
 MOVING_M_PER_S = 1e-3
@@ -110,7 +111,7 @@ def _split(whole: FloatArray, without_valve: FloatArray, floor: float, muscle_sh
     total = rest + valve
     if total <= 0.0:
         return {'valve': 1.0}
-    if load != 'hanging_mass':
+    if not LOADS[load].MOVES_FREELY:
         return {'valve': valve / total, 'muscle': rest / total}
     if muscle_share is None:          # no load cell: muscle and load cannot be told apart
         return {'valve': valve / total, 'muscle': rest / total}
@@ -148,9 +149,9 @@ def force_errors(rig: Rig, recording: Recording) -> ForceErrors | None:
     Return the ForceErrors of a model on a recording.
 
     Muscle: tension of the model at measured pressure and contraction against the load
-    cell. Load: m (a + g) of the measured motion against the load cell. All are smoothed alike.
-    What a scale of each side and a skew of the stamps explain is no error. None without
-    a load cell or where the mass never leaves its stop.
+    cell. Load: the force that the measured motion asks for against the load cell. All are
+    smoothed alike. What a scale of each side and a skew of the stamps explain is no error.
+    None without a load cell or where the mass never leaves its stop.
     """
     if 'force' not in recording.signals or rig.is_driven:
         return None
@@ -197,7 +198,8 @@ def _balances(rig: Rig, recording: Recording,
         (at - P_ATM_PA) / FAST_GAIN_PA_PER_V, 0.0, 6.0)).force_n
     acceleration = gaussian_filter1d(x, steps, order=2) / GRID_S ** 2
     external = recording.external_force_n
-    weight = rig.parameters['mass_kg'] * (acceleration + GRAVITY_M_PER_S2)
+    weight = rig.force_of_motion_n(
+        x, gaussian_filter1d(x, steps, order=1) / GRID_S, acceleration)
     if external is not None:
         weight = weight + gaussian_filter1d(np.append(external, external[-1]), steps)
     tension, cell = (gaussian_filter1d(y, steps) for y in (tension, cell))
