@@ -21,7 +21,7 @@ from typing import Any, TYPE_CHECKING
 from pam_actuation.report.metrics import run_metrics, RunMetrics
 from pam_actuation.report.page import (
     paragraph, render, Section, signed, table)
-from pam_actuation.report.pages import FOOTER, muscle_volume, summary
+from pam_actuation.report.pages import FOOTER, muscle_volume
 from pam_actuation.report.sections.cycles import cycles
 from pam_actuation.report.sections.gap import gap_section
 from pam_actuation.report.sections.metrics_table import metrics
@@ -115,7 +115,7 @@ def demo_report(out_path: StrPath, parts: Sequence[DemoPart],
                     for title, run in part.runs]
         everything += part.runs
         numbers += part_numbers([(title, m) for title, _, m in measured])
-        facts.update({title: summary(m) for title, _, m in measured})
+        facts.update({title: m.to_dict() for title, _, m in measured})
         sections += _part(index, part, measured)
     if checks:
         sections.append(Section('bags', 'The recordings, read by others', paragraph(

@@ -22,7 +22,7 @@ failing.
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -94,6 +94,20 @@ class RunMetrics:
     max_error_n: float | None = None
     cycle_rmse_n: FloatArray = field(default_factory=lambda: np.empty(0))
     path: 'PathEstimate | None' = None       # from command to pressure
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the main numbers as plain data, SI."""
+        return {'duration_s': self.duration_s, 'tracking_rmse_m': self.rmse_m,
+                'max_error_m': self.max_error_m,
+                'cycle_rmse_m': [float(v) for v in self.cycle_rmse_m],
+                'tracking_rmse_n': self.rmse_n, 'max_error_n': self.max_error_n,
+                'cycle_rmse_n': [float(v) for v in self.cycle_rmse_n],
+                'settling_s': [s.settling_s for s in self.steps],
+                'interruptions': self.interruptions and self.interruptions[0],
+                'saturation_high': self.saturation_high, 'air_use_kg': self.air_use_kg,
+                'air_fed_kg': self.air_fed_kg, 'saturation_low': self.saturation_low,
+                'loop_period_s': {t.topic: t.median_s for t in self.timing},
+                'loop_jitter_s': {t.topic: t.jitter_s for t in self.timing}}
 
 
 def rmse(error: ArrayLike) -> float | None:

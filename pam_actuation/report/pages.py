@@ -138,7 +138,7 @@ def experiment_report(runs: 'Sequence[Run]', out_path: StrPath,
         page_title or f'Experiment {name}', 'Tracking of a pneumatic muscle on the rig: '
         'what was asked, what it did, and how well.', [s for s in sections if s],
         run_numbers(named), FOOTER, of))
-    return {title: summary(m) for title, m in named}
+    return {title: m.to_dict() for title, m in named}
 
 
 def early_section(runs: 'Sequence[Run]') -> Section | None:
@@ -187,21 +187,6 @@ def run_numbers(named: Sequence[tuple[str, RunMetrics]]) -> list[tuple[str, str,
         if m.max_error_m is not None and len(named) == 1:
             numbers.append((f'{m.max_error_m * 1e3:.2f} mm', 'Largest error', title, ''))
     return numbers
-
-
-def summary(m: RunMetrics) -> dict[str, Any]:
-    """Return the main numbers of a RunMetrics as plain data, SI."""
-    return {'duration_s': m.duration_s, 'tracking_rmse_m': m.rmse_m,
-            'max_error_m': m.max_error_m,
-            'cycle_rmse_m': [float(v) for v in m.cycle_rmse_m],
-            'tracking_rmse_n': m.rmse_n, 'max_error_n': m.max_error_n,
-            'cycle_rmse_n': [float(v) for v in m.cycle_rmse_n],
-            'settling_s': [s.settling_s for s in m.steps],
-            'interruptions': m.interruptions and m.interruptions[0],
-            'saturation_high': m.saturation_high, 'air_use_kg': m.air_use_kg,
-            'air_fed_kg': m.air_fed_kg, 'saturation_low': m.saturation_low,
-            'loop_period_s': {t.topic: t.median_s for t in m.timing},
-            'loop_jitter_s': {t.topic: t.jitter_s for t in m.timing}}
 
 
 def bag_report(runs: 'Sequence[Run]', out_path: StrPath, titles: Sequence[str] | None = None,
