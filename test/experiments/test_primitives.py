@@ -65,7 +65,7 @@ def make(name):
 
 
 def test_every_primitive_has_an_example():
-    assert set(EXAMPLES) == set(PRIMITIVES)
+    assert set(EXAMPLES) == set(PRIMITIVES), 'each primitive has its keys in EXAMPLES above'
 
 
 @pytest.mark.parametrize('name', SMOOTH)

@@ -14,6 +14,8 @@
 
 """Muscle laws: check points, what belongs to each law, refusals, the registry."""
 
+from pathlib import Path
+
 import numpy as np
 from pam_sim.errors import InputError
 from pam_sim.muscle import registry
@@ -21,8 +23,7 @@ from pam_sim.muscle.law import ExtrapolationWarning
 from pam_sim.muscle.registry import laws, make_law
 import pytest
 
-NAMES = ['chou_hannaford', 'inoue_pair', 'lookup', 'repperger', 'sarosi', 'situm_herceg',
-         'tondu_lopez']
+NAMES = sorted(path.stem for path in Path(registry.__file__).with_name('laws').glob('[a-z]*.py'))
 WEIGHT_N = 5.0 * 9.80665
 
 
