@@ -39,7 +39,8 @@ from pam_sim.short_repr import short_repr
 # Whether to keep the messages of a topic, by its name, message type and encoding.
 Wanted = Callable[[str, str, str], bool]
 _LONGEST_REASON = 300
-_RECOVER = 'or read that beginning with the option recover'
+_RECOVER = ('or keep that beginning: `pam info --recover` repairs the bag, and in Python '
+            'recover=True reads it as it is')
 
 
 def _no_times() -> IntArray:
