@@ -66,7 +66,8 @@ def add_arguments(parser: Parser) -> None:
     add_view_option(parser)
     parser.add_argument('--policy', type=out_path, metavar='FILE', default=None,
                         help='start nothing; write the access policy of these nodes (SROS2)')
-    add_overwrite_option(parser, 'a policy that is there already')
+    add_overwrite_option(
+        parser, 'the bag that is there, once the new one is whole; of --policy the file')
 
 
 def run(args: argparse.Namespace) -> int:
@@ -90,7 +91,7 @@ def run(args: argparse.Namespace) -> int:
     if args.policy is None:
         for node in nodes:
             if node.name == RECORDER:
-                check_bag_target(node.parameters['output'])
+                check_bag_target(node.parameters['output'], args.overwrite)
     _check_controller(args)
     _tell_remarks(args)
     if args.policy is not None:
@@ -172,6 +173,7 @@ def _nodes(args: argparse.Namespace) -> 'list[NodeSpec]':
     """Return the nodes that are asked for."""
     from pam_actuation.namespaces import namespace_of
     from pam_actuation.rigging import layouts
+    from pam_actuation.rigging.plan import RECORDER
     options = {'valve': args.valve, 'controller': args.controller or '',
                'experiment': args.experiment or '', 'accept_other_rig': args.accept_other_rig,
                'record': args.record or ''}
@@ -183,6 +185,13 @@ def _nodes(args: argparse.Namespace) -> 'list[NodeSpec]':
     of_joint = args.what != 'rig' and args.hardware != layouts.SIMULATED
     if args.angle == layouts.BY_TOPIC and not of_joint:
         raise InputError('is for a joint on hardware only', '--angle')
-    if args.what == 'rig':
-        return layouts.rig(**options)
-    return getattr(layouts, args.what)(**options, angle=args.angle)
+    nodes = (layouts.rig(**options) if args.what == 'rig'
+             else getattr(layouts, args.what)(**options, angle=args.angle))
+    return [_replacing(node) if args.overwrite and node.name == RECORDER else node
+            for node in nodes]
+
+
+def _replacing(recorder: 'NodeSpec') -> 'NodeSpec':
+    """Return a recorder that may replace the bag that is there."""
+    from dataclasses import replace
+    return replace(recorder, parameters={**recorder.parameters, 'overwrite': True})

@@ -14,7 +14,8 @@
 
 """Test which nodes a rig is made of, and that mistakes are told before anything starts."""
 
-from pam_actuation.cli.main import main
+from pam_actuation.cli import up
+from pam_actuation.cli.main import build_parser, main
 from pam_actuation.rigging import layouts
 from pam_actuation.rigging.node_spec import ORDER
 import pytest
@@ -105,6 +106,13 @@ def test_every_node_has_its_place_in_the_order():
 def test_a_mistake_is_one_sentence(arguments, words, capsys):
     assert main(['up', *arguments]) == 2
     assert words in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('options, wanted', [([], None), (['--overwrite'], True)])
+def test_overwrite_is_told_to_every_recorder(options, wanted):
+    args = build_parser().parse_args(['up', 'exo', '--valve', 'ppr', '--record', 'bags', *options])
+    recorders = [node for node in up._nodes(args) if node.name == 'experiment_recorder']
+    assert [node.parameters.get('overwrite') for node in recorders] == [wanted, wanted]
 
 
 def test_the_valve_is_that_of_the_rig_file(tmp_path, capsys):
