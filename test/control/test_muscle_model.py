@@ -20,11 +20,11 @@ import re
 import numpy as np
 from pam_actuation.bags.load import load_run
 from pam_actuation.control.config import load_controller
-from pam_actuation.control.sofc import muscle_model
+from pam_actuation.control.sofc import dynamics, muscle_model
 from pam_actuation.control.sofc.controller import SelfOrganizingFuzzyController
 from pam_actuation.control.sofc.muscle_model import MODEL
 from pam_actuation.control.sofc.persistence import load_rules, rules_from_mapping
-from pam_actuation.control.sofc.rule_text import digest_of, rules_to_mapping
+from pam_actuation.control.sofc.rule_text import digest_of, MOST_SETS, rules_to_mapping
 from pam_actuation.control.sofc.settings import PARAMETERS
 from pam_actuation.control.sofc.words import sentence
 from pam_actuation.control.static_inverse import inverse_pressure_pa, tabulate_static_inverse
@@ -39,6 +39,7 @@ from pam_actuation.tuning.random_rigs import random_rigs
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.records import fields, zeros
+from pam_sim.units import P_ATM_PA
 import pytest
 
 PERIOD_S = 0.005
@@ -187,8 +188,8 @@ def found_inertia(inverse, contraction_m, pressure_pa, **settings):
     par, st = fields(controller.parameters, PARAMETERS), fields(zeros(MODEL), MODEL)
     for x, p in zip(contraction_m, pressure_pa):
         muscle_model.observe(par, inverse, controller.rules.path, st, x, p)
-        muscle_model.find_numbers(par, st, False)
-    return float(muscle_model.inertia_pa_s2_per_m(par, st))
+        muscle_model.find_numbers(par, inverse, st, False)
+    return float(muscle_model.inertia_pa_s2_per_m(par, st, 0.015))
 
 
 def test_noise_of_the_contraction_does_not_hide_the_inertia(inverse):
@@ -215,8 +216,39 @@ def test_the_damping_found_grows_no_further_beyond_its_rate(inverse):
         assert found == pytest.approx([5e4 + share * 2e3 / 0.05 for share in shares])
         muscle_model._begin(st, 0.014, 3e5)
         st.rate_m_per_s = -0.02
-        muscle_model.find_numbers(par, st, False)
+        muscle_model.find_numbers(par, inverse, st, False)
         assert st.now[muscle_model._RATE] == pytest.approx(-0.02 / 0.05 * shares[1])
+
+
+def test_friction_that_grows_with_the_pressure_is_found_at_400_kpa(inverse):
+    x, paths = slow_motion(40.0), {}
+    for growth in (0.0, 1.0):
+        controller = controller_with(
+            inverse, path_learning=0.0, model_noise_pa=5e3, integral_growth_per_m=12.0,
+            friction_growth=growth)
+        par, st = fields(controller.parameters, PARAMETERS), fields(zeros(MODEL), MODEL)
+        for one in x:
+            static_pa = inverse_pressure_pa(inverse, one)
+            grown = (static_pa - P_ATM_PA) / 4e5 * dynamics.load_shape(par, one)
+            muscle_model.observe(par, inverse, controller.rules.path, st, one,
+                                 static_pa + 8e3 * grown * st.path[1])
+            muscle_model.find_numbers(par, inverse, st, False)
+        paths[growth] = [
+            muscle_model.numbers_pa(par, st, np.ones(MOST_SETS), one, P_ATM_PA + gauge_pa)
+            - muscle_model.numbers_pa(par, st, np.zeros(MOST_SETS), one, P_ATM_PA + gauge_pa)
+            for one, gauge_pa in ((0.015, 4e5), (0.01, 3e5))]
+    assert paths[1.0] == pytest.approx([8e3, 8e3 * 0.75 * 0.94], rel=0.05)
+    assert paths[0.0][0] == paths[0.0][1]
+
+
+def test_the_inertia_grows_with_contraction_as_the_integral_does(inverse):
+    for growth, shares in ((0.0, (1.0, 1.0)), (1.0, (1.06, 0.94))):
+        controller = controller_with(
+            inverse, integral_growth_per_m=12.0, inertia_growth=growth,
+            acceleration_feedforward_pa_s2_per_m=17000.0)
+        par, st = fields(controller.parameters, PARAMETERS), fields(zeros(MODEL), MODEL)
+        found = [muscle_model.inertia_pa_s2_per_m(par, st, x_m) for x_m in (0.02, 0.01)]
+        assert found == pytest.approx([17000.0 * share for share in shares])
 
 
 @pytest.mark.parametrize('time_s, expected_pa, found_pa', [
@@ -231,15 +263,15 @@ def test_creep_is_told_apart_and_begins_anew_after_a_move(inverse, time_s, expec
         slow += PERIOD_S / (1.0 + PERIOD_S) * (one - slow)
         muscle_model.observe(par, inverse, controller.rules.path, st, one, inverse_pressure_pa(
             inverse, one) + 3e3 * (one - slow) / 0.01)
-        muscle_model.find_numbers(par, st, False)
+        muscle_model.find_numbers(par, inverse, st, False)
     creep_pa = float(st.number_pa[muscle_model._CREEP])
     assert creep_pa == pytest.approx(found_pa, rel=0.15)
-    before = muscle_model.numbers_pa(par, st, st.path, 0.02)
+    before = muscle_model.numbers_pa(par, st, st.path, 0.02, 4e5)
     for tick in range(400):      # two seconds at rest, the first without the sensor of pressure
         pressure_pa = math.nan if tick < 200 else inverse_pressure_pa(inverse, x[-1])
         muscle_model.observe(par, inverse, controller.rules.path, st, x[-1], pressure_pa)
     slower = x[-1] + (slow - x[-1]) * math.exp(-2.0)
-    assert muscle_model.numbers_pa(par, st, st.path, 0.02) - before == pytest.approx(
+    assert muscle_model.numbers_pa(par, st, st.path, 0.02, 4e5) - before == pytest.approx(
         creep_pa * (slow - slower) / 0.01, abs=60.0)
 
 

@@ -197,6 +197,8 @@ class SelfOrganizingFuzzyController(CompiledController):
     def _model_output_pa(self) -> float:
         """Return what path rules and numbers of the model add [Pa] where the last tick was."""
         state, par = fields(self._state, STATE), fields(self.parameters, PARAMETERS)
+        out = fields(self._outputs, OUTPUT)
         path, lead_m = state.model.lead_path, state.lead_m
         return float(muscle_model.rules_pa(par, self.rules.path, path, lead_m)
-                     + muscle_model.numbers_pa(par, state.model, path, lead_m))
+                     + muscle_model.numbers_pa(
+                         par, state.model, path, lead_m, out.inverse_pa))

@@ -36,6 +36,7 @@ feed-forward.
 import math
 
 import numpy as np
+from pam_actuation.control.sofc.dynamics import load_shape
 from pam_actuation.control.sofc.membership import locate
 from pam_actuation.control.sofc.rule_table import infer_path
 from pam_actuation.control.sofc.rule_text import MOST_SETS, NUMBERS
@@ -43,9 +44,11 @@ from pam_actuation.control.static_inverse import inverse_pressure_pa
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import compiled
 from pam_sim.records import record
+from pam_sim.units import P_ATM_PA
 
 _LIFTED_M = 5e-4          # below this contraction the pressure says nothing of the muscle
 _MOVES_M_PER_S = 2e-3     # from this rate on a residual counts in full: at rest friction hides it
+_FRICTION_AT_PA = 4e5     # gauge: what the numbers of the path are at
 _FADE = 0.99              # per tick, of a disturbance that is not observed any more
 
 # Numbers of the model that hold everywhere: offset, slope, the sets of the path beyond that of
@@ -145,14 +148,31 @@ def forget(par: np.record, st: np.record) -> None:
 
 
 @compiled
-def numbers_pa(par: np.record, st: np.record, path: FloatArray, contraction_m: float) -> float:
+def friction_shape(par: np.record, contraction_m: float, static_pa: float) -> float:
+    """
+    Return by what friction is larger than at 400 kPa in the middle of the range.
+
+    Friction grows with the pressure (Tondu and Lopez 2000), and a force takes the more pressure
+    the further the muscle has contracted (``load_shape``). ``static_pa`` holds the contraction.
+    """
+    if not par.friction_growth > 0.0:
+        return 1.0
+    gauge = max(static_pa - P_ATM_PA, 0.0)
+    shape = load_shape(par, contraction_m) * gauge / _FRICTION_AT_PA
+    return 1.0 + par.friction_growth * (shape - 1.0)
+
+
+@compiled
+def numbers_pa(par: np.record, st: np.record, path: FloatArray, contraction_m: float,
+               static_pa: float) -> float:
     """Return what offset, slope, path and creep of the model add at a contraction [Pa]."""
     if not par.model_noise_pa > 0.0:
         return 0.0
     middle = 0.5 * (par.reference_lower_m + par.reference_upper_m)
     total: float = st.number_pa[0] + st.number_pa[1] * (contraction_m - middle) / _SPAN_M
+    shape = friction_shape(par, contraction_m, static_pa)
     for q in range(1, int(par.path_sets)):
-        total += st.number_pa[1 + q] * path[q]
+        total += shape * st.number_pa[1 + q] * path[q]
     return total + st.number_pa[_CREEP] * _crept(par, st, contraction_m)
 
 
@@ -173,15 +193,16 @@ def damping_pa_s_per_m(par: np.record, st: np.record, rate_m_per_s: float) -> fl
 
 
 @compiled
-def inertia_pa_s2_per_m(par: np.record, st: np.record) -> float:
+def inertia_pa_s2_per_m(par: np.record, st: np.record, contraction_m: float) -> float:
     """Return the pressure per acceleration: the setting and what the model found."""
     setting: float = par.acceleration_feedforward_pa_s2_per_m
     found = setting + st.number_pa[_ACCELERATION] / _ACCELERATION_M_PER_S2
-    return min(max(found, setting / par.inertia_range), par.inertia_range * setting)
+    middle: float = min(max(found, setting / par.inertia_range), par.inertia_range * setting)
+    return middle * (1.0 + par.inertia_growth * (load_shape(par, contraction_m) - 1.0))
 
 
 @compiled
-def find_numbers(par: np.record, st: np.record, surprised: bool) -> None:
+def find_numbers(par: np.record, inverse: FloatArray, st: np.record, surprised: bool) -> None:
     """
     Correct the numbers of the model by the innovation: recursive least squares.
 
@@ -195,8 +216,9 @@ def find_numbers(par: np.record, st: np.record, surprised: bool) -> None:
     now, phi, gain, cov = st.now, st.regressor, st.gain, st.covariance_pa2
     now[0] = 1.0
     now[1] = (st.contraction_m - middle) / _SPAN_M
+    shape = friction_shape(par, st.contraction_m, inverse_pressure_pa(inverse, st.contraction_m))
     for q in range(1, MOST_SETS):
-        now[1 + q] = st.path[q] if q < par.path_sets else 0.0
+        now[1 + q] = shape * st.path[q] if q < par.path_sets else 0.0
     now[_RATE] = st.rate_m_per_s * _saturation(par, st.rate_m_per_s) / _RATE_M_PER_S
     now[_ACCELERATION] = st.acceleration_m_per_s2 / _ACCELERATION_M_PER_S2
     now[_CREEP] = _crept(par, st, st.contraction_m)
@@ -284,10 +306,11 @@ def observe(par: np.record, inverse: FloatArray, rules: FloatArray, st: np.recor
     st.rate_m_per_s, st.acceleration_m_per_s2 = rate, acceleration
     _creep(par, st, x)
     go(par, st.path, x - former_m)
+    static_pa = inverse_pressure_pa(inverse, x)
     innovation = (
-        p - inverse_pressure_pa(inverse, x) - damping_pa_s_per_m(par, st, rate) * rate
-        - inertia_pa_s2_per_m(par, st) * acceleration
-        - numbers_pa(par, st, st.path, x) - rules_pa(par, rules, st.path, x))
+        p - static_pa - damping_pa_s_per_m(par, st, rate) * rate
+        - inertia_pa_s2_per_m(par, st, x) * acceleration
+        - numbers_pa(par, st, st.path, x, static_pa) - rules_pa(par, rules, st.path, x))
     st.innovation_pa = innovation
     if not par.disturbance_time_s > 0.0 or x < _LIFTED_M:
         st.disturbance_pa *= _FADE

@@ -69,7 +69,7 @@ def predict(par: np.record, inverse: FloatArray, rules: FloatArray, ring: Ring, 
     x, rate, p = contraction_m, moved / period, pressure_pa
     for q in range(int(par.path_sets)):
         st.predicted_path[q] = st.path[q]
-    inertia = inertia_pa_s2_per_m(par, st)
+    inertia = inertia_pa_s2_per_m(par, st, contraction_m)
     whole, rest = valve_lag.ticks_of(par, valve)
     for ago in range(whole, -1 if rest > 0.0 else 0, -1):
         # At last the rest of a tick, with the newest command.
@@ -78,9 +78,10 @@ def predict(par: np.record, inverse: FloatArray, rules: FloatArray, ring: Ring, 
                    else valve_lag.command_of(ring, tick, 1, 0.0))
         p += step / (valve.lag_s + step) * (command - p)
         go(par, st.predicted_path, rate * step)
+        static_pa = inverse_pressure_pa(inverse, x)
         missing = (
-            p - inverse_pressure_pa(inverse, x) - damping_pa_s_per_m(par, st, rate) * rate
-            - numbers_pa(par, st, st.predicted_path, x)
+            p - static_pa - damping_pa_s_per_m(par, st, rate) * rate
+            - numbers_pa(par, st, st.predicted_path, x, static_pa)
             - rules_pa(par, rules, st.predicted_path, x) - st.disturbance_pa)
         rate += step * missing / inertia
         x += step * rate

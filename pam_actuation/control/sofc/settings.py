@@ -158,6 +158,10 @@ SETTINGS = (
     setting('damping_rate_m_per_s', 'm/s', 0.0, 0.0, 5.0,
             'rate at which half of the damping found is left, as friction grows no further; '
             '0 = it grows with the rate'),
+    setting('friction_growth', '-', 0.0, 0.0, 1.0,
+            'share of the friction found that grows with the pressure; 0 = the same everywhere'),
+    setting('inertia_growth', '-', 0.0, 0.0, 1.0,
+            'share of the inertia that grows with contraction as the integral does'),
     setting('model_drift_pa', 'Pa', 500.0, 0.0, 1e6, 'change of each such number in a second'),
     setting('creep_time_s', 's', 0.0, 0.0, 100.0,
             'time constant of the creep whose pressure is a number of the model; 0 = none'),

@@ -283,9 +283,10 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
         muscle_model.observe(par, inverse, path_rules, model, inp.contraction_m, measured)
         muscle_model.go(par, model.lead_path, way)
         path = (muscle_model.rules_pa(par, path_rules, model.lead_path, lead)
-                + muscle_model.numbers_pa(par, model, model.lead_path, lead))
+                + muscle_model.numbers_pa(
+                    par, model, model.lead_path, lead, base))
         damping = muscle_model.damping_pa_s_per_m(par, model, lead_rate)
-        inertia = muscle_model.inertia_pa_s2_per_m(par, model)
+        inertia = muscle_model.inertia_pa_s2_per_m(par, model, lead)
     dynamic = dynamics.dynamic_pressure_pa(
         par, st, base + par.lag_share * path, lead_rate,
         st.history_ticks < 0.5 or lead_jump != 0.0, damping, inertia,
@@ -364,7 +365,7 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
     learns = reason == learning.LEARNING or reason == learning.FROZEN_DEAD_ZONE
     surprised = reason == learning.FROZEN_SURPRISE
     if par.has_model > 0.5 and (learns or surprised):
-        muscle_model.find_numbers(par, model, surprised)
+        muscle_model.find_numbers(par, inverse, model, surprised)
     if learns:
         fb_squares, ff_squares, motion_squares = _learn(par, values, initial, ring, st)
         if par.has_model > 0.5:
@@ -437,7 +438,8 @@ def _guard(par: np.record, values: Tables, kept: Tables, st: np.record, inp: np.
                 motion, int(out.motion_knot), out.motion_knot_degree,
                 int(out.motion_rate_knot), out.motion_rate_knot_degree)
             + muscle_model.rules_pa(par, path, st.model.lead_path, st.lead_m)
-            + muscle_model.numbers_pa(par, st.model, st.model.lead_path, st.lead_m))
+            + muscle_model.numbers_pa(
+                par, st.model, st.model.lead_path, st.lead_m, out.inverse_pa))
         before = (out.feedback_rules_pa + out.feedforward_rules_pa + out.motion_rules_pa
                   + out.path_rules_pa)
         limit = par.integral_limit_pa
