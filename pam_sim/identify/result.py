@@ -64,11 +64,10 @@ class Found:
         factor, unit = READABLE.get(self.number.unit, (1.0, self.number.unit))
         unit = '' if unit == '-' else f' {unit}'
         i = self.interval
-        low = 'below' if i.open_low else f'{factor * i.low:.4g}'
-        high = 'beyond' if i.open_high else f'{factor * i.high:.4g}'
-        span = 'anywhere in its range' if i.open_low and i.open_high else (
-            f'{low} to {high}{unit}')
-        return f'{factor * self.value:.4g}{unit}', span
+        low, high = f'{factor * i.low:.4g}', f'{factor * i.high:.4g}'
+        span = {(False, False): f'{low} to {high}{unit}', (True, False): f'up to {high}{unit}',
+                (False, True): f'{low}{unit} or more', (True, True): 'anywhere in its range'}
+        return f'{factor * self.value:.4g}{unit}', span[i.open_low, i.open_high]
 
     def text(self) -> str:
         """Return it as a line."""

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""From where the next experiment is predicted."""
+"""From where the next experiment is predicted, and how an interval is told."""
 
 from made_records import RIG
 import numpy as np
@@ -20,6 +20,7 @@ from pam_sim.identify.advice import where_open
 from pam_sim.identify.judgement import DETERMINED, TOGETHER, UNDETERMINED
 from pam_sim.identify.numbers import unknown_numbers
 from pam_sim.identify.profile import Interval
+from pam_sim.identify.result import Found
 import pytest
 
 MASS, MAP = unknown_numbers(RIG, ['mass_kg', 'force_map_gain'])
@@ -42,3 +43,11 @@ def test_a_load_that_is_about_to_lift_tells_nothing_of_its_mass(status, low, hig
     # The other one is as little known as its curvature says: it stays.
     assert MAP.value(at[1]) == pytest.approx(GAIN) and seen[1, 1] == 4.0
     assert x[0] == MASS.coordinate(LIFTS) and information[0, 0] == 1e6
+
+
+@pytest.mark.parametrize('ends, said', [
+    ((False, False), '95 %: 1 to 3 kg'), ((True, False), '95 %: up to 3 kg'),
+    ((False, True), '95 %: 1 kg or more'), ((True, True), 'anywhere in its range')])
+def test_an_interval_that_is_open_at_an_end_is_told_as_such(ends, said):
+    assert Found(MASS, 2.0, Interval(1.0, 3.0, *ends, ()), DETERMINED).text().endswith(
+        f'2 kg ({said})')
