@@ -42,12 +42,12 @@ from pam_sim.effects.valve_dead_zone_gradual import mean_openings_with_lift
 from pam_sim.filters import first_order
 from pam_sim.gap.propose.response import follow
 from pam_sim.joint import load_joint
+from pam_sim.valve import VALVES
 
 RIG = 'dmsp_5_300_realistic'
 NOMINAL_RIG = 'dmsp_5_300_hanging_mass'
 FORCE_RIG = 'dmsp_5_300_isometric_realistic'
 JOINT = 'joint_dmsp_5_300'
-VALVES = ('ppr', 'hsv')
 LAWS = ('sofc_ppr', 'pid', 'lqi', 'ilc_ppr', 'mpc_ppr')
 ROWS = 10       # of a rollout: it is compiled before the first one
 

@@ -28,10 +28,10 @@ from pam_sim.muscle.muscle import get_muscle, LawChoice, muscle_names, read_law,
 from pam_sim.named_files import file_stem, NamedFiles
 from pam_sim.parameters import check_parameters, Parameter
 from pam_sim.rig import EffectSetting, Rig
-from pam_sim.rig_parameters import rig_parameters, VALVES
+from pam_sim.rig_parameters import rig_parameters
 from pam_sim.sensors import SENSOR_PARAMETERS
 from pam_sim.tolerance import read_tolerance, Tolerance
-from pam_sim.valve import hsv
+from pam_sim.valve import hsv, VALVES
 
 KEYS = (
     Key('name', str, 'What the rig is called in bags and reports.', otherwise='name of the file'),

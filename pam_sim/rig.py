@@ -28,12 +28,12 @@ from pam_sim.load.registry import has_force, load_force_n
 from pam_sim.muscle.coefficients import coefficients, own_value, PREFIX, with_coefficients
 from pam_sim.muscle.muscle import get_muscle, LawChoice, Muscle
 from pam_sim.parameters import check_parameters, Parameter
-from pam_sim.rig_parameters import rig_parameters, VALVES
+from pam_sim.rig_parameters import rig_parameters
 from pam_sim.rig_text import rig_to_yaml
 from pam_sim.sensors import SENSOR_PARAMETERS
 from pam_sim.tolerance import prior_sd, Tolerance, tolerances, UNKNOWN
 from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
-from pam_sim.valve import hsv, ppr
+from pam_sim.valve import hsv, ppr, VALVES
 
 if TYPE_CHECKING:
     from pam_sim.plant import Plant

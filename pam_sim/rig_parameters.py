@@ -21,7 +21,6 @@ from pam_sim.parameters import Parameter
 from pam_sim.sensors.zeros import ZEROS
 from pam_sim.valve import hsv, ppr
 
-VALVES = ('ppr', 'hsv')
 _OF_ALL_LOADS = {p.name for group in (
     MUSCLE_PARAMETERS, ppr.PARAMETERS, hsv.PARAMETERS, ZEROS) for p in group}
 for _load in LOADS.values():

@@ -19,6 +19,7 @@ from typing import Any
 
 from pam_actuation.bags.ending import Ending
 from pam_sim.errors import InputError
+from pam_sim.valve import VALVES
 
 # Units of the values on the wire, per topic; the text goes into every bag.
 UNITS = (
@@ -28,7 +29,6 @@ UNITS = (
     'valve_signal, valve_command: ppr_voltage V, fill_duty and vent_duty 1; '
     'time: header.stamp, ns'
 )
-VALVES = ('ppr', 'hsv')
 
 
 def software_version() -> str:

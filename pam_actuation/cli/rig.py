@@ -160,7 +160,7 @@ def _described(args: argparse.Namespace) -> 'Description':
     from pam_actuation.rig_files.numbers import read_range
     from pam_sim.load import LOADS
     from pam_sim.muscle.muscle import get_muscle
-    from pam_sim.rig_parameters import VALVES
+    from pam_sim.valve import VALVES
     found = Description(args.muscle, load=_one_of('--load', args.load, LOADS),
                         valve=_one_of('--valve', args.valve, VALVES), regulator=args.regulator)
     if args.muscle is not None:

@@ -31,6 +31,7 @@ from pam_sim.errors import InputError
 from pam_sim.joint.rig import JointRig
 from pam_sim.keys import Key, names_of
 from pam_sim.load import LOADS
+from pam_sim.valve import VALVES
 
 if TYPE_CHECKING:
     from pam_sim.located_yaml import Located
@@ -48,7 +49,7 @@ KEYS = (
     Key('mass_kg', float, 'Hanging mass.', unit='kg', lower=1e-6, upper=1e6, otherwise=_ANY),
     Key('inertia_kg_m2', float, 'Inertia of the limb about the joint axis.', unit='kg m^2',
         lower=1e-9, upper=1e6, otherwise=_ANY),
-    Key('valve', str, 'Type of the valve.', choices=('ppr', 'hsv'), otherwise=_ANY),
+    Key('valve', str, 'Type of the valve.', choices=VALVES, otherwise=_ANY),
     Key('load', str, 'Kind of the load.', choices=_KINDS, otherwise=_ANY),
 )
 _TEXTS = ('valve', 'load')

@@ -28,8 +28,7 @@ from pam_actuation.drivers.parameter import declared_numbers
 from pam_actuation.drivers.ppr import PprConfig
 from pam_sim.errors import InputError
 from pam_sim.parameters import check_given
-
-VALVE_TYPES = ('ppr', 'hsv')
+from pam_sim.valve import VALVES
 
 
 def check_valve_type(valve_type: str, where: str = 'valve_type') -> str:
@@ -42,8 +41,8 @@ def check_valve_type(valve_type: str, where: str = 'valve_type') -> str:
         Otherwise, with the choices.
 
     """
-    if valve_type not in VALVE_TYPES:
-        raise InputError(f'unknown valve type {valve_type!r}, choose {" or ".join(VALVE_TYPES)}',
+    if valve_type not in VALVES:
+        raise InputError(f'unknown valve type {valve_type!r}, choose {" or ".join(VALVES)}',
                          where)
     return valve_type
 

@@ -29,6 +29,7 @@ from pam_actuation.drivers.hsv_pulses import LONGEST_OF_A_PAIR
 from pam_actuation.hardware import sysfs
 from pam_actuation.hardware.sysfs import DeviceError
 from pam_sim.parameters import Parameter
+from pam_sim.valve import VALVES
 
 if TYPE_CHECKING:
     from pam_actuation.drivers.config import DriverConfig
@@ -54,7 +55,7 @@ class ValveOutput:
 
     """
 
-    VALVE_TYPES: tuple[str, ...] = ('ppr', 'hsv')
+    VALVE_TYPES: tuple[str, ...] = VALVES
     PARAMETERS: tuple[Parameter, ...] = ()
 
     def __init__(self, values: dict[str, Any], config: 'DriverConfig') -> None:

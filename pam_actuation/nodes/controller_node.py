@@ -28,6 +28,7 @@ from pam_actuation.nodes.senders import SensorEar
 from pam_sim.errors import InputError
 from pam_sim.parameters import Parameter
 from pam_sim.units import P_ATM_PA
+from pam_sim.valve import VALVES
 
 if TYPE_CHECKING:
     from pam_actuation.control.loop import ControllerLoop
@@ -56,7 +57,7 @@ class ControllerNode(ManagedNode):
             'preset that fits the valve.'),
         node_parameter(
             'rig', 'dmsp_5_300_realistic', 'Rig the controller is made for: preset or path.'),
-        node_parameter('valve_type', 'ppr', 'Valve of the rig.', choices=('ppr', 'hsv')),
+        node_parameter('valve_type', 'ppr', 'Valve of the rig.', choices=VALVES),
         ACCEPT_OTHER_RIG,
     )
 

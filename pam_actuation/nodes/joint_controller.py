@@ -25,6 +25,7 @@ from pam_actuation.nodes.controller_node import ControllerNode
 from pam_actuation.nodes.diagnostics import Values
 from pam_actuation.nodes.learning_switch import LearningSwitch
 from pam_actuation.nodes.runner import run
+from pam_sim.valve import VALVES
 from std_msgs.msg import String
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ class JointNode(LearningSwitch, ControllerNode):
             'that fits the valve and the size of the joint.'),
         node_parameter('joint', 'joint_dmsp_5_300_realistic',
                        'Joint the controller is made for: preset or path.'),
-        node_parameter('valve_type', 'ppr', 'Valves of the joint.', choices=('ppr', 'hsv')),
+        node_parameter('valve_type', 'ppr', 'Valves of the joint.', choices=VALVES),
         ACCEPT_OTHER_RIG,
         node_parameter('learning', True, 'Whether the rules change while running.'),
     )

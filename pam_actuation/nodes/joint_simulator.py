@@ -20,6 +20,7 @@ import sys
 from pam_actuation.drivers.parameter import node_parameter
 from pam_actuation.nodes.physics_node import MAX_SEED, PhysicsNode
 from pam_actuation.nodes.runner import run
+from pam_sim.valve import VALVES
 
 
 class JointSimulator(PhysicsNode):
@@ -35,7 +36,7 @@ class JointSimulator(PhysicsNode):
     PARAMETERS = (
         node_parameter(
             'joint', 'joint_dmsp_5_300_realistic', 'Joint preset, or path of its file.'),
-        node_parameter('valve_type', 'ppr', 'Valves of both muscles.', choices=('ppr', 'hsv')),
+        node_parameter('valve_type', 'ppr', 'Valves of both muscles.', choices=VALVES),
         node_parameter('seed', 0, 'Seed of noise and stamp jitter.', 0, MAX_SEED - 1),
         node_parameter(
             'publish_rate_hz', 250.0, 'Rate of the measurements [Hz].', 200.0, 1000.0),

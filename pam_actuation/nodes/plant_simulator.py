@@ -28,6 +28,7 @@ from pam_actuation.nodes.runner import run
 from pam_actuation.nodes.simulated_time import CLOCK_TOPIC
 from pam_actuation.nodes.simulated_time import PlantTime
 from pam_sim.errors import InputError
+from pam_sim.valve import VALVES
 from std_srvs.srv import SetBool
 from std_srvs.srv import Trigger
 
@@ -48,7 +49,7 @@ class PlantSimulator(PhysicsNode):
     REALTIME_RANK = 2
     PARAMETERS = (
         node_parameter('rig', 'dmsp_5_300_realistic', 'Rig preset, or path of a model file.'),
-        node_parameter('valve_type', 'ppr', 'Valve of the rig.', choices=('ppr', 'hsv')),
+        node_parameter('valve_type', 'ppr', 'Valve of the rig.', choices=VALVES),
         node_parameter('seed', 0, 'Seed of noise and stamp jitter.', 0, MAX_SEED),
         node_parameter(
             'publish_rate_hz', 250.0, 'Rate of the measurements [Hz].', 100.0, 1000.0),

@@ -25,6 +25,7 @@ from pam_actuation.nodes.diagnostics import OK, Values
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.runner import run
 from pam_sim.errors import InputError
+from pam_sim.valve import VALVES
 
 
 class ReferenceGenerator(ManagedNode):
@@ -43,7 +44,7 @@ class ReferenceGenerator(ManagedNode):
             'counts when the node is configured again.'),
         node_parameter(
             'valve_type', 'ppr', 'Valve of the rig, for experiments that speak to it.',
-            choices=('ppr', 'hsv')),
+            choices=VALVES),
         node_parameter('rate_hz', 100.0, 'Rate of the reference [Hz].', 50.0, 200.0),
         node_parameter(
             'await_receiver', False, 'Wait before the experiment starts until some node besides '

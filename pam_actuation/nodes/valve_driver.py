@@ -38,6 +38,7 @@ from pam_actuation.nodes.senders import DriverEar
 from pam_actuation.nodes.senders import IDLE_PERIOD_S
 from pam_actuation.nodes.timing import Latency
 from pam_sim.errors import InputError
+from pam_sim.valve import VALVES
 from std_srvs.srv import Trigger
 
 COMMAND_POLL_S = 0.001      # PPR: how soon a command is passed on
@@ -60,7 +61,7 @@ class ValveDriver(ManagedNode):
     PARAMETERS = (
         node_parameter(
             'valve_type', 'ppr', 'Kind of valve: proportional pressure regulator or a pair of '
-            'high-speed valves.', choices=('ppr', 'hsv')),
+            'high-speed valves.', choices=VALVES),
         node_parameter(
             'rig', '', 'Rig preset or model file, or JOINT/flexor and JOINT/extensor, that tells '
             'the driver valves, volume and load; numbers given beside it win. Empty: the '

@@ -27,6 +27,7 @@ from pam_actuation.nodes.lockstep import DRIVER
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.runner import run
 from pam_actuation.nodes.senders import ANSWER_PERIOD_S, IDLE_PERIOD_S, WriterNames
+from pam_sim.valve import VALVES
 
 PERIOD_S = 0.01     # the wire asks for 100 Hz or more
 
@@ -46,7 +47,7 @@ class ValveWatchdog(ManagedNode):
     PARAMETERS = (
         node_parameter(
             'valve_type', 'ppr', 'Valve of the rig, until a driver is heard: then that of its '
-            'signals.', choices=('ppr', 'hsv')),
+            'signals.', choices=VALVES),
         node_parameter(
             'timeout_s', 0.05, 'Silence of valve_signal from which it vents [s].', 0.02, 1.0),
     )

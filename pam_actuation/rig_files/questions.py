@@ -23,8 +23,8 @@ from pam_sim.errors import did_you_mean, InputError
 from pam_sim.load import LOADS
 from pam_sim.muscle.muscle import DIMENSIONS, muscle_names
 from pam_sim.parameters import Parameter
-from pam_sim.rig_parameters import VALVES
 from pam_sim.sensors import SENSOR_PARAMETERS
+from pam_sim.valve import VALVES
 from pam_sim.valve.regulator_presets import get_regulator, regulator_names
 
 OWN = 'own'

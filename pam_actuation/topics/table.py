@@ -31,6 +31,7 @@ from pam_actuation.topics.contents import (
 from pam_actuation.topics.quality import Service, USUAL
 from pam_sim.errors import InputError
 from pam_sim.joint.parameters import SIDES
+from pam_sim.valve import VALVES
 
 # Where a topic lies: in the namespace of a muscle, in that of a joint, in that of the rig, which
 # is a joint or a muscle alone, or at the root.
@@ -100,7 +101,7 @@ class Topic:
     missing: str = TOLD
     internals: bool = False
     drawn: bool = False
-    valves: tuple[str, ...] = ('ppr', 'hsv')
+    valves: tuple[str, ...] = VALVES
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     service: Service = USUAL
 

@@ -24,6 +24,7 @@ from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.parameters import check_parameters, Parameter
 from pam_sim.records import put, put_some, record
+from pam_sim.valve import VALVES
 
 if TYPE_CHECKING:
     from pam_sim.rig import Rig
@@ -77,7 +78,7 @@ class Reported:
     name: str
     unit: str
     function: Callable[[Mapping[str, float], Any], float]
-    valves: tuple[str, ...] = ('ppr', 'hsv')
+    valves: tuple[str, ...] = VALVES
 
 
 # Numbers of an effect from its parameters and those of the rig.
@@ -154,7 +155,7 @@ class Effect:
     packed: np.dtype[Any] = field(default_factory=lambda: _BY_PARAMETERS)
     pack: Packing = _as_they_are
     initial: Packing = _at_zero
-    valves: tuple[str, ...] = ('ppr', 'hsv')
+    valves: tuple[str, ...] = VALVES
     order: int = 50
     active: Callable[[Mapping[str, float], Numbers], bool] | None = None
     fitting: Fitting = Fitting()

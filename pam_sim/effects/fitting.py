@@ -18,7 +18,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 import math
 
-VALVES = ('ppr', 'hsv')
+from pam_sim.valve import VALVES
+
 # What comes this late in quick motion is not a multiple of what comes a little late.
 DELAY_STARTS_S = (0.01, 0.002)
 _MAX_LOGARITHM = 50.0

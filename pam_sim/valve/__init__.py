@@ -13,3 +13,5 @@
 # limitations under the License.
 
 """Valves: proportional pressure regulator (PPR) and high-speed on/off pair (HSV)."""
+
+VALVES = ('ppr', 'hsv')

@@ -37,8 +37,8 @@ from pam_sim.errors import InputError
 from pam_sim.files import refuse_pipe
 from pam_sim.keys import Key, names_of
 from pam_sim.parameters import check_parameters
+from pam_sim.valve import VALVES
 
-VALVES = ('ppr', 'hsv')
 MOST_PA = 1e6             # largest number of a model
 MAX_BYTES = 2**24         # more than the largest tables the settings allow
 # Lengths of the axes of every table: numbers, or the entry of the scaling that says it.

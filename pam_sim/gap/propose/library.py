@@ -28,6 +28,7 @@ from pam_sim.effects.unnamed import (
     contraction_reading_term, flow_term, force_reading_term, load_term, muscle_term,
     set_point_term, terms)
 from pam_sim.effects.unnamed.terms import Input
+from pam_sim.valve import VALVES
 
 LARGEST = 200.0              # of an amplitude, in trial sizes
 SHAPE_ROOM = 3.0             # how far a shape may move from where it was found
@@ -65,7 +66,7 @@ class StandIn:
     subsystem: str
     inputs: tuple[Input, ...]
     channels: tuple[Channel, ...]
-    valves: tuple[str, ...] = ('ppr', 'hsv')
+    valves: tuple[str, ...] = VALVES
     signal: str = ''            # of a sensor: the reading it changes
 
 

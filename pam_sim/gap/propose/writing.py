@@ -22,6 +22,7 @@ from pam_sim.gap.propose.hooks import (
     BOTH, COMMIT, function_text, hook_text, HOOKS, READS, RETURNS)
 from pam_sim.gap.propose.library import Factor, StandIn, Term
 from pam_sim.gap.propose.words import equation_of, range_texts
+from pam_sim.valve import VALVES
 
 NAME = 'proposed_effect'
 _LICENCE = '"""\nA term without a name, proposed by `pam gap`; its form was found from data.\n'
@@ -154,7 +155,7 @@ class EffectText:
         if self._steps:
             names = ', '.join(map(repr, self.parameters))
             rows += [f"    packed=record({names}, 'step_s'),", '    pack=_pack,']
-        if self._stand_in.valves != ('ppr', 'hsv'):
+        if self._stand_in.valves != VALVES:
             rows.append(f'    valves={self._stand_in.valves!r},')
         signal = f", sensor_signal='{self._stand_in.signal}'" if self._stand_in.signal else ''
         rows += ['    order=90,', '    fitting=Fitting(free=(', *free, f'    ){signal}),', ')', '']
