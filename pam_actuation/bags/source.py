@@ -145,7 +145,9 @@ def _read_directory(path: Path, recover: bool, wanted: Wanted | None) -> Bag:
     plain_mcap = (
         facts.get('storage_identifier') == 'mcap' and not facts.get('compression_mode'))
     if not plain_mcap:
-        return _read_with_rosbags(path, path, wanted)
+        bag = _read_with_rosbags(path, path, wanted)
+        bag.storage = str(facts.get('storage_identifier') or bag.storage)
+        return bag
     files = []
     for name in facts['relative_file_paths']:
         # Version 3 and older repeat the directory's name in front of the file's.
@@ -241,7 +243,7 @@ def _damage_sentence(damage: Damaged, count: int, size: int, readable: str) -> s
 
 
 def _add_content(bag: Bag, content: McapContent,
-                 pieces: dict[str, list['MessageColumns']]) -> None:
+                 pieces: dict[str, list[MessageColumns]]) -> None:
     """Note a file's topics in the bag and their messages in ``pieces``, by topic."""
     bag.records.update(content.metadata)
     for channel in content.channels.values():
@@ -256,7 +258,7 @@ def _add_content(bag: Bag, content: McapContent,
         pieces.setdefault(channel.topic, []).append(channel.messages)
 
 
-def _join(topic: TopicData, pieces: Sequence['MessageColumns']) -> None:
+def _join(topic: TopicData, pieces: Sequence[MessageColumns]) -> None:
     for messages in pieces:
         topic.payloads.extend(messages.payloads)
     topic.log_time_ns = joined([messages.log_time_ns for messages in pieces])

@@ -21,6 +21,7 @@ import mcap_ros2.writer
 import numpy as np
 from pam_actuation import messages
 from pam_actuation.bags.load import load_run
+from pam_actuation.bags.source import read_bag
 from pam_actuation.bags.writer import BagWriter
 from pam_actuation.topics import codec, definitions
 from pam_actuation.topics.table import OF_A_RUN, RECORDED
@@ -107,6 +108,7 @@ def test_missing_optional_topics(tmp_path):
 @pytest.mark.parametrize('plugin, compression', [
     (StoragePlugin.MCAP, None), (StoragePlugin.SQLITE3, None),
     (StoragePlugin.MCAP, CompressionMode.STORAGE), (StoragePlugin.SQLITE3, CompressionMode.FILE),
+    (StoragePlugin.MCAP, CompressionMode.MESSAGE),
     (StoragePlugin.SQLITE3, CompressionMode.MESSAGE)])
 def test_bags_of_another_writer(tmp_path, plugin, compression):
     directory = write_with_rosbags(
@@ -115,6 +117,7 @@ def test_bags_of_another_writer(tmp_path, plugin, compression):
         run = load_run(directory, namespace)
         assert_same_run(run)
         assert run.namespace == namespace and run.metadata == {}
+    assert read_bag(directory).storage == plugin.name.lower()
     if compression in (CompressionMode.FILE, CompressionMode.MESSAGE):
         return
     data_file, = (path for path in directory.iterdir() if path.name != 'metadata.yaml')
