@@ -82,7 +82,8 @@ class Chain:
     Raises
     ------
     InputError
-        Unknown primitive or key; a value or rate outside the domain's range.
+        Unknown primitive or key; a value or rate outside the domain's range, or that cannot be
+        calculated.
 
     """
 
@@ -93,17 +94,23 @@ class Chain:
         self._raw = [(name, dict(arguments or {})) for name, arguments, _ in segments]
         value, t = domain.rest, 0.0
         for name, arguments, where in segments:
-            primitive = make_primitive(
-                name, arguments, value, domain.rest, domain.unit, where, domain.name)
-            t += primitive.duration_s
-            if t > LONGEST_S:
+            try:
+                primitive = make_primitive(
+                    name, arguments, value, domain.rest, domain.unit, where, domain.name)
+                t += primitive.duration_s
+                if t > LONGEST_S:
+                    raise InputError(
+                        f'after {name} the experiment is {t:.6g} s long; allowed is up to '
+                        f'{LONGEST_S:g} s', where)
+                self._check_range(primitive, name, where)
+                value = primitive.end
+            except InputError:
+                raise
+            except (ArithmeticError, ValueError) as error:
                 raise InputError(
-                    f'after {name} the experiment is {t:.6g} s long; allowed is up to '
-                    f'{LONGEST_S:g} s', where)
-            self._check_range(primitive, name, where)
+                    f'{name} cannot be calculated with these keys: {error}', where) from error
             self.segments.append(primitive)
             self._starts.append(t - primitive.duration_s)
-            value = primitive.end
         self.duration_s = t
 
     def _check_range(self, primitive: 'Primitive', name: str, where: str) -> None:

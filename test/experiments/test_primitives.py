@@ -23,6 +23,7 @@ import sys
 import textwrap
 
 from pam_actuation.experiments import load_experiment
+from pam_actuation.experiments.chain import Chain, DOMAINS
 from pam_actuation.experiments.primitives import make_primitive, PRIMITIVES
 from pam_actuation.resources import list_config
 from pam_sim.errors import InputError
@@ -162,6 +163,18 @@ def test_the_file_that_the_guide_shows_is_a_primitive(tmp_path):
         [sys.executable, '-c', code], capture_output=True, text=True,
         env={**os.environ, 'PAM_PRIMITIVES_PATH': str(tmp_path)})
     assert done.stdout.strip() == '0.0015', done.stderr
+
+
+def test_a_value_that_cannot_be_calculated_is_told_with_its_place(monkeypatch):
+    class Inverse(PRIMITIVES['hold']):
+        """A value without a limit at its start."""
+
+        def at(self, t_s):
+            return 1e-3 / t_s, 0.0
+
+    monkeypatch.setitem(PRIMITIVES, 'inverse', Inverse)
+    with pytest.raises(InputError, match='^here: inverse cannot be calculated with these keys: '):
+        Chain(DOMAINS['contraction'], [('inverse', {'duration_s': 1.0}, 'here')])
 
 
 def test_the_guide_shows_an_experiment_and_names_all():
