@@ -32,7 +32,7 @@ from launch.substitutions import LaunchConfiguration
 
 KNEES = ('left_knee', 'right_knee')
 HANDED_ON = {
-    'valve': ('ppr', 'Proportional pressure regulators (ppr) or high-speed valves (hsv).'),
+    'valve': ('', 'Regulators (ppr) or high-speed valves (hsv); empty: those of the joint.'),
     'joint': ('joint_dmsp_5_300_realistic', 'Joint of both knees: preset or path.'),
     'hardware': ('sim', 'sim, another name in config/hardware, or a parameter file.'),
     'angle': ('sensors', 'Who publishes the angles of real joints: sensors, or topic: you.'),

@@ -60,8 +60,9 @@ def _arguments():
     """Return the declared arguments."""
     return [
         DeclareLaunchArgument(
-            'valve', default_value='ppr', choices=['ppr', 'hsv'],
-            description='Proportional pressure regulators or pairs of high-speed valves.'),
+            'valve', default_value='', choices=['', 'ppr', 'hsv'],
+            description='Proportional pressure regulators or pairs of high-speed valves; '
+                        'empty: the valves of the joint.'),
         DeclareLaunchArgument(
             'joint', default_value='joint_dmsp_5_300_realistic',
             description='Joint preset, or path of its file.'),
@@ -186,7 +187,8 @@ def _note_names(context):
         return LaunchConfiguration(name).perform(context)
 
     namespace = launch_namespace(given('namespace'))
-    noted = {'namespace': namespace, NAME: namespace.rsplit('/', 1)[-1] or 'knee',
+    valve = given('valve') or load_joint(given('joint')).valve
+    noted = {'namespace': namespace, 'valve': valve, NAME: namespace.rsplit('/', 1)[-1] or 'knee',
              HARDWARE_FILE: hardware_file(given('hardware')),
              # Real sensors have no seed.
              RECORDED_SEED: given('seed') if given('hardware') == SIMULATED else '-1',
@@ -197,7 +199,7 @@ def _note_names(context):
         noted[RECORDER_NAME] = f'{above}{namespace}/{RECORDER}'
         if given('controller') != 'none':
             noted[RECORDED_CONTROLLER] = given('controller_file') or joint_preset_for(
-                load_joint(given('joint')), given('valve'))
+                load_joint(given('joint')), valve)
         if given('experiment') != 'none':
             noted[RECORDED_EXPERIMENT] = given('experiment')
     return [SetLaunchConfiguration(name, value) for name, value in noted.items()]

@@ -42,6 +42,7 @@ from pam_actuation.hardware.files import hardware_file
 from pam_actuation.namespaces import launch_namespace
 from pam_actuation.nodes.pid_controller import PidNode
 from pam_actuation.rigging.layouts import NO_CONTROLLER, played
+from pam_sim import load_rig
 from pam_sim.errors import InputError
 
 PACKAGE = 'pam_actuation'
@@ -56,8 +57,9 @@ def _arguments():
     started = datetime.now().strftime('%Y%m%d_%H%M%S')
     return [
         DeclareLaunchArgument(
-            'valve', default_value='ppr', choices=['ppr', 'hsv'],
-            description='Proportional pressure regulator or a pair of high-speed valves.'),
+            'valve', default_value='', choices=['', 'ppr', 'hsv'],
+            description='Proportional pressure regulator or a pair of high-speed valves; '
+                        'empty: the valve of the rig.'),
         DeclareLaunchArgument(
             'rig', default_value='dmsp_5_300_realistic',
             description='Rig preset, or path of a model file.'),
@@ -175,10 +177,11 @@ def _note_what_is_needed(context):
         if file:
             raise InputError('is of no use with controller:=none', 'controller_file')
         file = NO_CONTROLLER
+    valve = given('valve') or load_rig(given('rig')).valve
     name, raw = played(
-        given('experiment'), given('rig'), given('valve'), file,
+        given('experiment'), given('rig'), valve, file,
         PidNode.DEFAULT_CONTROLLERS if kind == 'pid' else None)
-    noted = {HARDWARE_FILE: hardware_file(given('hardware')),
+    noted = {'valve': valve, HARDWARE_FILE: hardware_file(given('hardware')),
              CONTROLLER: kind if name else NO_CONTROLLER, CONTROLLER_NAME: name,
              RAW: str(raw).lower(), 'namespace': launch_namespace(given('namespace')),
              # Real sensors have no seed.

@@ -53,3 +53,26 @@ def test_the_aggregator_has_every_node_in_one_group():
     contained = [part for group in groups.values() if isinstance(group, dict)
                  for part in group['contains']]
     assert sorted(contained) == sorted(f'/{name}' for name in ORDER)
+
+
+@pytest.mark.parametrize('name, given, valve', [
+    ('rig', {}, 'ppr'), ('rig', {'rig': 'mine.yaml'}, 'hsv'),
+    ('rig', {'rig': 'mine.yaml', 'valve': 'ppr'}, 'ppr'), ('knee', {}, 'ppr'),
+    ('knee', {'valve': 'hsv'}, 'hsv')])
+def test_the_valve_is_that_of_the_file_where_none_is_given(name, given, valve, tmp_path,
+                                                           monkeypatch):
+    """Where ROS 2 is installed: what the launch file makes of its arguments."""
+    launch = pytest.importorskip('launch.launch_description_sources')
+    pytest.importorskip('launch_ros')
+    from launch import LaunchContext
+    from launch.actions import DeclareLaunchArgument, OpaqueFunction
+    monkeypatch.chdir(tmp_path)
+    Path('mine.yaml').write_text('rig: dmsp_5_300_hanging_mass\nvalve: hsv\n')
+    context = LaunchContext()
+    context.launch_configurations.update(given)
+    source = launch.PythonLaunchDescriptionSource(str(LAUNCH / f'{name}.launch.py'))
+    for entity in source.get_launch_description(context).entities:
+        if isinstance(entity, (DeclareLaunchArgument, OpaqueFunction)):
+            for follows in entity.visit(context) or ():
+                follows.visit(context)
+    assert context.launch_configurations['valve'] == valve
