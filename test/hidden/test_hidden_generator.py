@@ -187,6 +187,27 @@ def test_what_numbers_of_the_rig_can_take_up_is_no_gap_at_full_weight():
     assert max(found['plain'].values()) < 0.2 * max(found['tempered'].values())
 
 
+def test_a_refit_goes_on_where_its_first_step_ends_beside_the_least_squares():
+    # By the second number the flow changes twice as much once the first has moved.
+    def model(theta, run):
+        a, b = theta
+        return {'pressure': np.repeat([3.0 * a, 300.0 * b * (1.0 + a)], 100)}
+
+    def slopes_at(theta, values):
+        a, b = theta
+        rows = [[3.0, 0.0, 0.0], [300.0 * b, 300.0 * (1.0 + a), 0.0]]
+        return {'pressure': np.repeat(rows, 100, axis=0)}
+
+    start, prior = np.zeros(2), np.zeros(3)
+    target, slopes = model(np.ones(2), None), slopes_at(start, None)
+    step = truth_gap._fitted(target, slopes, prior, 1)
+    assert abs(target['pressure'] - model(start + step[:-1], None)['pressure']).max() > 500.0
+    step = truth_gap._settled(
+        step, model, start, None, target, slopes, slopes_at, prior,
+        truth_gap.LATENCY_SD_S)
+    assert step[:-1] == pytest.approx([1.0, 1.0], abs=1e-2)
+
+
 def test_a_run_without_the_effect_starts_at_what_is_read():
     truth = truth_run.run_rig({}, 'hsv', truth_commands.protocol('steps', 2))
     start_pa = truth.rows[0, truth_sensors.rig.O_P]

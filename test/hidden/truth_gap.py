@@ -33,6 +33,8 @@ PRIOR = 0.02
 SUPPLY_PRIOR = 0.005
 LATENCY_SD_S = 1e-3
 EVERY = 25                    # rows of 0.2 ms: compared at 200 Hz
+FURTHER, GOOD_PART = 6, 0.8    # most further steps, and what one must leave at most to go on
+SETTLED = 0.01                # squares of a sample [sigma] below which there is no gap
 ROUNDS = {'plain': 1, 'tempered': 5}         # the first is at full weight
 
 
@@ -83,21 +85,27 @@ def gap_in_sigma(numbers, without, chain, fit, certify, valve, start=None, repla
     theta = np.array([(without.get(n, nominal[n]) - nominal[n]) / s
                       for n, s in zip(names, sd)])
     base = model(theta, fit)
-    slopes = {s: np.empty((base[s].size, len(names) + 1)) for s in signals}
-    for k in range(len(names)):
-        moved = theta.copy()
-        moved[k] += 0.3
-        for s, values in model(moved, fit).items():
-            slopes[s][:, k] = (values - base[s]) / 0.3
-    for s in signals:
-        slopes[s][:, -1] = -np.gradient(base[s], EVERY * sensors.ROW_S) * latency_sd_s
+
+    def slopes_at(at, values):
+        found = {s: np.empty((values[s].size, len(names) + 1)) for s in signals}
+        for k in range(len(names)):
+            moved = at.copy()
+            moved[k] += 0.3
+            for s, other in model(moved, fit).items():
+                found[s][:, k] = (other - values[s]) / 0.3
+        for s in signals:
+            found[s][:, -1] = -np.gradient(values[s], EVERY * sensors.ROW_S) * latency_sd_s
+        return found
+
+    slopes = slopes_at(theta, base)
     prior = np.concatenate([theta, [0.0]])
     left = {s: target[s] - base[s] for s in signals}
     found = {}
     for refit, rounds in ROUNDS.items():
         step = _fitted(left, slopes, prior, rounds)
         if rounds == 1:
-            step = _corrected(step, model, theta, fit, target, slopes, prior, latency_sd_s)
+            step = _settled(step, model, theta, fit, target, slopes, slopes_at, prior,
+                            latency_sd_s)
         end = model(theta + step[:-1], certify)
         truth = _scaled(certify.rows, chain, signals)
         found[refit] = {s: float(np.sqrt(np.mean(
@@ -110,25 +118,38 @@ def _late(values, step, latency_sd_s):
     return values - np.gradient(values, EVERY * sensors.ROW_S) * step[-1] * latency_sd_s
 
 
-def _corrected(step, model, theta, fit, target, slopes, prior, latency_sd_s):
+def _settled(step, model, theta, fit, target, slopes, slopes_at, prior, latency_sd_s):
     """
-    Return a step of full weight, corrected once where it leads, if that lowers the squares.
+    Return a step of full weight, taken further while that lowers the squares by a good part.
 
-    The slopes are those of the start, and a misfit of hundreds of sigma takes numbers far.
+    The slopes are those of the start, and a misfit of hundreds of sigma takes numbers far. Behind
+    on/off valves the pressure adds up every flow, and two numbers of the valve do nearly the same.
+    There the first step may end far from the least squares, and the rest would count as a gap.
     """
     def reached(at):
         values = model(theta + at[:-1], fit)
         with np.errstate(all='ignore'):
             off = {s: target[s] - _late(values[s], at, latency_sd_s) for s in target}
             squares = sum(float(np.sum(v**2)) for v in off.values())
-        return off, squares + float(np.sum((prior + at) ** 2))
+        return values, off, squares + float(np.sum((prior + at) ** 2))
 
-    off, squares = reached(step)
+    values, off, squares = reached(step)
     while not np.isfinite(squares):             # no rig has such numbers
         step = 0.5 * step
-        off, squares = reached(step)
-    further = step + _fitted(off, slopes, prior + step, 1)
-    return further if reached(further)[1] < squares else step
+        values, off, squares = reached(step)
+    enough = SETTLED * sum(v.size for v in target.values())
+    for round_ in range(FURTHER):
+        if round_:
+            slopes = slopes_at(theta + step[:-1], values)
+        further = step + _fitted(off, slopes, prior + step, 1)
+        other, rest, less = reached(further)
+        falls = less < squares
+        if falls:
+            step, values, off, before, squares = further, other, rest, squares, less
+        # The first round has the old slopes: that it ends tells nothing.
+        if squares < enough or round_ and not (falls and squares < GOOD_PART * before):
+            break
+    return step
 
 
 def _fitted(left, slopes, prior, rounds):
