@@ -47,11 +47,12 @@ def decimate_min_max(xs: ArrayLike, ys: ArrayLike,
         return x, y
     bins = max(int(max_points) // 2 - 1, 1)
     edges = np.linspace(0, x.size, bins + 1).astype(int)
-    kept = [0, x.size - 1]
-    for start, stop in zip(edges[:-1], edges[1:]):
-        part = y[start:stop]
-        kept += [start + int(np.argmin(part)), start + int(np.argmax(part))]
-    keep = np.unique(kept)
+    starts, place = edges[:-1], np.repeat(np.arange(bins), np.diff(edges))
+    kept = [np.array([0, x.size - 1])]
+    for extreme in np.minimum.reduceat(y, starts), np.maximum.reduceat(y, starts):
+        at = np.flatnonzero(y == extreme[place])
+        kept.append(at[np.searchsorted(at, starts)])       # the first one of each bin
+    keep = np.unique(np.concatenate(kept))
     return x[keep], y[keep]
 
 

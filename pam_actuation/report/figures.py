@@ -47,15 +47,12 @@ Row = tuple[str, list[Trace]] | tuple[str, list[Trace], bool]
 
 def rounded(values: ArrayLike, digits: int = 5) -> list[int | float | None]:
     """Return a list of floats with so many significant digits; NaN and infinity become None."""
-    out: list[int | float | None] = []
-    for value in np.asarray(values, dtype=float).ravel():
-        value = float(value)
-        if not math.isfinite(value):
-            out.append(None)
-        else:
-            text = float(f'{value:.{digits}g}')
-            out.append(int(text) if text == int(text) and abs(text) < 1e15 else text)
-    return out
+    numbers = np.asarray(values, dtype=float).ravel().tolist()
+    # One text for all of them costs half as much as one text each.
+    texts = f'%.{digits}g ' * len(numbers) % tuple(numbers)
+    return [None if not math.isfinite(value) else int(value)
+            if abs(value) < 1e15 and value.is_integer() else value
+            for value in map(float, texts.split())]
 
 
 def line(x: ArrayLike, y: ArrayLike, name: str, role: str, held: bool = False,
