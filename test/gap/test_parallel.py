@@ -17,7 +17,7 @@
 import threading
 import time
 
-from pam_sim.gap.fit.parallel import parallel_map
+from pam_sim.gap.subsystems.parallel import parallel_map
 import pytest
 
 

@@ -22,10 +22,10 @@ from pam_sim.gap.data.split import SELECT
 from pam_sim.gap.fit.distance import distance_to_none
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
-from pam_sim.gap.fit.parallel import parallel_map
 from pam_sim.gap.select.candidates import candidates
 from pam_sim.gap.select.ranking import Ranking
 from pam_sim.gap.select.rival import Rival
+from pam_sim.gap.subsystems.parallel import parallel_map
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.gap.subsystems.problems import subsystem_problems
 from pam_sim.gap.verify.spread import spread_of_numbers

@@ -14,7 +14,7 @@
 
 """A run on the physics grid: inputs held between their stamps, outputs at theirs."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Protocol
 
@@ -241,12 +241,11 @@ class Recording:
                 return float(level)
         return None
 
-    def at_stamps(self, response: Response, late_s: Mapping[str, float] | None = None
-                  ) -> dict[str, FloatArray]:
-        """Return the response at the measured stamps, by signal; ``late_s`` are their errors."""
-        late_s = late_s or {}
-        return {s: np.interp(self.time_s[s] - late_s.get(s, 0.0), response.time_s,
-                             getattr(response, FIELD[s])) for s in self.signals}
+    def at_stamps(self, response: Response, late_s: Mapping[str, float] | None = None,
+                  signals: Sequence[str] = ()) -> dict[str, FloatArray]:
+        """Return the response at the measured stamps, less their errors ``late_s``, by signal."""
+        return {s: np.interp(self.time_s[s] - (late_s or {}).get(s, 0.0), response.time_s,
+                             getattr(response, FIELD[s])) for s in signals or self.signals}
 
 
 def smoothed(recording: Recording, signal: str) -> tuple[FloatArray, FloatArray]:

@@ -39,9 +39,9 @@ from pam_sim.gap.data.split import FIT, SELECT
 from pam_sim.gap.fit.candidate import Setting
 from pam_sim.gap.fit.distance import distance_to_none
 from pam_sim.gap.fit.hypothesis import Fit, Hypothesis, Precision, within_reach
-from pam_sim.gap.fit.parallel import parallel_map
 from pam_sim.gap.fit.solver import is_refused, ROUNDS, simulated_errors, Solver
 from pam_sim.gap.subsystems.effects import shows
+from pam_sim.gap.subsystems.parallel import parallel_map
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.rig import Rig
 

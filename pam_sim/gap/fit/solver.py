@@ -28,9 +28,9 @@ from pam_sim.errors import InputError
 from pam_sim.gap.data.noise import autocorrelation_time
 from pam_sim.gap.fit.candidate import Setting
 from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
-from pam_sim.gap.fit.parallel import parallel_map
 from pam_sim.gap.fit.trust_region import minimised
 from pam_sim.gap.subsystems.effects import shows
+from pam_sim.gap.subsystems.parallel import parallel_map
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.rig import Rig
 

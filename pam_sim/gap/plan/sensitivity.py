@@ -25,9 +25,9 @@ from pam_sim.gap.criteria import CRITERIA, Criteria
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.split import UNUSED
 from pam_sim.gap.fit.candidate import Candidate
-from pam_sim.gap.fit.parallel import parallel_map
 from pam_sim.gap.select.candidates import candidates, is_limit, split_refinements
 from pam_sim.gap.subsystems.effects import acts_on
+from pam_sim.gap.subsystems.parallel import parallel_map
 from pam_sim.gap.subsystems.problems import subsystem_problems
 from pam_sim.rig import Rig
 from pam_sim.short_repr import short_repr

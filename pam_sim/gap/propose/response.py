@@ -32,10 +32,10 @@ from pam_sim.effects.unnamed import flow_term, set_point_term, terms
 from pam_sim.gap.data.recording import GRID_S
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit
-from pam_sim.gap.fit.parallel import parallel_map
 from pam_sim.gap.propose.factors import columns_of, EVERY
 from pam_sim.gap.propose.library import Term
 from pam_sim.gap.subsystems.known import of_run
+from pam_sim.gap.subsystems.parallel import parallel_map
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.gap.subsystems.pulses import pulses_of
 from pam_sim.response import Response

@@ -31,13 +31,13 @@ from pam_sim.errors import InputError
 from pam_sim.gap.fit.candidate import Candidate
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
-from pam_sim.gap.fit.parallel import parallel_map
 from pam_sim.gap.fit.solver import Solver
 from pam_sim.gap.propose.library import library, StandIn, Term
 from pam_sim.gap.propose.response import responses_of, worth_a_run
 from pam_sim.gap.propose.signals import force_error
 from pam_sim.gap.select.comparison import gap, preference
 from pam_sim.gap.subsystems.effects import shows
+from pam_sim.gap.subsystems.parallel import parallel_map
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 
 FITTED = 3                   # most promising terms of a stand-in that are fitted

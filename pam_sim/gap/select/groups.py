@@ -26,11 +26,11 @@ import numpy as np
 from pam_sim.effects.registry import get_effect
 from pam_sim.gap.fit.candidate import Candidate
 from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
-from pam_sim.gap.fit.parallel import parallel_map
 from pam_sim.gap.select.context import SearchContext
 from pam_sim.gap.select.refit import fit_without
 from pam_sim.gap.select.rival import NamedEffect, Rival
 from pam_sim.gap.subsystems.effects import acts_on
+from pam_sim.gap.subsystems.parallel import parallel_map
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 
 IN_ITS_PLACE = 3             # effort: so many rivals of each member are fitted beside the others

@@ -30,11 +30,11 @@ from pam_sim.errors import InputError
 from pam_sim.gap.fit.candidate import Candidate
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
-from pam_sim.gap.fit.parallel import parallel_map
 from pam_sim.gap.select.context import SearchContext
 from pam_sim.gap.select.rival import NamedEffect, Rival
 from pam_sim.gap.select.screening import AMPLITUDE_RANGE, flat_spaces_of, free_signature, Screened
 from pam_sim.gap.subsystems.effects import acts_on
+from pam_sim.gap.subsystems.parallel import parallel_map
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 
 FITTED = 4                   # effort: of the most promising pairs

@@ -26,11 +26,11 @@ from typing import Protocol
 from pam_sim.gap.criteria import Criteria
 from pam_sim.gap.data.split import FIT, SELECT
 from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
-from pam_sim.gap.fit.parallel import parallel_map
 from pam_sim.gap.select.candidates import is_limit, same_as
 from pam_sim.gap.select.comparison import gap, preference, share
 from pam_sim.gap.select.order import in_order, uncertain_numbers
 from pam_sim.gap.select.rival import NamedEffect, Rival
+from pam_sim.gap.subsystems.parallel import parallel_map
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 
 Test = Callable[[Rival], bool]

@@ -19,9 +19,9 @@ from collections.abc import Sequence
 from pam_sim.gap.fit.candidate import Candidate
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
-from pam_sim.gap.fit.parallel import parallel_map
 from pam_sim.gap.select.context import SearchContext
 from pam_sim.gap.select.rival import NamedEffect, Rival
+from pam_sim.gap.subsystems.parallel import parallel_map
 
 
 def fit_without(estimator: Estimator, current: Fit, name: str, put: Rival | None = None) -> Fit:

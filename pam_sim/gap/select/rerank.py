@@ -17,11 +17,11 @@
 from collections.abc import Sequence
 
 from pam_sim.gap.fit.hypothesis import Fit
-from pam_sim.gap.fit.parallel import parallel_map
 from pam_sim.gap.select.context import SearchContext
 from pam_sim.gap.select.refit import fit_without
 from pam_sim.gap.select.rival import NamedEffect, Rival
 from pam_sim.gap.subsystems.effects import acts_on
+from pam_sim.gap.subsystems.parallel import parallel_map
 
 RANKED_AGAIN = 4             # effort: so many rivals when further effects are in
 

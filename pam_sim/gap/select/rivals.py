@@ -20,7 +20,6 @@ from pam_sim.gap.criteria import Criteria
 from pam_sim.gap.data.split import SELECT
 from pam_sim.gap.fit.candidate import Candidate
 from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
-from pam_sim.gap.fit.parallel import parallel_map
 from pam_sim.gap.select.candidates import is_limit, split_refinements
 from pam_sim.gap.select.comparison import gap
 from pam_sim.gap.select.context import SearchContext
@@ -29,6 +28,7 @@ from pam_sim.gap.select.ranking import least_gain
 from pam_sim.gap.select.rival import Rival
 from pam_sim.gap.select.screening import screen, Screened
 from pam_sim.gap.subsystems.effects import acts_on
+from pam_sim.gap.subsystems.parallel import parallel_map
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 
 # Effort: how many names are fitted in each subsystem, and how many of those that promise most

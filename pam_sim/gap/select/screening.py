@@ -29,8 +29,8 @@ from pam_sim.errors import InputError
 from pam_sim.gap.fit.candidate import Candidate
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit
-from pam_sim.gap.fit.parallel import parallel_map
 from pam_sim.gap.subsystems.effects import acts_on
+from pam_sim.gap.subsystems.parallel import parallel_map
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 
 AMPLITUDE_RANGE = (0.05, 30.0)      # of the screening size, for the start of a fit

@@ -17,5 +17,5 @@ Each subsystem on its own measured input, and the whole chain on its valve signa
 
 ``effects`` (where an effect acts), ``known`` (numbers with a prior), ``simulation`` (free runs),
 ``problem`` (one subsystem with its recordings), ``valve``, ``mechanics``, ``problems`` (those that
-recordings allow).
+recordings allow), ``parallel`` (several simulations or fits at once).
 """

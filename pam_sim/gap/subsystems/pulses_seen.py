@@ -23,6 +23,7 @@ from pam_sim.gap.criteria import CRITERIA, Criteria
 from pam_sim.gap.data.means import behind
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.split import TEST_BLOCK_S
+from pam_sim.gap.subsystems.parallel import parallel_map
 from pam_sim.gap.subsystems.simulation import free_run
 from pam_sim.rig import Rig
 
@@ -57,7 +58,7 @@ def _is_nearer(averaged: Rig, switching: Rig, recording: Recording, period_s: fl
     first = min(mean, key=lambda one: one.squares[0].mean())
     # What opens at once comes sooner than its mean, so it needs more delay; any phase is tried.
     single = min(one.squares[0].mean() for one in _tried(
-        switching, recording, period_s, first.delay + np.arange(0.0, 1.0, FINE)))
+        switching, recording, period_s, first.delay + np.arange(0.0, 1.0, FINE), LAGS[:1]))
     if single < (1.0 - criteria.close_share) * first.squares[0].mean():
         return True
     # A lag of the reading takes part of the delay over.
@@ -81,13 +82,15 @@ class _Tried:
         return self.squares[np.argmin(self.squares.mean(axis=1))]
 
 
-def _tried(rig: Rig, recording: Recording, period_s: float, delays: FloatArray) -> list[_Tried]:
+def _tried(rig: Rig, recording: Recording, period_s: float, delays: FloatArray,
+           lags: Sequence[float] = LAGS) -> list[_Tried]:
     """Return the squared changes of the error of free runs, pressure alone."""
     measured = recording.measured['pressure']
     step = float(np.median(np.diff(recording.time_s['pressure']))) / period_s
-    found = []
-    for delay in delays:
-        run = free_run(rig, recording, period_s * float(delay))['pressure']
-        found.append(_Tried(float(delay), np.array([
-            np.diff(behind(run, lag / step, 1.0) - measured) ** 2 for lag in LAGS])))
-    return found
+
+    def tried(delay: float) -> _Tried:
+        run = free_run(rig, recording, period_s * delay, signals=('pressure',))['pressure']
+        return _Tried(delay, np.array([
+            np.diff(behind(run, lag / step, 1.0) - measured) ** 2 for lag in lags]))
+
+    return parallel_map(tried, delays.tolist())

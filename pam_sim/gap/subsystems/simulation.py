@@ -22,7 +22,7 @@ The valve signal holds between its header stamps. On the physics grid each step 
 mean of the held signal over the step, so that a shift of the whole signal acts smoothly.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from pam_sim.annotations import FloatArray
@@ -44,7 +44,8 @@ HIGHEST_INPUT_V = 6.0
 def free_run(rig: Rig, recording: Recording, delay_s: float = 0.0,
              stamp_shift_s: FloatArray | None = None, start_error_pa: float = 0.0,
              late_s: Mapping[str, float] | None = None,
-             pressure_noise_pa: float | FloatArray = 0.0) -> dict[str, FloatArray]:
+             pressure_noise_pa: float | FloatArray = 0.0,
+             signals: Sequence[str] = ()) -> dict[str, FloatArray]:
     """
     Return the model's outputs at the measured stamps, by signal name.
 
@@ -66,15 +67,17 @@ def free_run(rig: Rig, recording: Recording, delay_s: float = 0.0,
         By how much the stamps of a signal are late.
     pressure_noise_pa : float or numpy.ndarray
         Added to the measured pressure where that is the input.
+    signals : sequence of str
+        Which are returned; where none are given, all that are measured.
 
     """
     if recording.pressure_given:
         return recording.at_stamps(simulate(
             pressure_driven(rig), recording, pressure_input(recording, read_pressure(
-                recording, rig, pressure_noise_pa))), late_s)
+                recording, rig, pressure_noise_pa))), late_s, signals)
     signal = recording.valve_signal(delay_s, stamp_shift_s, pulses_of(rig))
     return recording.at_stamps(
-        simulate(on_openings(rig), recording, signal, start_error_pa), late_s)
+        simulate(on_openings(rig), recording, signal, start_error_pa), late_s, signals)
 
 
 def run_from_pressure(rig: Rig, recording: Recording) -> dict[str, FloatArray]:
