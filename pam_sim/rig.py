@@ -355,12 +355,12 @@ class Rig:
         """
         Return the force [N] at the load cell that a motion of a free load asks for.
 
-        Inertia and weight of a hanging mass, its spring excepted; inertia and own force of any
-        other load.
+        Inertia, weight and spring of a hanging mass; inertia and own force of any other load.
         """
         mass_kg: float = self.parameters['mass_kg']
         if not has_force(LOADS[self.load]):
-            return mass_kg * (acceleration_m_per_s2 + GRAVITY_M_PER_S2)
+            return (mass_kg * (acceleration_m_per_s2 + GRAVITY_M_PER_S2)
+                    + self.parameters['spring_n_per_m'] * contraction_m)
         return mass_kg * acceleration_m_per_s2 + load_force_n(
             LOADS[self.load], self.parameters, contraction_m, velocity_m_per_s)
 

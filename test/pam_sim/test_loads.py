@@ -19,6 +19,8 @@ from pathlib import Path
 import subprocess
 import sys
 
+import numpy as np
+from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.load import LOADS
 from pam_sim.load.registry import find_loads
@@ -81,6 +83,15 @@ def test_the_loads_that_ship():
     for name, load in LOADS.items():
         assert load.NAME == name and load.SENTENCE and load.EQUATION and load.SOURCE
         assert all(p.unit and p.description and p.source for p in load.PARAMETERS)
+
+
+def test_the_cell_reads_what_the_motion_of_mass_and_spring_asks_for():
+    rig = load_rig('dmsp_5_300_hanging_mass').with_({'spring_n_per_m': 700.0})
+    seen = rig.simulate(4.0 + np.sin(np.arange(200) * 0.05), initial_pressure_pa=451325.0)
+    asked = rig.force_of_motion_n(
+        seen.contraction_m, seen.velocity_m_per_s, seen.acceleration_m_per_s2)
+    assert np.ptp(seen.contraction_m) > 1e-3
+    np.testing.assert_allclose(seen.force_n, asked, atol=1e-9)
 
 
 def test_a_load_in_a_folder_of_the_user_moves_a_rig(tmp_path):
