@@ -39,7 +39,6 @@ from pam_actuation.tuning.joint_loop import JointLoop
 from pam_sim import load_rig
 from pam_sim.effects.unnamed.reading import with_terms
 from pam_sim.effects.valve_dead_zone_gradual import mean_openings_with_lift
-from pam_sim.filters import first_order
 from pam_sim.gap.propose.response import follow
 from pam_sim.joint import load_joint
 from pam_sim.valve import VALVES
@@ -85,7 +84,6 @@ def rollouts() -> None:
         {'name': 'force_reading_term', 'parameters': {'first_of_1': 1.0}}]).effects
     with_terms(found.outputs, 'force', reading.parameters, rig.parameters)
     follow(*np.zeros((3, ROWS)))
-    first_order(np.zeros(ROWS), 0.5, 0.5)
     mean_openings_with_lift(np.zeros(ROWS), 0.01, 0.0, 0.0, 0.0, 0.0, np.empty(ROWS))
 
 

@@ -24,7 +24,6 @@ from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit, Precision
 from pam_sim.gap.result import Calibrated, GapResult
 from pam_sim.gap.select.comparison import gap
-from pam_sim.gap.select.rarity import normal_below
 from pam_sim.gap.select.rival import NamedEffect, Rival
 from pam_sim.gap.select.search import Outcome
 from pam_sim.gap.verify.materiality import is_material
@@ -223,9 +222,10 @@ def _tested(rival: Rival, subsystem: str) -> float | None:
 
 def _confidence(named: NamedEffect, outcome: Outcome, criteria: Criteria) -> float:
     """Return how sure a name is, 0 to 1: against its nearest rival, and by what is left."""
+    from scipy.stats import norm       # slow to import
     s = named.subsystem
     best = max((r.share.get(s, 0.0) for r in named.rivals), default=1.0)
     rivals = [_tested(r, s) for r in named.rivals if r.name not in named.names
               and r.share.get(s, 0.0) > criteria.greater_part * best]
-    sure = normal_below(min([t for t in rivals if t is not None], default=6.0) - 1.0)
+    sure = float(norm.cdf(min([t for t in rivals if t is not None], default=6.0) - 1.0))
     return round(sure / len(named.names) * math.sqrt(max(outcome.share.get(s, 1.0), 0.0)), 3)

@@ -30,7 +30,6 @@ import math
 
 import numpy as np
 from pam_sim.annotations import FloatArray
-from pam_sim.filters import local_polynomial, weights
 from pam_sim.gap.data.noise import Noise, SMALLEST
 from pam_sim.gap.data.recording import Recording
 
@@ -85,8 +84,10 @@ def drawn_pa(raw: Recording, noise: Noise, quiet: Recording, random: np.random.G
 
 def _averages(p: FloatArray, period_s: float) -> Iterator[tuple[FloatArray, float]]:
     """Give (averaged values, what is left of white noise), with ever longer windows."""
+    from scipy.signal import savgol_coeffs, savgol_filter       # slow to import
+
     yield p, 1.0
     window = FEWEST
     while (window - 1) * period_s <= SHORT_S:
-        yield local_polynomial(p, window, 2), float(np.linalg.norm(weights(window, 2)))
+        yield savgol_filter(p, window, 2), float(np.linalg.norm(savgol_coeffs(window, 2)))
         window = 2 * int(0.5 * LONGER * window) + 1

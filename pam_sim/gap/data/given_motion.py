@@ -21,7 +21,6 @@ friction. Noise at rest would turn that direction hundreds of times a second.
 
 import numpy as np
 from pam_sim.annotations import BoolArray, FloatArray
-from pam_sim.filters import local_polynomial
 from pam_sim.gap.data.noise import noise_of
 
 WINDOW_S = 0.061             # of the parabolas that smooth; passes what is slower than 15 Hz
@@ -46,8 +45,9 @@ def given_motion(time_s: FloatArray, values: FloatArray, grid_s: FloatArray
         Evenly spaced instants.
 
     """
+    from scipy.signal import savgol_filter       # slow to import
     steps = 2 * int(0.5 * WINDOW_S / (grid_s[1] - grid_s[0])) + 1
-    y = local_polynomial(np.interp(grid_s, time_s, values), steps, 2)
+    y = savgol_filter(np.interp(grid_s, time_s, values), steps, 2)
     within = max(WINDOW_S / float(np.median(np.diff(time_s))), PARABOLA_GAIN)
     noise = noise_of(time_s, values).sd * float(np.sqrt(PARABOLA_GAIN / within))
     found = followed(y, STILL_SD * noise)

@@ -18,21 +18,22 @@ import math
 
 import numpy as np
 from pam_sim.annotations import BoolArray, FloatArray
-from pam_sim.filters import first_order
 
 
 def recent(values: FloatArray, time_s: FloatArray, memory_s: float) -> FloatArray:
     """Return values less their own mean before, which forgets within ``memory_s``."""
+    from scipy.signal import lfilter       # slow to import
     keep = math.exp(-float(np.median(np.diff(time_s))) / memory_s)
-    return values - first_order(values, keep, 0.0, 1.0 - keep)
+    return values - lfilter([0.0, 1.0 - keep], [1.0, -keep], values)
 
 
 def behind(values: FloatArray, memory: float, period: float) -> FloatArray:
     """Return evenly sampled values behind a lag, at rest before; both times in one unit."""
+    from scipy.signal import lfilter       # slow to import
     if memory == 0.0:
         return values
     keep = math.exp(-period / memory)
-    return first_order(values, keep, 1.0 - keep, start=keep * float(values[0]))
+    return lfilter([1.0 - keep], [1.0, -keep], values, zi=[keep * values[0]])[0]
 
 
 def means_of(values: FloatArray, time_s: FloatArray, mean_s: float,

@@ -25,7 +25,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from pam_sim.annotations import FloatArray
-from pam_sim.filters import first_order
 
 THIRD_DIFFERENCE_GAIN = np.sqrt(20.0)      # 1, 3, 3, 1 squared and summed
 SLOW_S = 1.0 / 90.0          # between samples: a log is slow above that
@@ -99,12 +98,13 @@ class Noise:
 
     def draw(self, time_s: FloatArray, random: np.random.Generator) -> FloatArray:
         """Return noise like it at rising instants, shape of ``time_s``."""
+        from scipy.signal import lfilter       # slow to import
         found = self.white_sd * random.standard_normal(time_s.size)
         if self.slow_sd > 0.0:
             period = float(np.median(np.diff(time_s)))
             keep = np.exp(-period / self.memory_s)
             driven = self.slow_sd * np.sqrt(1.0 - keep ** 2) * random.standard_normal(time_s.size)
-            found += first_order(driven, float(keep), 1.0)
+            found += lfilter([1.0], [1.0, -keep], driven)
         return found
 
 

@@ -20,7 +20,6 @@ from typing import Protocol
 
 import numpy as np
 from pam_sim.annotations import BoolArray, FloatArray, IntArray
-from pam_sim.filters import local_polynomial
 from pam_sim.gap.data.given_motion import given_motion
 from pam_sim.gap.data.jumps import jump_shares
 from pam_sim.gap.data.noise import SLOW_S
@@ -250,9 +249,9 @@ class Recording:
 
 def smoothed(recording: Recording, signal: str) -> tuple[FloatArray, FloatArray]:
     """Return (value, rate) of a measured signal on the grid, smoothed over some steps."""
+    from scipy.signal import savgol_filter       # slow to import
     y = np.interp(recording.grid_s, recording.time_s[signal], recording.measured[signal])
-    return (local_polynomial(y, SMOOTH_STEPS, 2, 0, GRID_S),
-            local_polynomial(y, SMOOTH_STEPS, 2, 1, GRID_S))
+    return tuple(savgol_filter(y, SMOOTH_STEPS, 2, deriv=k, delta=GRID_S) for k in range(2))
 
 
 def held_mean(time_s: FloatArray, value: FloatArray, grid_s: FloatArray,

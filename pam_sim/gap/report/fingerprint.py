@@ -33,7 +33,6 @@ from typing import Any
 import numpy as np
 from pam_sim.annotations import BoolArray, FloatArray, IntArray
 from pam_sim.effects.registry import get_effect
-from pam_sim.filters import local_polynomial
 from pam_sim.gap.criteria import CRITERIA, Criteria
 from pam_sim.gap.data.noise import noise_sd
 from pam_sim.gap.data.recording import GRID_S, Measured, Recording
@@ -71,13 +70,14 @@ def conditions_of(recording: Measured, subsystem: str, time_s: FloatArray
     that of the contraction [m/s], of the pressure [Pa/s] where the subsystem is the valve or
     nothing moves; pressure in Pa gauge.
     """
+    from scipy.signal import savgol_filter       # slow to import
     grid = recording.grid_s
     level = {s: np.interp(grid, recording.time_s[s], recording.measured[s])
              for s in ('pressure', 'contraction')}
     moves = np.ptp(level['contraction']) > 10.0 * REST['contraction'] * GRID_S
     leading = 'pressure' if subsystem == 'valve' or not moves else 'contraction'
     window = min(SMOOTH_STEPS, 2 * ((grid.size - 1) // 2) - 1)
-    rate = local_polynomial(level[leading], window, 2, 1, GRID_S)
+    rate = savgol_filter(level[leading], window, 2, deriv=1, delta=GRID_S)
     motion = np.where(rate > REST[leading], 1, np.where(rate < -REST[leading], -1, 0))
     direction = _direction(motion)
     place = np.clip(np.rint(np.asarray(time_s) / GRID_S).astype(int), 0, grid.size - 1)

@@ -26,7 +26,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from pam_sim.annotations import BoolArray, FloatArray
-from pam_sim.filters import local_polynomial
 from pam_sim.gap.data.noise import noise_of, STAMP_SD_S
 from pam_sim.gap.data.recording import GRID_S, Recording
 from pam_sim.gap.result import Share
@@ -217,12 +216,11 @@ def _unscaled(one: FloatArray, other: FloatArray, rate: FloatArray) -> FloatArra
 
 def smooth_motion(recording: Recording) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return contraction [m], its rate [m/s] and acceleration [m/s^2] on the grid, smoothed."""
+    from scipy.signal import savgol_filter       # slow to import
     x = np.interp(recording.grid_s, recording.time_s['contraction'],
                   recording.measured['contraction'])
     window = 2 * int(0.5 * SMOOTH_S / GRID_S) + 1
-    motion, rate, acceleration = (
-        local_polynomial(x, window, 3, k, GRID_S) for k in range(3))
-    return motion, rate, acceleration
+    return tuple(savgol_filter(x, window, 3, deriv=k, delta=GRID_S) for k in range(3))
 
 
 def signal_conditions(recording: Recording, time_s: FloatArray) -> list[dict[str, BoolArray]]:

@@ -38,7 +38,6 @@ from pam_sim.gap.report.condition import condition_of
 from pam_sim.gap.report.encoder import sensor_part
 from pam_sim.gap.report.location import force_errors, ForceErrors, locate
 from pam_sim.gap.result import GapResult, Share
-from pam_sim.gap.select.rarity import normal_below
 from pam_sim.gap.select.rival import NamedEffect
 from pam_sim.gap.select.screening import Screened
 from pam_sim.gap.select.search import Outcome
@@ -299,6 +298,7 @@ def _reads(name: str) -> str:
 
 def _certainty(named: NamedEffect, subsystem: str) -> float:
     """Return how sure the subsystem of a name is: by its set, and against rivals elsewhere."""
+    from scipy.stats import norm       # slow to import
     of_set = [subsystem_of(n) == subsystem for n in named.names]
     s = named.subsystem
     best = max((r.share.get(s, 0.0) for r in named.rivals), default=0.0)
@@ -307,4 +307,4 @@ def _certainty(named: NamedEffect, subsystem: str) -> float:
               and r.share.get(s, 0.0) > 0.5 * best and r.t.get(s, np.nan) == r.t.get(s, np.nan)]
     # A rival that explains as much was left behind for its place in the order.
     return float(np.mean(of_set)) * max(
-        normal_below(min(behind, default=6.0) - T_OF_DOUBT), UNTOLD)
+        float(norm.cdf(min(behind, default=6.0) - T_OF_DOUBT)), UNTOLD)

@@ -28,7 +28,6 @@ import numpy as np
 from pam_sim.annotations import BoolArray, FloatArray, IntArray
 from pam_sim.gap.criteria import Criteria
 from pam_sim.gap.data.split import SELECT
-from pam_sim.gap.select.rarity import normal_deviation, ranks_above, student_above
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 
 SOFTEN = 0.1                 # floors squared, added to both: equal when both are at the floor
@@ -110,6 +109,7 @@ def preference(problem: SubsystemProblem, base: FloatArray, better: FloatArray, 
 
 def _deviations(ratio: FloatArray, criteria: Criteria) -> float:
     """Return by how many deviations the log ratios of some blocks differ from none."""
+    from scipy.stats import norm, t as student, wilcoxon       # slow to import
     if ratio.size < criteria.min_blocks:
         return NO_TEST_T
     if not ratio.any():
@@ -117,8 +117,8 @@ def _deviations(ratio: FloatArray, criteria: Criteria) -> float:
     spread = float(np.std(ratio, ddof=1)) / np.sqrt(ratio.size)
     t = float(np.mean(ratio) / max(spread, 1e-9))
     towards = np.sign(t) * ratio
-    rare = min(student_above(abs(t), ratio.size - 1), ranks_above(towards))
-    return float(np.copysign(min(normal_deviation(rare), LARGEST_T), t))
+    rare = min(student.sf(abs(t), ratio.size - 1), wilcoxon(towards, alternative='greater').pvalue)
+    return float(np.copysign(min(norm.isf(rare), LARGEST_T), t))
 
 
 def _active(values: FloatArray, of_mean: float, criteria: Criteria) -> BoolArray:

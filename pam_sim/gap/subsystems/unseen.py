@@ -30,7 +30,6 @@ from functools import lru_cache
 
 import numpy as np
 from pam_sim.annotations import FloatArray, IntArray
-from pam_sim.filters import first_order
 from pam_sim.gap.data.jumps import jump_shares
 from pam_sim.gap.data.recording import GRID_S
 
@@ -120,8 +119,9 @@ class UnseenJumps:
 
 def lagged(responses: FloatArray, lag_s: float) -> FloatArray:
     """Return responses on the grid, one in each row, behind a further lag."""
-    keep = float(np.exp(-GRID_S / lag_s)) if lag_s > 0.0 else 0.0
-    return first_order(responses, keep, 1.0 - keep) if keep else responses
+    from scipy.signal import lfilter       # slow to import
+    keep = np.exp(-GRID_S / lag_s) if lag_s > 0.0 else 0.0
+    return lfilter([1.0 - keep], [1.0, -keep], responses, axis=1) if keep else responses
 
 
 def _responses(stamps_s: FloatArray, share: FloatArray, simulated: Simulated
