@@ -26,13 +26,11 @@ import math
 
 from pam_sim.annotations import FloatArray
 from pam_sim.gap.criteria import Criteria
-from pam_sim.gap.data.split import FIT, SELECT
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
 from pam_sim.gap.select.rival import NamedEffect
 from pam_sim.gap.verify.model import held_without
 from pam_sim.gap.verify.own_runs import OwnRuns
-from pam_sim.gap.verify.paired import PairedProof
 from pam_sim.gap.verify.validation import Validation
 
 
@@ -74,11 +72,6 @@ def refute(named: Iterable[NamedEffect], estimator: Estimator, base: Fit, final:
         best = max(told, key=lambda name: told[name][0] * told[name][1] ** 2)
         gone = {name for name in runs if name != best and _contradicted(
             validation, runs[name], runs[best], told[best][1], criteria)}
-        behind = _behind(w, best, estimator, fits[best], validation)
-        if set(behind) - gone:
-            proof = PairedProof(validation, estimator, fits[best], runs[best], whole)
-            gone |= {name for name, t in behind.items()
-                     if name not in gone and proof.contradicts(runs[name], t)}
         names = tuple(n for n in w.names if n not in gone)
         # The recordings hardly tell them apart: where the certify data do not find the first
         # again, but another, that one is likelier.
@@ -178,25 +171,6 @@ def _contradicted(validation: Validation, run: Mapping[str, FloatArray],
     # Were it true, the squares would rise by as much as the two are apart: a fall of -1.
     return (fell > criteria.greater_part and apart > max(criteria.visible_sd, form)
             and fell + 1.0 > criteria.certain_sd * validation.doubt(run, best))
-
-
-def _behind(w: NamedEffect, best: str, estimator: Estimator, found: Fit,
-            validation: Validation) -> dict[str, float]:
-    """
-    Return what stays in a set only because no formulation is exact, but the best one is.
-
-    The searched data leave it behind, by a small share of the gap: by how many deviations, by
-    name. The best leaves nothing of the gap, neither there nor on the certify data. So its
-    formulation is as good as the true one, which a wrong one would be by chance only.
-    """
-    criteria, s = estimator.criteria, w.subsystem
-    behind = {r.name: r.t[s] for r in w.rivals if r.name in w.names and r.name != best
-              and r.t.get(s, 0.0) >= criteria.ahead_t}
-    if not behind or best != w.name or validation.left() > criteria.visible_sd:
-        return {}
-    problem = next(p for p in estimator.problems if p.subsystem == s)
-    rest = max(problem.chi2(found.errors[s], part) for part in (FIT, SELECT))
-    return behind if rest <= 1.0 + criteria.seen_gap else {}
 
 
 def _comparable(w: NamedEffect, estimator: Estimator, final: Fit) -> dict[str, Fit]:

@@ -19,7 +19,7 @@ The given model, the same with its numbers calibrated, and the final one run on 
 recorded valve signal alone, or, where nobody recorded it, on the measured pressure.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 import math
 
@@ -101,8 +101,7 @@ class Validation:
         # It is the same sensor, and a recording without rest hides its slow noise.
         self._slow = {s: 0.0 if seen[s].slow_sd > 0.0 else self._slow_elsewhere(s) for s in seen}
         self.noise = {s: float(np.hypot(seen[s].sd, self._slow[s])) for s in seen}
-        self._drawn = final, whole, seed
-        self.drift = self._drift(*self._drawn)
+        self.drift = self._drift(final, whole, seed)
         # A valve that adds up its errors drifts: one run may be off by far more than the mean.
         self.floor, self.highest_floor = self._floors()
 
@@ -184,28 +183,16 @@ class Validation:
             apart += float(np.mean((first - last) ** 2)) / variance
         return (fell / apart, math.sqrt(apart)) if apart > 0.0 else (1.0, 0.0)
 
-    def doubt(self, worse: Mapping[str, FloatArray], better: Mapping[str, FloatArray],
-              drift: Sequence[Mapping[str, FloatArray]] | None = None) -> float:
-        """
-        Return the standard deviation of ``fall`` by stamps and the start of this recording.
-
-        Parameters
-        ----------
-        worse, better : dict of str -> numpy.ndarray
-            Free runs, as of ``fall``.
-        drift : sequence of dict of str -> numpy.ndarray, optional
-            By how much errors of the input move a run, draw by draw; ``drift`` by default.
-
-        """
+    def doubt(self, worse: Mapping[str, FloatArray], better: Mapping[str, FloatArray]) -> float:
+        """Return the standard deviation of ``fall`` by stamps and the start of this recording."""
         _, apart = self.fall(worse, better)
-        moved = [self.product(d, worse, better) for d in (self.drift if drift is None else drift)]
-        return float(np.sqrt(np.mean(np.square(moved)))) / apart ** 2 if apart > 0.0 else 0.0
-
-    def product(self, change: Mapping[str, FloatArray], worse: Mapping[str, FloatArray],
-                better: Mapping[str, FloatArray]) -> float:
-        """Return by how much a change of both runs moves the fall of the squared errors."""
-        return sum(2.0 * float(np.mean((change[s] * (worse[s] - better[s]))[self.part[s]]))
-                   / max(self.noise[s], 1e-12) ** 2 for s in self.recording.signals)
+        by_draw = np.zeros(len(self.drift))
+        for s in self.recording.signals:
+            chosen, variance = self.part[s], max(self.noise[s], 1e-12) ** 2
+            between = (worse[s] - better[s])[chosen]
+            by_draw += [2.0 * float(np.mean(d[s][chosen] * between)) / variance
+                        for d in self.drift]
+        return float(np.sqrt(np.mean(by_draw ** 2))) / apart ** 2 if apart > 0.0 else 0.0
 
     def finds_again(self) -> bool:
         """
@@ -260,12 +247,7 @@ class Validation:
         error = (simulated[signal] - self.recording.measured[signal])[self.part[signal]]
         return float(np.sqrt(np.mean(error ** 2)))
 
-    def drift_with(self, stamp_sd_s: float) -> list[dict[str, FloatArray]]:
-        """Return the same as ``drift`` where the stamps scatter by so much [s]."""
-        return self._drift(*self._drawn, stamp_sd_s)
-
-    def _drift(self, final: Fit, whole: bool, seed: int, stamp_sd_s: float = STAMP_SD_S
-               ) -> list[dict[str, FloatArray]]:
+    def _drift(self, final: Fit, whole: bool, seed: int) -> list[dict[str, FloatArray]]:
         """Return by signal, for some draws, how far errors of the input move the final run."""
         random, r = np.random.default_rng(seed), self.recording
         found: list[dict[str, FloatArray]] = []
@@ -277,7 +259,7 @@ class Validation:
                 moved = self.run(final, whole, pressure_noise_pa=drift_pa + noise.draw(
                     r.time_s['pressure'], random))
             else:
-                shift = r.stamp_sd_s(stamp_sd_s) * random.standard_normal(r.messages)
+                shift = r.stamp_sd_s(STAMP_SD_S) * random.standard_normal(r.messages)
                 moved = self.run(final, whole, shift, start_sd * random.standard_normal())
             self.simulations += 1
             found.append({s: moved[s] - self.after[s] for s in r.signals})
