@@ -85,6 +85,7 @@ class DriverEar:
     def __init__(self, node: 'ManagedNode') -> None:
         names = WriterNames(node)
         self._node = node
+        self._seen: dict[str, frozenset[bytes]] = {}        # publishers at the last look
         self.vented = False         # whether another node sent the safe signal at the last look
         self._on_graph = names.on_graph
         self._signals = node.add_subscription('valve_signal', plain=False, writers=True)
@@ -131,10 +132,14 @@ class DriverEar:
         Return how many publishers of a topic send or may yet, and their names as words.
 
         One that was heard before another one has ended or is the cause of a fault; the graph
-        keeps what was killed for up to 20 s.
+        keeps what was killed for up to 20 s. One that was not there at the last look may be about
+        to take over from such a one: beside others it counts from the next look on.
         """
         heard, found = self._senders.topics[topic], self._on_graph(full_topic)
-        names = [name for writer, name in found.items() if not heard.replaced(writer)]
+        there = [writer for writer in found if not heard.replaced(writer)]
+        before, self._seen[topic] = self._seen.get(topic, frozenset()), frozenset(found)
+        names = [found[writer] for writer in
+                 [one for one in there if one in before] or there]
         return len(names), told(names)
 
 
