@@ -28,6 +28,7 @@ from pam_sim.errors import did_you_mean, InputError
 from pam_sim.keys import Key, names_of
 from pam_sim.located_yaml import Located
 from pam_sim.parameters import Parameter
+from pam_sim.units import behind_number
 
 UNKNOWN = math.inf           # as a tolerance; the word in a file is WORD
 WORD = 'unknown'
@@ -158,5 +159,5 @@ def _width(parameter: Parameter) -> float:
 
 
 def _allowed(parameter: Parameter) -> str:
-    unit = '' if parameter.unit == '-' else f' {parameter.unit}'
-    return (f'0 to 1 (relative), {{sd: 0 to {_width(parameter):g}{unit}}} or `{WORD}`')
+    widest = f'{_width(parameter):g}{behind_number(parameter.unit)}'
+    return f'0 to 1 (relative), {{sd: 0 to {widest}}} or `{WORD}`'

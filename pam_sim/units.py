@@ -53,6 +53,11 @@ def unit_of(name: str) -> str:
     return next((unit for ending, unit in _UNIT_OF_ENDING if name.endswith(ending)), '1')
 
 
+def behind_number(unit: str) -> str:
+    """Return what is written behind a number: a space and its unit; '' for the unit ``-``."""
+    return '' if unit == '-' else f' {unit}'
+
+
 def allowed_range(lower: float, upper: float, unit: str = '', name: str = '') -> str:
     """
     Return a range in words, in the unit that is to be written: ``0.1 to 500 kg``.

@@ -160,6 +160,7 @@ def _explain(args: argparse.Namespace) -> int:
     from pam_sim import load_rig
     from pam_sim.catalogue import catalogue, find
     from pam_sim.gap.plan.look_alikes import look_alikes
+    from pam_sim.units import behind_number
     entry = find(catalogue(), args.explain)
     if args.run:
         run = load_run(args.run[0], namespace=args.namespace)
@@ -172,7 +173,7 @@ def _explain(args: argparse.Namespace) -> int:
     least = found['least']
     lines = [in_full(entry)]
     if least:
-        unit = '' if least['unit'] == '-' else f' {least["unit"]}'
+        unit = behind_number(least['unit'])
         lines.append(f'shows from {least["quantity"]} = {least["value"]:.3g}{unit} on '
                      '(one noise floor, rms, after calibration)')
     lines.append('looks like: ' + (', '.join(

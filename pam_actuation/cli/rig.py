@@ -241,11 +241,12 @@ def _numbers(rig: 'Rig') -> dict[str, Any]:
 
 
 def _numbers_text(rig: 'Rig') -> list[str]:
+    from pam_sim.units import behind_number
     lines = [f'  {p.name}: unknown, {p.allowed}' for p in rig.number_list
              if p.name in rig.unknown]
     return lines + [
-        f'  {p.name}: {rig.number(p.name):.6g} ± {_short(rig.prior_sd(p.name))} {p.unit}'
-        .removesuffix(' -') for p in _inexact(rig)]
+        f'  {p.name}: {rig.number(p.name):.6g} ± {_short(rig.prior_sd(p.name))}'
+        f'{behind_number(p.unit)}' for p in _inexact(rig)]
 
 
 def _short(sd: float) -> str:

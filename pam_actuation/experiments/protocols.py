@@ -40,7 +40,7 @@ from pam_sim.gap.plan.outlook import in_proportion, least_factors, Outlook, outl
 from pam_sim.gap.plan.sensitivity import Sensitivities
 from pam_sim.located_yaml import dump_yaml
 from pam_sim.rig import Rig
-from pam_sim.units import P_ATM_PA
+from pam_sim.units import behind_number, P_ATM_PA
 
 Segments = list[dict[str, dict[str, float]]]      # as an experiment file has them
 
@@ -309,4 +309,4 @@ def _shown(size: dict[str, Any] | None) -> str:
     values = size['equivalent'] or size['parameters']
     name, quantity = next((pair for pair in values.items() if pair[1]['value'] != 0.0),
                           next(iter(values.items())))
-    return f'{name} {quantity["value"]:.3g} {quantity["unit"]}'.removesuffix(' -')
+    return f'{name} {quantity["value"]:.3g}{behind_number(quantity["unit"])}'

@@ -16,14 +16,12 @@
 
 from typing import Any
 
-from pam_actuation.drivers.parameter import node_parameter
+from pam_actuation.drivers.parameter import node_parameter, unit_of
 from pam_actuation.hardware.iio import IioVoltage, SYSFS_ROOT
 from pam_actuation.hardware.sensor_input import SensorInput, TOPICS
 from pam_actuation.hardware.sysfs import DeviceError
 from pam_sim.parameters import Parameter
 
-# Units of the names of parameters, as people write them.
-_SHOWN = {'pa': 'Pa', 'n': 'N'}
 # Topic: name and unit in its parameters, what it is, default at 0 V and per volt.
 QUANTITIES = {
     'pressure': ('pressure', 'pa', 'absolute pressure of the muscle', 101_325.0, 100_000.0),
@@ -36,7 +34,7 @@ QUANTITIES = {
 
 def _parameters(name: str, unit: str, what: str, at_0_v: float,
                 per_v: float) -> tuple[Parameter, Parameter, Parameter]:
-    shown = _SHOWN.get(unit, unit)
+    shown = unit_of(f'{name}_{unit}')
     return (
         node_parameter(f'{name}.channel', -1, f'analog input of the {what}; -1: not connected',
                        -1, 255),

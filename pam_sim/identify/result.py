@@ -22,6 +22,7 @@ from pam_sim.identify.numbers import Number
 from pam_sim.identify.profile import Interval
 from pam_sim.rig import Rig
 from pam_sim.short_repr import short_repr
+from pam_sim.units import behind_number
 
 # For people: factor from SI and unit.
 READABLE = {'Pa': (1e-3, 'kPa'), 'Pa/V': (1e-3, 'kPa/V'), 'm': (1e3, 'mm'), 's': (1e3, 'ms'),
@@ -62,7 +63,7 @@ class Found:
     def shown(self) -> tuple[str, str]:
         """Return (value, 95 % interval) for people, with units."""
         factor, unit = READABLE.get(self.number.unit, (1.0, self.number.unit))
-        unit = '' if unit == '-' else f' {unit}'
+        unit = behind_number(unit)
         i = self.interval
         low, high = f'{factor * i.low:.4g}', f'{factor * i.high:.4g}'
         span = {(False, False): f'{low} to {high}{unit}', (True, False): f'up to {high}{unit}',
