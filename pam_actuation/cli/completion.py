@@ -65,7 +65,8 @@ def verbs_of(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentPars
 def _names_for(verb: str, argument: str) -> Names | None:
     """Return the function that lists the names of an argument, None for one without names."""
     if argument == 'valve':
-        return lambda: ['ppr', 'hsv']
+        from pam_sim.valve import VALVES
+        return lambda: list(VALVES)
     if argument in ('experiment', 'check') or (verb, argument) == ('experiments', 'name'):
         return lambda: configured('experiments')
     if argument in ('controller', 'changes', 'against') or (verb, argument) == ('rules', 'rules'):

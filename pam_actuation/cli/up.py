@@ -23,6 +23,7 @@ from pam_actuation.cli.options import count, number, out_path, Parser, source
 from pam_actuation.cli.viewed import add_view_option, viewed
 from pam_sim.errors import InputError
 from pam_sim.files import check_file
+from pam_sim.valve import VALVES
 
 if TYPE_CHECKING:
     from pam_actuation.rigging.node_spec import NodeSpec
@@ -37,7 +38,7 @@ def add_arguments(parser: Parser) -> None:
     """Declare the options of the verb."""
     parser.add_argument('what', choices=('rig', 'knee', 'exo'),
                         help='one muscle, a joint with two, two joints')
-    parser.add_argument('--valve', choices=('ppr', 'hsv'), default=None,
+    parser.add_argument('--valve', choices=VALVES, default=None,
                         help='valve type (default: that of the rig or joint)')
     parser.add_argument('--model', '--rig', dest='model', type=source, default=None,
                         metavar='NAME|FILE',
@@ -173,10 +174,9 @@ def _nodes(args: argparse.Namespace) -> 'list[NodeSpec]':
     """Return the nodes that are asked for."""
     from pam_actuation.namespaces import namespace_of
     from pam_actuation.rigging import layouts
-    from pam_actuation.rigging.plan import RECORDER
     options = {'valve': args.valve, 'controller': args.controller or '',
                'experiment': args.experiment or '', 'accept_other_rig': args.accept_other_rig,
-               'record': args.record or ''}
+               'record': args.record or '', 'overwrite': args.overwrite}
     if args.namespace is not None:
         options['namespace'] = namespace_of(args.namespace, '--namespace')
     if args.model:
@@ -185,13 +185,6 @@ def _nodes(args: argparse.Namespace) -> 'list[NodeSpec]':
     of_joint = args.what != 'rig' and args.hardware != layouts.SIMULATED
     if args.angle == layouts.BY_TOPIC and not of_joint:
         raise InputError('is for a joint on hardware only', '--angle')
-    nodes = (layouts.rig(**options) if args.what == 'rig'
-             else getattr(layouts, args.what)(**options, angle=args.angle))
-    return [_replacing(node) if args.overwrite and node.name == RECORDER else node
-            for node in nodes]
-
-
-def _replacing(recorder: 'NodeSpec') -> 'NodeSpec':
-    """Return a recorder that may replace the bag that is there."""
-    from dataclasses import replace
-    return replace(recorder, parameters={**recorder.parameters, 'overwrite': True})
+    if args.what == 'rig':
+        return layouts.rig(**options)
+    return getattr(layouts, args.what)(**options, angle=args.angle)

@@ -37,7 +37,7 @@ KNEES = ('left_knee', 'right_knee')
 
 def rig(namespace: str = '/muscle', rig: str = 'dmsp_5_300_realistic', valve: str = 'ppr',
         hardware: str = 'sim', controller: str = '', experiment: str = '', record: str = '',
-        accept_other_rig: bool = False) -> list[NodeSpec]:
+        accept_other_rig: bool = False, overwrite: bool = False) -> list[NodeSpec]:
     """
     Return the nodes of one muscle.
 
@@ -61,6 +61,8 @@ def rig(namespace: str = '/muscle', rig: str = 'dmsp_5_300_realistic', valve: st
         Folder of the bag; '': no recorder.
     accept_other_rig : bool
         Take a controller file that was made for another rig.
+    overwrite : bool
+        Let the recorder replace the bag that is there.
 
     Raises
     ------
@@ -91,16 +93,17 @@ def rig(namespace: str = '/muscle', rig: str = 'dmsp_5_300_realistic', valve: st
         return nodes
     return _recorded(nodes, namespace, {
         **described, **({'seed': 0} if hardware == SIMULATED else {}),
-        'output': record, 'experiment': experiment, 'controller': name})
+        'output': record, 'experiment': experiment, 'controller': name}, overwrite)
 
 
-def _recorded(nodes: list[NodeSpec], namespace: str,
-              parameters: Mapping[str, Any]) -> list[NodeSpec]:
+def _recorded(nodes: list[NodeSpec], namespace: str, parameters: Mapping[str, Any],
+              overwrite: bool) -> list[NodeSpec]:
     """Return nodes that wait for a recorder, and the recorder."""
     recorder = f'{namespace}/experiment_recorder'
     waiting = [replace(node, parameters={**node.parameters, 'await_subscriber': recorder})
                for node in nodes]
-    return [*waiting, NodeSpec('experiment_recorder', namespace, parameters)]
+    return [*waiting, NodeSpec('experiment_recorder', namespace, {
+        **parameters, **({'overwrite': True} if overwrite else {})})]
 
 
 def played(experiment: str, rig: str, valve: str, controller: str = '',
@@ -143,14 +146,15 @@ def played(experiment: str, rig: str, valve: str, controller: str = '',
 def knee(namespace: str = '/knee', joint: str = 'joint_dmsp_5_300_realistic', valve: str = 'ppr',
          controller: str = '', experiment: str = '', seed: int = 0,
          accept_other_rig: bool = False, record: str = '', hardware: str = SIMULATED,
-         angle: str = BY_SENSORS) -> list[NodeSpec]:
+         angle: str = BY_SENSORS, overwrite: bool = False) -> list[NodeSpec]:
     """
     Return the nodes of one joint; its name is the last part of the namespace.
 
     ``controller`` is a preset or file, '' for the preset of valve and joint, 'none' for no node.
-    ``record`` is the folder of the bag; '': no recorder. ``hardware`` is ``sim``, another name in
-    config/hardware, or a parameter file; ``angle`` tells of hardware whether the angle is read by
-    ``hardware_sensors`` ('sensors') or published by a program of your own ('topic').
+    ``record`` is the folder of the bag; '': no recorder. With ``overwrite`` it replaces the bag
+    that is there. ``hardware`` is ``sim``, another name in config/hardware, or a parameter file.
+    ``angle`` tells of hardware whether the angle is read by ``hardware_sensors`` ('sensors') or
+    published by a program of your own ('topic').
     """
     namespace = namespace_of(namespace)
     common = {'valve_type': valve, 'muscle': namespace.rsplit('/', 1)[-1] or 'knee'}
@@ -182,7 +186,7 @@ def knee(namespace: str = '/knee', joint: str = 'joint_dmsp_5_300_realistic', va
     return _recorded(nodes, namespace, {
         **common, **({'seed': seed} if simulated else {}),
         'rig': joint, 'output': record, 'experiment': experiment,
-        'controller': '' if controller == NO_CONTROLLER else controller})
+        'controller': '' if controller == NO_CONTROLLER else controller}, overwrite)
 
 
 def exo(namespace: str = '', record: str = '', **options: Any) -> list[NodeSpec]:
