@@ -31,7 +31,6 @@ from pam_sim.gap.data.recording import GRID_S, Recording
 from pam_sim.gap.result import Share
 from pam_sim.gap.subsystems.simulation import (
     FAST_GAIN_PA_PER_V, FAST_T_S, pressure_driven, run_from_pressure, simulate_driven)
-from pam_sim.load import LOADS
 from pam_sim.rig import Rig
 from pam_sim.units import P_ATM_PA
 
@@ -89,7 +88,7 @@ def locate(rig: Rig, recording: Recording, simulated: Mapping[str, FloatArray],
                 'muscle': muscle_share, 'load': 1.0 - muscle_share}
         else:
             parts = _split(residual, by_pressure[signal] - recording.measured[signal],
-                           floor[signal], muscle_share, rig.load)
+                           floor[signal], muscle_share)
         found += [Share(name, signal, 'all', share) for name, share in parts.items()]
         main = max(parts, key=lambda name: parts[name])
         for conditions in signal_conditions(recording, recording.time_s[signal])[:2]:
@@ -102,17 +101,15 @@ def _squared(residual: FloatArray, floor: float) -> float:
     return max(float(np.mean(residual ** 2)) - floor ** 2, 0.0)
 
 
-def _split(whole: FloatArray, without_valve: FloatArray, floor: float, muscle_share: float | None,
-           load: str) -> dict[str, float]:
+def _split(whole: FloatArray, without_valve: FloatArray, floor: float,
+           muscle_share: float | None) -> dict[str, float]:
     """Return the share of each subsystem in the gap of contraction or force."""
     rest = _squared(without_valve, floor)
     valve = _squared(whole - without_valve, 0.0)
     total = rest + valve
     if total <= 0.0:
         return {'valve': 1.0}
-    if not LOADS[load].MOVES_FREELY:
-        return {'valve': valve / total, 'muscle': rest / total}
-    if muscle_share is None:          # no load cell: muscle and load cannot be told apart
+    if muscle_share is None:          # no free load, or no cell that tells it from the muscle
         return {'valve': valve / total, 'muscle': rest / total}
     return {'valve': valve / total, 'muscle': rest / total * muscle_share,
             'load': rest / total * (1.0 - muscle_share)}
