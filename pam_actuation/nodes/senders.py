@@ -136,10 +136,10 @@ class DriverEar:
         to take over from such a one: beside others it counts from the next look on.
         """
         heard, found = self._senders.topics[topic], self._on_graph(full_topic)
-        there = [writer for writer in found if not heard.replaced(writer)]
+        there = {writer: name for writer, name in found.items() if not heard.replaced(writer)}
         before, self._seen[topic] = self._seen.get(topic, frozenset()), frozenset(found)
-        names = [found[writer] for writer in
-                 [one for one in there if one in before] or there]
+        stayed = [name for writer, name in there.items() if writer in before]
+        names = stayed or list(there.values())
         return len(names), told(names)
 
 

@@ -283,8 +283,7 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
         muscle_model.observe(par, inverse, path_rules, model, inp.contraction_m, measured)
         muscle_model.go(par, model.lead_path, way)
         path = (muscle_model.rules_pa(par, path_rules, model.lead_path, lead)
-                + muscle_model.numbers_pa(
-                    par, model, model.lead_path, lead, base))
+                + muscle_model.numbers_pa(par, model, model.lead_path, lead, base))
         damping = muscle_model.damping_pa_s_per_m(par, model, lead_rate)
         inertia = muscle_model.inertia_pa_s2_per_m(par, model, lead)
     dynamic = dynamics.dynamic_pressure_pa(
