@@ -59,7 +59,7 @@ class CountedPublisher:
                  profile: QoSProfile | None = None) -> None:
         self._publisher = node.create_publisher(
             message_type, topic, copy(profile or qos.PUBLISHER),      # overrides change it
-            qos_overriding_options=None if topic.startswith('/') else qos.overridable())
+            qos_overriding_options=qos.overridable())
         self._node = node
         self.topic = self._publisher.topic_name
         self.count = 0
@@ -134,13 +134,12 @@ class PolledSubscription:
                  profile: QoSProfile | None = None, raw: bool = False,
                  read: Callable[[bytes], Any] | None = None, writers: bool = False) -> None:
         self._node = node
-        may_override = not topic.startswith('/')
         self._subscription = node.create_subscription(
             message_type, topic, _unused, copy(profile or qos.CONSUMER),
             callback_group=_NeverExecuted(), raw=raw,
             event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
-            qos_overriding_options=qos.overridable() if may_override else None)
-        self.mismatches = Mismatches(node, self._subscription, may_override)
+            qos_overriding_options=qos.overridable())
+        self.mismatches = Mismatches(node, self._subscription)
         self._take: Callable[[], Any] = partial(
             self._subscription.handle.take_message, message_type, raw)
         if writers:

@@ -38,7 +38,7 @@ from pam_actuation.nodes.diagnostics import DiagnosticsReporter, ERROR, OK, Valu
 from pam_actuation.nodes.endpoints import CountedPublisher, PolledSubscription, wait_until_matched
 from pam_actuation.nodes.lockstep import TickInput, TickInputs
 from pam_actuation.nodes.loops import LoopSet, SteadyTime
-from pam_actuation.nodes.parameters import declare
+from pam_actuation.nodes.parameters import declare, unused_qos
 from pam_actuation.nodes.realtime import run_in_realtime
 from pam_actuation.nodes.ros_messages import class_of
 from pam_actuation.nodes.simulated_time import FollowedTime, leave_clock_to_node, PlantTime
@@ -402,6 +402,8 @@ class ManagedNode(LifecycleNode):
         self.setup()
         if self.FOLLOWS_CLOCK and self.uses_simulated_time:
             self.simulated_time = self.loops.time = self.make_simulated_time()
+        for sentence in unused_qos(self):
+            self.get_logger().warning(sentence)
         self.diagnostics.update(OK, 'configured, not active')
 
     def _activate(self) -> None:

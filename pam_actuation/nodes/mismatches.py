@@ -43,18 +43,15 @@ class Mismatches:
     node : rclpy.node.Node
         Node that subscribes.
     subscription : rclpy.subscription.Subscription
-        Its subscription.
-    may_override : bool
-        Whether the quality of service of the subscription can be set by parameters.
+        Its subscription, whose quality of service can be set by parameters.
 
     """
 
-    def __init__(self, node: Node, subscription: Any, may_override: bool) -> None:
+    def __init__(self, node: Node, subscription: Any) -> None:
         self._node = node
         self._subscription = subscription
         self._topic = subscription.topic_name
         self._profile = subscription.qos_profile
-        self._may_override = may_override
         self._counted = 0
         self._since_s: float | None = None      # the last event, while it may concern anybody
 
@@ -99,7 +96,6 @@ class Mismatches:
         if (end.qos_profile.reliability != ReliabilityPolicy.BEST_EFFORT
                 or self._profile.reliability != ReliabilityPolicy.RELIABLE):
             return f'{who} cannot be received on {self._topic}: {reason.strip(" ;")}'
-        here = (f', or start this node with -p qos_overrides.{self._topic}.subscription.'
-                'reliability:=best_effort' if self._may_override else '')
         return (f'{who} sends {self._topic} best effort, which is not received here; let it '
-                f'publish reliable{here}')
+                f'publish reliable, or start this node with -p qos_overrides.{self._topic}.'
+                'subscription.reliability:=best_effort')

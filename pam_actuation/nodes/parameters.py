@@ -33,6 +33,10 @@ from rclpy.exceptions import InvalidParameterTypeException
 from rclpy.exceptions import InvalidParameterValueException
 from rclpy.node import Node
 
+QOS = 'qos_overrides.'
+# Of these ROS declares the parameters itself, late or never.
+TOPICS_OF_ROS = ('/clock', '/parameter_events', '/rosout')
+
 
 def allowed(parameter: Parameter) -> str:
     """Return what is allowed, for people: ``0.1 to 5.0``, ``ppr or hsv``, or the type."""
@@ -80,7 +84,7 @@ def _check_overrides(node: Node, table: Mapping[str, Parameter]) -> None:
                 continue                      # `-p rate:=200` is meant as 200.0
             if wrong := problem(table[name], value):
                 raise InputError(wrong, f'parameter {name}')
-        elif name != 'use_sim_time' and not name.startswith('qos_overrides.'):
+        elif name != 'use_sim_time' and not name.startswith(QOS):
             hint = did_you_mean(name, table, '', '; did you mean {}?')
             node.get_logger().warning(f'parameter {name} is not known here, ignored{hint}')
 
@@ -135,3 +139,17 @@ def declare(node: Node, parameters: Iterable[Parameter], live: Collection[str] =
         return SetParametersResult(successful=True)
 
     node.add_on_set_parameters_callback(check)
+
+
+def unused_qos(node: Node) -> list[str]:
+    """
+    Return a sentence on each given quality of service that no topic of the node takes.
+
+    ROS drops such a parameter without a word. To be asked when the topics are there.
+    """
+    known = [f'{QOS}{name}' for name in node.get_parameters_by_prefix(QOS.rstrip('.'))]
+    return [f'parameter {name} is not known here, ignored'
+            + did_you_mean(name, known, '', '; did you mean {}?')
+            for name in node._parameter_overrides
+            if name.startswith(QOS) and name not in known
+            and not name.startswith(tuple(f'{QOS}{topic}.' for topic in TOPICS_OF_ROS))]

@@ -47,6 +47,7 @@ PUBLISHER = profile(quality.USUAL.publisher)
 CONSUMER = profile(quality.USUAL.consumer)
 RECORDER = profile(quality.USUAL.recorder)
 LATCHED = profile(quality.LATCHED)
+CLOCK = profile(quality.CLOCK)
 
 
 def overridable() -> QoSOverridingOptions:

@@ -82,7 +82,8 @@ class FollowedTime:
         self.end()
         self._pending_ns = None
         self._inputs.begin()
-        self._subscription = PolledSubscription(self._node, Clock, CLOCK_TOPIC, qos.CONSUMER)
+        self._subscription = PolledSubscription(
+            self._node, Clock, CLOCK_TOPIC, qos.CONSUMER if self._inputs else qos.CLOCK)
 
     def end(self) -> None:
         """Leave the clock."""

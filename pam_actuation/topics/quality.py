@@ -50,5 +50,8 @@ class Service:
 USUAL = Service(Quality(1000), Quality(1000), Quality(5000))
 # The live page only looks on: nothing is sent to it again, so no publisher ever waits for it.
 ONLOOKER = Quality(1000, reliability='best_effort')
+# Of a clock that somebody else makes: Gazebo and `ros2 bag play` offer it best effort, as ROS has
+# it for this topic. Only the newest counts; lockstep, which needs each, has the plant's own.
+CLOCK = Quality(1000, reliability='best_effort')
 # What is said once, such as a robot description: who comes later hears it too.
 LATCHED = Quality(1, durability='transient_local')

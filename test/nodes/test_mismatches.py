@@ -15,6 +15,7 @@
 """A publisher that a subscription cannot receive is named, with the line that helps."""
 
 import time
+from types import SimpleNamespace
 
 import pytest
 
@@ -23,17 +24,22 @@ pytest.importorskip('rclpy')
 from live_rig import wait_for                                               # noqa: E402, I100
 from pam_actuation.nodes import qos                                         # noqa: E402
 from pam_actuation.nodes.endpoints import PolledSubscription                # noqa: E402
+from pam_actuation.nodes.lockstep import TickInputs                         # noqa: E402
+from pam_actuation.nodes.parameters import unused_qos                       # noqa: E402
+from pam_actuation.nodes.simulated_time import FollowedTime                 # noqa: E402
 from pam_actuation.rigging.client import local_context                      # noqa: E402
 from pam_actuation.rigging.domain import DomainLock                         # noqa: E402
 import rclpy                                                                # noqa: E402
 from rclpy.node import Node                                                 # noqa: E402
 from rclpy.parameter import Parameter                                       # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy       # noqa: E402
+from rosgraph_msgs.msg import Clock                                         # noqa: E402
 from sensor_msgs.msg import FluidPressure                                   # noqa: E402
 
 pytestmark = [pytest.mark.ros, pytest.mark.shared]
 
 BEST_EFFORT = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
+WILLING = '/muscle/willing', '/lab/imu'      # in the namespace of the node, and elsewhere
 LINE = 'qos_overrides./muscle/pressure.subscription.reliability'
 
 
@@ -43,7 +49,8 @@ def nodes():
     lock = DomainLock()
     contexts = [local_context(lock.domain_id) for _ in range(2)]
     listener = Node('listener', namespace='/muscle', context=contexts[0], parameter_overrides=[
-        Parameter(LINE.replace('/pressure', '/willing'), value='best_effort')])
+        Parameter(LINE.replace('/muscle/pressure', topic), value='best_effort')
+        for topic in WILLING])
     sensor = Node('sensor', namespace='/lab', context=contexts[1])
     yield listener, sensor
     for node, context in zip((listener, sensor), contexts):
@@ -73,10 +80,11 @@ def test_a_best_effort_sensor_is_named_as_long_as_it_is_there(nodes):
     subscription.destroy()
 
 
-def test_the_line_of_the_sentence_helps(nodes):
+@pytest.mark.parametrize('topic', WILLING)
+def test_the_line_of_the_sentence_helps(nodes, topic):
     listener, sensor = nodes
-    subscription = PolledSubscription(listener, FluidPressure, 'willing')
-    publisher = sensor.create_publisher(FluidPressure, '/muscle/willing', BEST_EFFORT)
+    subscription = PolledSubscription(listener, FluidPressure, topic.removeprefix('/muscle/'))
+    publisher = sensor.create_publisher(FluidPressure, topic, BEST_EFFORT)
     wait_for(lambda: subscription.publishers == 1, 10.0, 'the publisher')
     publisher.publish(FluidPressure(fluid_pressure=2e5))
     wait_for(lambda: [message.fluid_pressure for message, _ in subscription.take()] == [2e5],
@@ -86,6 +94,41 @@ def test_the_line_of_the_sentence_helps(nodes):
     subscription.destroy()
     # It changed this topic alone.
     assert qos.CONSUMER.reliability == qos.PUBLISHER.reliability == ReliabilityPolicy.RELIABLE
+
+
+def test_a_line_that_no_topic_takes_is_told(nodes):
+    listener, _ = nodes
+    subscription = PolledSubscription(listener, FluidPressure, 'pressure')
+    wrong = [f'qos_overrides.{name}' for name in (
+        '/muscle/presure.subscription.depth', '/muscle/pressure.subscription.durability',
+        '/clock.subscription.depth')]
+    given = {name: Parameter(name, value=1) for name in (LINE, *wrong)}
+    asked = SimpleNamespace(
+        _parameter_overrides=given, get_parameters_by_prefix=listener.get_parameters_by_prefix)
+    first, second = unused_qos(asked)
+    assert first == (f'parameter {wrong[0]} is not known here, ignored; did you mean '
+                     'qos_overrides./muscle/pressure.subscription.depth?')
+    assert second.startswith(f'parameter {wrong[1]} is not known here, ignored')
+    subscription.destroy()
+
+
+def test_a_clock_that_is_offered_best_effort_is_followed(nodes):
+    """As ``ros2 bag play --clock`` and Gazebo offer it."""
+    listener, player = nodes
+    followed = FollowedTime(listener, TickInputs(list, False, print))
+    followed.begin()
+    clock = player.create_publisher(Clock, '/clock', BEST_EFFORT)
+    message = Clock()
+    message.clock.sec = 42
+
+    def arrived():
+        clock.publish(message)
+        followed.wait_until(0)
+        return followed.now_ns() == 42_000_000_000
+
+    wait_for(arrived, 10.0, 'the time of the clock')
+    followed.close()
+    player.destroy_publisher(clock)
 
 
 def test_another_mismatch_is_told_by_its_reason(nodes):
