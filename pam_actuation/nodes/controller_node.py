@@ -23,12 +23,12 @@ from pam_actuation.nodes import lockstep
 from pam_actuation.nodes.diagnostics import OK, Values, WARN
 from pam_actuation.nodes.lockstep import TickInput
 from pam_actuation.nodes.managed import ManagedNode
+from pam_actuation.nodes.parameters import valve_of_rig
 from pam_actuation.nodes.refusals import RefusalLog
 from pam_actuation.nodes.senders import SensorEar
 from pam_sim.errors import InputError
 from pam_sim.parameters import Parameter
 from pam_sim.units import P_ATM_PA
-from pam_sim.valve import VALVES
 
 if TYPE_CHECKING:
     from pam_actuation.control.loop import ControllerLoop
@@ -57,7 +57,7 @@ class ControllerNode(ManagedNode):
             'preset that fits the valve.'),
         node_parameter(
             'rig', 'dmsp_5_300_realistic', 'Rig the controller is made for: preset or path.'),
-        node_parameter('valve_type', 'ppr', 'Valve of the rig.', choices=VALVES),
+        valve_of_rig('Valve of the rig. Empty: that of its preset or file.'),
         ACCEPT_OTHER_RIG,
     )
 
@@ -69,7 +69,7 @@ class ControllerNode(ManagedNode):
     def load_rig(self) -> 'Rig | JointRig':
         """Return the rig that the controller is made for."""
         from pam_sim import load_rig
-        return load_rig(self.value('rig'), valve=self.value('valve_type'))
+        return load_rig(self.value('rig'), valve=self.value('valve_type') or None)
 
     def preset_for(self, rig: Any) -> str:
         """Return the name of the controller preset that fits a rig."""

@@ -28,6 +28,7 @@ from typing import Any, Self
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.rigging.client import local_context
 from pam_actuation.rigging.domain import DomainLock
+from pam_actuation.topics.table import topic_of
 from pam_sim.parameters import Parameter
 import rclpy
 from rclpy import parameter as ros
@@ -51,6 +52,8 @@ VARIANTS: dict[str, tuple[dict[str, Any], ...]] = {
     'joint_simulator': ({'valve_type': 'hsv'},),
     'joint_controller': (), 'joint_trajectory_server': ()}
 NEEDED: dict[str, dict[str, Any]] = {'hardware_sensors': {'backend': 'dummy'}}
+# Node to the topics it sends only where a device is wired to it, each with the parameter.
+WIRED = {'hardware_sensors': {'supply_pressure': 'supply_pressure.channel:=1'}}
 
 
 @dataclass(frozen=True)
@@ -143,6 +146,8 @@ class Inspector:
                 for key, type_name in getattr(variant, kind).items():
                     if key not in known:
                         known[key], notes[key] = type_name, words
+        for topic, words in WIRED.get(name, {}).items():
+            whole['publishes'][topic], notes[topic] = topic_of(topic).type_name, words
         return replace(base, **whole), notes
 
 

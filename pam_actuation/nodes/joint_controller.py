@@ -24,8 +24,8 @@ from pam_actuation.nodes.controller_node import ACCEPT_OTHER_RIG
 from pam_actuation.nodes.controller_node import ControllerNode
 from pam_actuation.nodes.diagnostics import Values
 from pam_actuation.nodes.learning_switch import LearningSwitch
+from pam_actuation.nodes.parameters import valve_of_rig
 from pam_actuation.nodes.runner import run
-from pam_sim.valve import VALVES
 from std_msgs.msg import String
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ class JointNode(LearningSwitch, ControllerNode):
             'that fits the valve and the size of the joint.'),
         node_parameter('joint', 'joint_dmsp_5_300_realistic',
                        'Joint the controller is made for: preset or path.'),
-        node_parameter('valve_type', 'ppr', 'Valves of the joint.', choices=VALVES),
+        valve_of_rig('Valves of the joint. Empty: those of its preset or file.'),
         ACCEPT_OTHER_RIG,
         node_parameter('learning', True, 'Whether the rules change while running.'),
     )
@@ -59,12 +59,12 @@ class JointNode(LearningSwitch, ControllerNode):
     def load_rig(self) -> 'JointRig':
         """Return the joint that the controller is made for."""
         from pam_sim.joint import load_joint
-        return load_joint(self.value('joint'), valve=self.value('valve_type'))
+        return load_joint(self.value('joint'), valve=self.value('valve_type') or None)
 
     def preset_for(self, rig: 'JointRig') -> str:
         """Return the name of the controller preset that fits a joint."""
         from pam_actuation.control.modes.files import joint_preset_for
-        return joint_preset_for(rig, self.value('valve_type'))
+        return joint_preset_for(rig, rig.valve)
 
     def setup(self) -> None:
         """Load the controller, create the topics, describe the joint."""

@@ -18,9 +18,9 @@ from collections.abc import Sequence
 import sys
 
 from pam_actuation.drivers.parameter import node_parameter
+from pam_actuation.nodes.parameters import valve_of_rig
 from pam_actuation.nodes.physics_node import MAX_SEED, PhysicsNode
 from pam_actuation.nodes.runner import run
-from pam_sim.valve import VALVES
 
 
 class JointSimulator(PhysicsNode):
@@ -36,7 +36,7 @@ class JointSimulator(PhysicsNode):
     PARAMETERS = (
         node_parameter(
             'joint', 'joint_dmsp_5_300_realistic', 'Joint preset, or path of its file.'),
-        node_parameter('valve_type', 'ppr', 'Valves of both muscles.', choices=VALVES),
+        valve_of_rig('Valves of both muscles. Empty: those of the joint\'s preset or file.'),
         node_parameter('seed', 0, 'Seed of noise and stamp jitter.', 0, MAX_SEED - 1),
         node_parameter(
             'publish_rate_hz', 250.0, 'Rate of the measurements [Hz].', 200.0, 1000.0),
@@ -45,7 +45,7 @@ class JointSimulator(PhysicsNode):
     def setup(self) -> None:
         """Load the joint, create the topics."""
         from pam_sim.joint import load_joint
-        self.set_up(load_joint(self.value('joint'), valve=self.value('valve_type')))
+        self.set_up(load_joint(self.value('joint'), valve=self.value('valve_type') or None))
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -22,8 +22,10 @@ turns a wrong value, at start or live, into one sentence.
 from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
+from pam_actuation.drivers.parameter import node_parameter
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.parameters import Parameter
+from pam_sim.valve import VALVES
 from rcl_interfaces.msg import FloatingPointRange
 from rcl_interfaces.msg import IntegerRange
 from rcl_interfaces.msg import ParameterDescriptor
@@ -38,10 +40,15 @@ QOS = 'qos_overrides.'
 TOPICS_OF_ROS = ('/clock', '/parameter_events', '/rosout')
 
 
+def valve_of_rig(description: str) -> Parameter:
+    """Return the parameter ``valve_type`` of a node that loads a rig, which has a valve itself."""
+    return node_parameter('valve_type', '', description, choices=(*VALVES, ''))
+
+
 def allowed(parameter: Parameter) -> str:
     """Return what is allowed, for people: ``0.1 to 5.0``, ``ppr or hsv``, or the type."""
     if parameter.choices:
-        return ' or '.join(parameter.choices)
+        return ' or '.join(choice or 'empty' for choice in parameter.choices)
     if parameter.bounded:
         return f'{parameter.lower:g} to {parameter.upper:g}'
     return type(parameter.default).__name__

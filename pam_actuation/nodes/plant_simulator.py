@@ -23,12 +23,12 @@ from pam_actuation.nodes import lockstep
 from pam_actuation.nodes.diagnostics import Values
 from pam_actuation.nodes.endpoints import full_name
 from pam_actuation.nodes.lockstep import TickInput
+from pam_actuation.nodes.parameters import valve_of_rig
 from pam_actuation.nodes.physics_node import MAX_SEED, PhysicsNode
 from pam_actuation.nodes.runner import run
 from pam_actuation.nodes.simulated_time import CLOCK_TOPIC
 from pam_actuation.nodes.simulated_time import PlantTime
 from pam_sim.errors import InputError
-from pam_sim.valve import VALVES
 from std_srvs.srv import SetBool
 from std_srvs.srv import Trigger
 
@@ -49,7 +49,7 @@ class PlantSimulator(PhysicsNode):
     REALTIME_RANK = 2
     PARAMETERS = (
         node_parameter('rig', 'dmsp_5_300_realistic', 'Rig preset, or path of a model file.'),
-        node_parameter('valve_type', 'ppr', 'Valve of the rig.', choices=VALVES),
+        valve_of_rig('Valve of the rig. Empty: that of its preset or file.'),
         node_parameter('seed', 0, 'Seed of noise and stamp jitter.', 0, MAX_SEED),
         node_parameter(
             'publish_rate_hz', 250.0, 'Rate of the measurements [Hz].', 100.0, 1000.0),
@@ -77,7 +77,7 @@ class PlantSimulator(PhysicsNode):
     def loaded_rig(self) -> 'Rig':
         """Return the rig to be simulated; what moves is its ``plant``."""
         from pam_sim import load_rig
-        return load_rig(self.value('rig'), valve=self.value('valve_type'))
+        return load_rig(self.value('rig'), valve=self.value('valve_type') or None)
 
     def teardown(self) -> None:
         """Take the services back."""

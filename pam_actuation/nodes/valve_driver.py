@@ -32,13 +32,13 @@ from pam_actuation.nodes.endpoints import PolledSubscription
 from pam_actuation.nodes.lockstep import TickInput
 from pam_actuation.nodes.managed import DEACTIVATED
 from pam_actuation.nodes.managed import ManagedNode
+from pam_actuation.nodes.parameters import valve_of_rig
 from pam_actuation.nodes.runner import run
 from pam_actuation.nodes.senders import ANSWER_PERIOD_S
 from pam_actuation.nodes.senders import DriverEar
 from pam_actuation.nodes.senders import IDLE_PERIOD_S
 from pam_actuation.nodes.timing import Latency
 from pam_sim.errors import InputError
-from pam_sim.valve import VALVES
 from std_srvs.srv import Trigger
 
 COMMAND_POLL_S = 0.001      # PPR: how soon a command is passed on
@@ -59,9 +59,9 @@ class ValveDriver(ManagedNode):
     NAME = 'valve_driver'
     REALTIME_RANK = 3
     PARAMETERS = (
-        node_parameter(
-            'valve_type', 'ppr', 'Kind of valve: proportional pressure regulator or a pair of '
-            'high-speed valves.', choices=VALVES),
+        valve_of_rig(
+            'Kind of valve: proportional pressure regulator or a pair of high-speed valves. '
+            'Empty: that of the rig, without a rig a regulator.'),
         node_parameter(
             'rig', '', 'Rig preset or model file, or JOINT/flexor and JOINT/extensor, that tells '
             'the driver valves, volume and load; numbers given beside it win. Empty: the '
@@ -113,11 +113,11 @@ class ValveDriver(ManagedNode):
     def setup(self) -> None:
         """Build the driver, its topics and services."""
         from pam_actuation.drivers.loop import DriverLoop
-        config = self._config()
-        _warm_up(DriverLoop(self.value('valve_type'), config))
-        loop = DriverLoop(self.value('valve_type'), config)
+        valve, config = self._valve_and_config()
+        _warm_up(DriverLoop(valve, config))
+        loop = DriverLoop(valve, config)
         self.output = open_valve(
-            self.value('backend'), self.value('valve_type'),
+            self.value('backend'), valve,
             {p.name: self.value(p.name) for p in parameters_of(VALVE_OUTPUTS)}, config,
             loop.safe_signal(0).efforts, self.value('device_watchdog_s'))
         if self._stopped is not None:
@@ -141,26 +141,26 @@ class ValveDriver(ManagedNode):
             self.create_service(Trigger, '~/reset', self._on_reset),
         ]
 
-    def _config(self) -> DriverConfig:
-        """Return the driver's numbers: those given, else the rig's, else the defaults."""
+    def _valve_and_config(self) -> tuple[str, DriverConfig]:
+        """Return valve and numbers: those given, else the rig's, else the defaults."""
         from pam_actuation.drivers.asked import asked_by
         asked = asked_by(self.value('controller')) if self.value('controller') else {}
         if not self.value('rig'):
             usual = {p.name: self.value(p.name) for p in DRIVER_PARAMETERS}
-            return DriverConfig.from_parameters(usual | {
+            return self.value('valve_type') or 'ppr', DriverConfig.from_parameters(usual | {
                 name: value for name, value in asked.items()
                 if name not in self._parameter_overrides})
         from pam_actuation.drivers.for_rig import driver_config
         from pam_sim.joint import load_rig_or_side
         given = asked | {p.name: self.value(p.name) for p in DRIVER_PARAMETERS
                          if p.name in self._parameter_overrides}
-        config = driver_config(
-            load_rig_or_side(self.value('rig'), valve=self.value('valve_type')), given)
+        rig = load_rig_or_side(self.value('rig'), valve=self.value('valve_type') or None)
+        config = driver_config(rig, given)
         told = {name: value for name, value in config.as_parameters().items()
                 if value != self.value(name)}
         self.get_logger().info(f'numbers told by rig {self.value("rig")}: ' + (
             ', '.join(f'{name} {value:g}' for name, value in told.items()) or 'the defaults'))
-        return config
+        return rig.valve, config
 
     def teardown(self) -> None:
         """Take the services back."""

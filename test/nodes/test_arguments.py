@@ -93,7 +93,7 @@ def test_help_shows_default_unit_and_range():
     text = help_text('valve_driver', 99)
     assert '  resume_rate_pa_per_s  (default 500000.0 Pa/s, allowed: 1000 to 1e+09)\n' in text
     assert '  command_timeout_s  (default 0.1 s, allowed: 0.01 to 10)\n' in text
-    assert "  valve_type  (default 'ppr', allowed: ppr or hsv)\n" in text
+    assert "  valve_type  (default '', allowed: ppr or hsv or empty)\n" in text
     assert 'may change while it runs' in help_text('sofc_controller', 99)
 
 

@@ -71,10 +71,8 @@ def test_nodes_speak_and_listen_as_the_table_of_topics_says():
     for topic in (one for one in table.TOPICS if one.place != table.ROOT):
         for nodes, known in zip((topic.published_by, topic.consumed_by), offered.values()):
             there = {name for name in known if topic.name in known[name]}
-            # Where such a sensor is connected: the dummy has none.
-            unseen = {'hardware_sensors'} if topic.name == 'supply_pressure' else set()
             # The live page has no executable.
-            assert there == set(nodes) - unseen - {table.ONLOOKER}, topic.name
+            assert there == set(nodes) - {table.ONLOOKER}, topic.name
             assert {known[name][topic.name] for name in there} <= {topic.type_name}
 
 
@@ -108,6 +106,19 @@ def test_the_policy_gives_the_nodes_what_they_need_and_no_more(name):
         else:
             assert len(who) == 1, topic
     assert not any(topic.endswith('/clock') for topic in publishers)
+
+
+@pytest.mark.parametrize(('name', 'parameters', 'kind', 'topic'), [
+    ('plant_simulator', {}, 'publishes', 'supply_pressure'),
+    ('valve_driver', {'hsv.correct_by_contraction': 0.8}, 'subscribes', 'contraction')])
+def test_a_node_takes_the_valve_of_its_rig_file(tmp_path, name, parameters, kind, topic):
+    file = tmp_path / 'lab.yaml'
+    file.write_text('rig: dmsp_5_300_hanging_mass\nvalve: hsv\n')
+    with Inspector() as inspector:
+        of_rig, of_parameter = (getattr(inspector.interface(
+            name, {**parameters, 'rig': str(file), **given}), kind)
+            for given in ({}, {'valve_type': 'ppr'}))
+    assert topic in of_rig and topic not in of_parameter
 
 
 def test_a_node_that_cannot_be_configured_says_why():
