@@ -43,6 +43,7 @@ from pam_sim.short_repr import short_repr
 
 UNITS = {'ppr_voltage': 'V', 'fill_duty': '1', 'vent_duty': '1'}
 COMMANDS = ('pressure_command', 'valve_command')
+NO_PRESSURE = 'the bag has no pressure, without which a driver first vents and rises otherwise'
 
 
 @short_repr
@@ -80,7 +81,8 @@ class DriverReplay:
 
     def lines(self) -> list[str]:
         """Return the outcome for people."""
-        return [f'driver: {len(self.stamp_ns)} ticks on the recorded commands and pressures'
+        inputs = 'commands' if NO_PRESSURE in self.note else 'commands and pressures'
+        return [f'driver: {len(self.stamp_ns)} ticks on the recorded {inputs}'
                 + (f' ({self.note})' if self.note else ''),
                 *(one.line() for one in self.differences)]
 
@@ -114,6 +116,8 @@ def replay_driver(run: Run) -> DriverReplay:
     recorded = recorded_topics(run, (*takes, 'valve_signal'), ticks=('valve_signal',))
     if not any(len(recorded.get(topic, ())) for topic in COMMANDS):
         run.require('pressure_command')
+    if not len(recorded.get('pressure', ())):
+        note = '; '.join(filter(None, (note, NO_PRESSURE)))
     stamps: array[int] = array('q')
     told: dict[str, array[float]] = {}
     sent: dict[str, array[float]] = {}

@@ -180,6 +180,22 @@ def test_clocks_that_disagree_are_noted_beside_other_parts_and_refused_alone(
             replay_run(run, **options)
 
 
+def test_a_driver_without_a_recorded_pressure_is_told(runs, monkeypatch):
+    run = runs['pid_ppr']
+    whole = replay_run(run, only='driver').driver
+
+    def without(path, **options):
+        bag = read_bag(path, **options)
+        bag.topics = {name: topic for name, topic in bag.topics.items()
+                      if not name.endswith('/pressure')}
+        return bag
+
+    monkeypatch.setattr('pam_actuation.replay.arrivals.read_bag', without)
+    bare = replay_run(run, only='driver').driver
+    assert 'recorded commands and pressures' in whole.lines()[0] and not whole.note
+    assert 'recorded commands (the bag has no pressure' in bare.lines()[0]
+
+
 def test_what_cannot_be_replayed_is_said_in_a_sentence(runs):
     run = runs['pid_ppr']
     bare = Run(run.topics, {}, run.namespace, run.path)
