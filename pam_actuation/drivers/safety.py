@@ -46,6 +46,7 @@ _WARNING_HOLD_NS = _NS       # a warning stays in the message for 1 s after its 
 _LATE_TICK_NS = 50_000_000   # after a tick this late, queued messages get one chance to arrive
 _GRACE_NS = 20_000_000
 _QUEUE = 256
+_TO_GO_ON = '; call the service reset to go on'      # said of what is latched
 
 Fault = tuple[str, str]      # key in ``FAULTS``, sentence
 
@@ -195,7 +196,7 @@ class SafetySupervisor:
         if math.isfinite(measured) and measured - P_ATM_PA > limit:
             return False, (f'Not reset: the measured pressure of {gauge_kpa(measured):.0f} kPa '
                            f'gauge is above the limit of {limit * 1e-3:.0f} kPa.')
-        text = self._latched[1]
+        text = self._latched[1].removesuffix(_TO_GO_ON)
         self._latched = None
         self._seen_command = False
         self.command_stamp_ns = None
@@ -275,7 +276,7 @@ class SafetySupervisor:
                 f'trip at {trip * 1e-3:.0f} kPa'))
 
     def _latch(self, key: str, text: str) -> Fault:
-        latched = self._latched = (key, text + '; call the service reset to go on')
+        latched = self._latched = (key, f'{text}{_TO_GO_ON}')
         return latched
 
     def _take_command(self, stamp_ns: int, value: float, sequence: int | None, is_duty: bool,
