@@ -36,7 +36,7 @@ class JointSimulator(PhysicsNode):
     PARAMETERS = (
         node_parameter(
             'joint', 'joint_dmsp_5_300_realistic', 'Joint preset, or path of its file.'),
-        valve_of_rig('Valves of both muscles. Empty: those of the joint\'s preset or file.'),
+        valve_of_rig('Valves of both muscles. Empty: those of the preset or file of the joint.'),
         node_parameter('seed', 0, 'Seed of noise and stamp jitter.', 0, MAX_SEED - 1),
         node_parameter(
             'publish_rate_hz', 250.0, 'Rate of the measurements [Hz].', 200.0, 1000.0),

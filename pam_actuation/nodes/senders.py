@@ -79,10 +79,12 @@ class DriverEar:
     ----------
     node : ManagedNode
         The driver, with its publisher of ``valve_signal``.
+    watchdog : str
+        Full name of its watchdog.
 
     """
 
-    def __init__(self, node: 'ManagedNode') -> None:
+    def __init__(self, node: 'ManagedNode', watchdog: str) -> None:
         names = WriterNames(node)
         self._node = node
         self._seen: dict[str, frozenset[bytes]] = {}        # publishers at the last look
@@ -93,7 +95,7 @@ class DriverEar:
         self._name_of = names
         own = gid_of(dict(node.topics_sent())['valve_signal'].rclpy_publisher)
         self._senders = DriverSenders(
-            own, full_name(node.get_namespace(), WATCHDOG),
+            own, watchdog,
             lambda topic, writer: names(node.resolve_topic_name(topic), writer),
             node.get_fully_qualified_name())
 

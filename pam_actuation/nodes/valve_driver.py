@@ -26,6 +26,7 @@ from pam_actuation.hardware.back_ends import VALVE_OUTPUTS
 from pam_actuation.hardware.valve_output import TRIES
 from pam_actuation.messages import Pressure
 from pam_actuation.messages import ValveSignal
+from pam_actuation.namespaces import node_name_of
 from pam_actuation.nodes import lockstep
 from pam_actuation.nodes.diagnostics import ERROR, Values
 from pam_actuation.nodes.endpoints import PolledSubscription
@@ -37,6 +38,7 @@ from pam_actuation.nodes.runner import run
 from pam_actuation.nodes.senders import ANSWER_PERIOD_S
 from pam_actuation.nodes.senders import DriverEar
 from pam_actuation.nodes.senders import IDLE_PERIOD_S
+from pam_actuation.nodes.senders import WATCHDOG
 from pam_actuation.nodes.timing import Latency
 from pam_sim.errors import InputError
 from std_srvs.srv import Trigger
@@ -78,6 +80,9 @@ class ValveDriver(ManagedNode):
         node_parameter(
             'device_watchdog_s', 0.1, 'Silence of the driver, killed or stopped, from which a '
             'process of its own vents the device of the back end [s]; 0: none does.', 0.0, 1.0),
+        node_parameter(
+            'watchdog', WATCHDOG, 'Name of the node whose safe signals do not count as those of a '
+            'second sender. Without a slash: in the namespace of this node.'),
         *DRIVER_PARAMETERS,
         *parameters_of(VALVE_OUTPUTS),
     )
@@ -94,6 +99,8 @@ class ValveDriver(ManagedNode):
         """Refuse to drive a device on a time that may stand still, or to vent between signals."""
         if self.uses_simulated_time and self.value('backend') not in ('sim', 'dummy'):
             raise InputError('a real valve is not driven in simulated time', 'use_sim_time')
+        self._watchdog = node_name_of(
+            self.value('watchdog'), self.get_namespace().rstrip('/'), 'parameter watchdog')
         if 0.0 < self.value('device_watchdog_s') < SHORTEST_SILENCE_S:
             raise InputError(
                 f'{self.value("device_watchdog_s"):g} s is shorter than a few signals take, '
@@ -131,7 +138,7 @@ class ValveDriver(ManagedNode):
         if self.value('accept_valve_command'):
             self.raw_commands = self.add_subscription('valve_command', writers=True)
         self.pressures = self.add_subscription('pressure', writers=True)
-        self.ear = DriverEar(self)
+        self.ear = DriverEar(self, self._watchdog)
         self.supplies = self.add_subscription('supply_pressure')
         self.contractions = None
         if loop.uses_contraction:

@@ -16,17 +16,26 @@
 
 from pathlib import Path
 import re
+import time
 import xml.etree.ElementTree as ElementTree
 
 import pytest
 
 pytest.importorskip('rclpy')
 
-from pam_actuation.nodes.interfaces import Inspector, VARIANTS              # noqa: E402, I100
+from pam_actuation.messages import SAFE_EFFORTS, VALVE_NAMES, ValveSignal  # noqa: E402, I100
+from pam_actuation.nodes.interfaces import Inspector, node_class, VARIANTS  # noqa: E402
 from pam_actuation.nodes.pages import pages                                 # noqa: E402
 from pam_actuation.nodes.policy import policy                               # noqa: E402
+from pam_actuation.nodes.ros_messages import class_of                       # noqa: E402
 from pam_actuation.rigging import layouts                                   # noqa: E402
+from pam_actuation.rigging.client import local_context                      # noqa: E402
+from pam_actuation.rigging.domain import DomainLock                         # noqa: E402
 from pam_actuation.topics import table                                      # noqa: E402
+from pam_actuation.topics.codec import Writer                               # noqa: E402
+import rclpy                                                                # noqa: E402
+from rclpy.node import Node                                                 # noqa: E402
+from rclpy.parameter import Parameter                                       # noqa: E402
 
 pytestmark = [pytest.mark.ros, pytest.mark.shared]
 
@@ -119,6 +128,39 @@ def test_a_node_takes_the_valve_of_its_rig_file(tmp_path, name, parameters, kind
             name, {**parameters, 'rig': str(file), **given}), kind)
             for given in ({}, {'valve_type': 'ppr'}))
     assert topic in of_rig and topic not in of_parameter
+
+
+def test_the_driver_is_told_the_name_of_its_watchdog():
+    safe = Writer('valve_signal').fill(ValveSignal(1, VALVE_NAMES['ppr'], SAFE_EFFORTS['ppr']))
+    lock = DomainLock()
+    context = local_context(lock.domain_id)
+    driver = node_class('valve_driver')(
+        context=context, namespace='/muscle', enable_rosout=False,
+        parameter_overrides=[Parameter('watchdog', value='guard')])
+    driver.trigger_configure()
+    others = [Node(name, namespace='/muscle', context=context) for name in ('guard', 'other')]
+
+    def told(node):
+        """Return the fault, if any, and whether the driver heard that another one vents."""
+        publisher = node.create_publisher(class_of('valve_signal'), 'valve_signal', 10)
+        deadline = time.monotonic() + 0.4       # longer than a new writer may stay unnamed
+        heard, fault = False, None
+        while fault is None and time.monotonic() < deadline:
+            publisher.publish(safe)
+            time.sleep(0.01)
+            driver.ear.listen()
+            heard, fault = heard or driver.ear.vented, driver.ear.fault(driver.now_ns())
+        return heard, fault and fault[1]
+
+    try:
+        assert told(others[0]) == (True, None)
+        heard, sentence = told(others[1])
+        assert heard and '/muscle/other as well as by this driver' in sentence
+    finally:
+        for node in (driver, *others):
+            node.destroy_node()
+        rclpy.try_shutdown(context=context)
+        lock.release()
 
 
 def test_a_node_that_cannot_be_configured_says_why():
