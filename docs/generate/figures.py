@@ -15,8 +15,9 @@
 """
 Draws the figures of the explanation anew, and writes down the numbers that the pages state.
 
-``python docs/generate/figures.py [muscle] [control] [gap]``, all of them by default. A test
-compares the numbers with the pages and, for muscle and control, with a new calculation.
+``python docs/generate/figures.py [muscle] [control] [gap] [valves]``, all of them by default. A
+test compares the numbers with the pages, and another one, which is slow, with a new calculation.
+The page on valves has tables in place of figures; they are written anew.
 """
 
 import json
@@ -26,11 +27,11 @@ import sys
 DOCS = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(DOCS))
 
-from generate import control_figures, gap_figures, muscle_figures  # noqa: E402
+from generate import control_figures, gap_figures, muscle_figures, valve_numbers  # noqa: E402
 
 FOLDER = DOCS / 'figures' / 'explanation'
 PAGES = {'muscle': muscle_figures.draw, 'control': control_figures.draw,
-         'gap': gap_figures.draw}
+         'gap': gap_figures.draw, 'valves': valve_numbers.draw}
 
 
 def remake(page: str, folder: Path = FOLDER) -> dict[str, str]:
@@ -44,5 +45,8 @@ def remake(page: str, folder: Path = FOLDER) -> dict[str, str]:
 
 if __name__ == '__main__':
     for name in sys.argv[1:] or PAGES:
-        for what, number in remake(name).items():
+        numbers = remake(name)
+        if name == 'valves':
+            valve_numbers.write(numbers)
+        for what, number in numbers.items():
             print(f'{name}: {what}: {number}')
