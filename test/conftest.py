@@ -22,7 +22,8 @@ import tempfile
 import time
 
 import pytest
-from stall_watch import EXIT_STOOD_STILL, NAMES_A_LIVE_TEST, STALL_S, StallWatch, TIMED
+from stall_watch import (
+    EXIT_CROWDED, EXIT_STOOD_STILL, NAMES_A_LIVE_TEST, STALL_S, StallWatch, TIMED)
 
 # Set before anything imports rclpy; children inherit it. Ids above 101 collide
 # with the ports that Linux hands out. Values given from outside are respected.
@@ -106,7 +107,29 @@ class StallPlugin:
             session.exitstatus = EXIT_STOOD_STILL
 
 
+class CrowdPlugin:
+    """Tell a run in which only live tests failed that share the machine with the others."""
+
+    def __init__(self):
+        self.others = 0
+
+    def pytest_runtest_logreport(self, report):
+        self.others += report.failed and 'shared' not in report.keywords
+
+    def pytest_collectreport(self, report):
+        self.others += report.failed
+
+    @pytest.hookimpl(trylast=True)
+    def pytest_sessionfinish(self, session, exitstatus):
+        if exitstatus == pytest.ExitCode.TESTS_FAILED and not self.others:
+            session.exitstatus = EXIT_CROWDED
+
+
 def pytest_configure(config):
-    """Watch the machine where live tests run one after the other."""
-    if HAS_ROS and config.getoption('markexpr') in ('ros', TIMED):
+    """Watch the machine where live tests run one after the other, or beside all others."""
+    if not HAS_ROS or hasattr(config, 'workerinput'):
+        return
+    if config.getoption('markexpr') in ('ros', TIMED):
         config.pluginmanager.register(StallPlugin())
+    elif config.getoption('markexpr') == f'not ({TIMED})':
+        config.pluginmanager.register(CrowdPlugin())

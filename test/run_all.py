@@ -17,7 +17,8 @@ Run every test: the live ones that judge times in two lanes, and beside them all
 
 Live nodes wait more than they compute, and the other tests take the rest of the cores. Those
 have a low priority: a live process that wakes gets a core at once. Live tests that failed while
-the machine stood still are run once more, with the machine to themselves.
+the machine stood still, or among those of low priority, are run once more with the machine to
+themselves.
 """
 
 import contextlib
@@ -28,7 +29,7 @@ import subprocess
 import sys
 import tempfile
 
-from stall_watch import EXIT_STOOD_STILL, NAMES_A_LIVE_TEST, TIMED
+from stall_watch import EXIT_CROWDED, EXIT_STOOD_STILL, NAMES_A_LIVE_TEST, TIMED
 
 ROOT = Path(__file__).resolve().parent.parent
 # Whole runs as a user starts them: the longest live tests, about half of the time of all.
@@ -94,6 +95,9 @@ def main():
             print('The machine stood still during the live tests that failed; these once more:',
                   flush=True)
             codes[place], = ended(pytest(*lane, '--last-failed'))
+    if others == EXIT_CROWDED:
+        print('Of the tests of low priority only live ones failed; these once more:', flush=True)
+        others, = ended(pytest('-m', 'shared', '--last-failed'))
     return int(any((*codes, others)))
 
 

@@ -34,6 +34,8 @@ TIMED = 'timed or ros and not shared'
 NAMES_A_LIVE_TEST = re.compile(r'\bmark\.(ros|timed)\b')
 # Exit code of a run in which tests failed, but only while the machine stood still.
 EXIT_STOOD_STILL = 75       # EX_TEMPFAIL of sysexits.h: try again
+# Exit code of a run in which only live tests of low priority failed.
+EXIT_CROWDED = 76
 PERIOD_S = 0.01
 STALL_S = 0.025     # a quarter of the shortest time limit of the rig
 

@@ -38,7 +38,7 @@ def add_live_options(parser: Parser) -> None:
         help='only this ROS domain (default: ROS_DOMAIN_ID, else 0, and every domain in which '
              'pam runs nodes on this machine)')
     parser.add_argument(
-        '--wait', type=number(0.1, 60.0, 's'), default=3.0, metavar='S',
+        '--wait', type=number(0.1, 60.0, 's'), default=7.0, metavar='S',
         help='how long to look for the first node, s (default: %(default)g)')
 
 

@@ -69,7 +69,8 @@ def domain():
 
 
 def _pam(capsys, *words):
-    code = main([*words, '--json'])
+    # Long: of low priority on a busy machine, even an announcement may take seconds.
+    code = main([*words, '--wait', '60', '--json'])
     return code, json.loads(capsys.readouterr().out)
 
 
