@@ -13,6 +13,7 @@ VENV ?= .venv
 ARGS ?=
 BIN := $(VENV)/bin
 STAMP := $(VENV)/installed
+EXTRAS := $(VENV)/extras
 COMPILED := $(VENV)/compiled
 RARELY := plotly|sqlalchemy|debugpy|pip|setuptools|matplotlib|fontTools|mypy|mypyc
 SOURCES := $(shell find pam_actuation pam_sim -name '*.py')
@@ -23,7 +24,7 @@ export OPENBLAS_NUM_THREADS := 1
 # Byte code is kept: without it every process compiles some 300 files again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help demo test docs env clean
+.PHONY: help demo test docs env all_of_it clean
 
 # PYTHON names another version than the environment has: it is made anew.
 VERSION_OF = $(shell "$(1)" -c 'import sys; print(sys.version_info[:2])' 2>/dev/null)
@@ -36,24 +37,34 @@ endif
 help:
 	@sed -n '/^#/!q; s/^# \{0,1\}//p' Makefile
 
-demo: $(COMPILED)
+demo: env
 	@$(BIN)/pam demo $(ARGS)
 
-test: $(COMPILED)
+test: env
 ifeq ($(strip $(ARGS)),)
 	@$(BIN)/python test/run_all.py
 else
 	@$(BIN)/python -m pytest $(ARGS)
 endif
 
-docs: $(STAMP)
+docs: $(EXTRAS)
 	@$(BIN)/python -m sphinx -W --keep-going -q -b html docs build/docs $(ARGS)
 	@echo 'documentation: build/docs/index.html'
 
-env: $(COMPILED)
+# pip waits for the network most of the time: meanwhile the cores compile.
+env:
+	@$(MAKE) --no-print-directory --jobs 2 all_of_it
+
+all_of_it: $(EXTRAS) $(COMPILED)
+	@:
 
 clean:
 	rm -rf $(VENV) build install log *.egg-info .pytest_cache
+
+INSTALL = PYTHONWARNINGS=ignore '$(BIN)/python' -m pip install --quiet --disable-pip-version-check --no-compile
+FAILED = echo 'The installation failed. Without a network, point pip at a folder of wheels:' >&2; \
+	echo '  PIP_NO_INDEX=1 PIP_FIND_LINKS=/path/to/wheels make env' >&2; exit 1
+BYTE_CODE = '$(BIN)/python' -m compileall -q -j 0 -x 'site-packages/(.*/tests|$(RARELY))/' '$(VENV)/lib' >/dev/null 2>&1
 
 # The pip of Python 3.11 takes twice as long to find what fits together as a present one.
 # pip compiles one file after the other, tests of all packages as well; here all cores compile.
@@ -77,11 +88,18 @@ $(STAMP): setup.py pyproject.toml
 	echo "Creating the environment $(VENV) with $$("$$found" --version) (once; needs a network or a pip cache)"; \
 	rm -rf '$(VENV)' && "$$found" -m venv '$(VENV)' \
 	&& { '$(BIN)/python' -m pip install --quiet --no-compile --retries 0 --upgrade pip >/dev/null 2>&1 || true; } \
-	&& PYTHONWARNINGS=ignore '$(BIN)/python' -m pip install --quiet --disable-pip-version-check --no-compile \
-	     --editable '.[ros,test]' \
-	|| { echo 'The installation failed. Without a network, point pip at a folder of wheels:' >&2; \
-	     echo '  PIP_NO_INDEX=1 PIP_FIND_LINKS=/path/to/wheels make env' >&2; exit 1; }; \
-	'$(BIN)/python' -m compileall -q -j 0 -x 'site-packages/(.*/tests|$(RARELY))/' '$(VENV)/lib' >/dev/null 2>&1; \
+	&& $(INSTALL) --editable . \
+	|| { $(FAILED); }; \
+	$(BYTE_CODE); \
+	touch '$@'
+
+# ROS 2 and what tests and documentation need. The project itself stays as it is: it is in use.
+$(EXTRAS): $(STAMP)
+	@'$(BIN)/python' -c 'from importlib.metadata import requires; \
+	print("\n".join(one.partition(";")[0] for one in requires("pam_actuation") \
+	if one.endswith(("extra == \"ros\"", "extra == \"test\""))))' > '$(VENV)/extras.txt'; \
+	$(INSTALL) --requirement '$(VENV)/extras.txt' || { $(FAILED); }; \
+	$(BYTE_CODE); \
 	touch '$@'
 
 # Machine code is kept by source file: after a change, or a pull, only what changed is compiled.
