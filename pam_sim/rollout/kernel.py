@@ -69,11 +69,10 @@ def _entries(key: int, beyond: int) -> Entries:
             return
         of_rig, numbers = part(state, 0, STATE), part(par, 0, PARAMETERS)
         given, seen = part(inp, 0, INPUT), part(out, 0, OUTPUT)
-        if numbers.beyond_nominal > NOMINAL:
-            if beyond == TERMS:
-                _step_terms(of_rig, numbers, given, seen)
-            else:
-                _step_beyond(of_rig, numbers, given, seen)
+        if beyond == TERMS:         # known to the compiler, which leaves out the rest
+            _step_terms(of_rig, numbers, given, seen)
+        elif numbers.beyond_nominal > NOMINAL:
+            _step_beyond(of_rig, numbers, given, seen)
         else:
             steps.step_body(NOMINAL, of_rig, numbers, given, seen)
 
@@ -133,7 +132,7 @@ def _entries(key: int, beyond: int) -> Entries:
         steps.look_body(
             beyond, of_rig, numbers, part(flat_in, 0, INPUT), part(flat_out, 0, OUTPUT))
         unphysical = physical.first_unphysical(-1, 0, flat_out, 0)
-        if numbers.beyond_nominal > NOMINAL:
+        if beyond == TERMS or numbers.beyond_nominal > NOMINAL:
             for i in range(inputs.shape[0]):
                 step_given = part(flat_in, i * _INPUT_SIZE, INPUT)
                 step_seen = part(flat_out, (i + 1) * _OUTPUT_SIZE, OUTPUT)
