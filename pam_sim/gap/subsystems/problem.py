@@ -166,6 +166,11 @@ class SubsystemProblem:
         self._forget()
         self._disturb(None)
 
+    def delay_inputs(self, late_s: float) -> None:
+        """Take measured inputs as stamped so late against what is compared, until ``disturb``."""
+        self._forget()
+        self._disturb(None)
+
     def _simulate(self, rig: Rig, index: int, numbers: Mapping[str, float]) -> Response:
         raise NotImplementedError
 

@@ -45,6 +45,7 @@ class ValveProblem(SubsystemProblem):
     def __init__(self, rig: Rig, recordings: Sequence[Recording], holds_certify: bool = True,
                  seed: int = 0, criteria: Criteria = CRITERIA) -> None:
         self._shift_s: list[FloatArray] | None = None
+        self._late_s = 0.0
         self._signal = lru_cache(maxsize=KEPT)(
             lambda index, late_s, pulses: recordings[index].valve_signal(late_s, None, pulses))
         self._motion = [smoothed(r, 'contraction') for r in recordings]
@@ -108,7 +109,13 @@ class ValveProblem(SubsystemProblem):
             found[mine] = jumps.whitened(errors[mine], *more)
         return found
 
+    def delay_inputs(self, late_s: float) -> None:
+        """Take the measured contraction as stamped so late [s], until ``disturb``."""
+        super().delay_inputs(late_s)
+        self._late_s = late_s
+
     def _disturb(self, random: np.random.Generator | None) -> None:
+        self._late_s = 0.0
         if random is None:
             self._shift_s = None
             return
@@ -120,7 +127,8 @@ class ValveProblem(SubsystemProblem):
     def _simulate(self, rig: Rig, index: int, numbers: Mapping[str, float]) -> Response:
         recording = self.recordings[index]
         shift = None if self._shift_s is None else self._shift_s[index]
-        x = true_value('contraction', rig, *self._motion[index])
+        reading, rate = self._motion[index]
+        x = true_value('contraction', rig, reading + self._late_s * rate, rate)
         kept = [e for e in rig.effects if acts_on(e.name, 'valve')]
         late_s, pulses = numbers[of_run('latency', index)], pulses_of(rig)
         p = self._start[index]['pressure'] + numbers.get(of_run('start_error', index), 0.0)

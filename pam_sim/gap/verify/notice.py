@@ -22,7 +22,7 @@ is taken out before.
 A muscle behind on/off valves integrates the errors of its flow. Errors of stamps alone take its
 free run far away, and a gap of the flow hides in that. Its errors count against their own mean
 shortly before, so a test sees the flow and not where it led to. They must not follow the time,
-the pressure, or a number of the valve that changes with either.
+the pressure, or a number of the valve that changes with either; ``flow`` has this test.
 
 A recorded supply pressure is a witness of its own: where it moves, a model with a constant one
 has a gap.
@@ -33,28 +33,25 @@ from dataclasses import dataclass
 import math
 
 import numpy as np
-from pam_sim.annotations import BoolArray, FloatArray
+from pam_sim.annotations import FloatArray
 from pam_sim.effects.registry import get_effect
 from pam_sim.gap.criteria import Criteria
 from pam_sim.gap.data.means import free_of, means_of, recent
-from pam_sim.gap.data.noise import autocorrelation_time, MAD_TO_SD, noise_of, STAMP_SD_S
+from pam_sim.gap.data.noise import MAD_TO_SD, noise_of, STAMP_SD_S
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.split import FIT, SELECT
 from pam_sim.gap.data.supply import DRIFT_SD, supply_scatter
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit
 from pam_sim.gap.subsystems.problem import SubsystemProblem
+from pam_sim.gap.verify.flow import Flow
 from pam_sim.gap.verify.own_runs import OwnRuns
 from pam_sim.rig import Rig
 
 SLOW_S, FAST_S = 0.5, 0.02   # of the means that are compared with those of noise
 MEMORY_S = 1.0               # of the mean before that errors behind on/off valves count against
-# Of the test that follows them. The errors of stamps add up, and those of the sensor do not;
-# they are as large after some tenths of a second.
-FLOW_MEAN_S, FLOW_MEMORY_S = 0.1, 0.25
 DRAWS = 4
 LEAST_STAMP_SD_S = 0.05e-3   # stamps as regular as that may be those of a clock, not of the valve
-SPARE = 10                   # means that are left for the noise once all is fitted
 
 
 @dataclass(frozen=True)
@@ -118,7 +115,7 @@ def notices(runs: OwnRuns, estimator: Estimator, found: Fit, seed: int = 0) -> l
             followed = 0.0
             if _integrates(problem, problem.recordings[0]):
                 z = here.flow.follows(0, runs.chosen(problem, signal))
-                flow, mine = _Flow(searched, rig, found.known_z[searched.subsystem]), np.isin(
+                flow, mine = Flow(searched, rig, found.known_z[searched.subsystem]), np.isin(
                     searched.part, (FIT, SELECT))
                 followed = _most([z, *(flow.follows(index, mine & (searched.run == index))
                                        for index in range(len(searched.recordings)))])
@@ -179,56 +176,13 @@ def _doubt(estimator: Estimator, found: Fit) -> dict[str, float]:
     return {name: float(min(sd, 1.0)) for name, sd in zip(names, spread)}
 
 
-class _Flow:
-    """The errors of a problem, and their slopes for its known numbers."""
-
-    def __init__(self, problem: SubsystemProblem, rig: Rig, known: FloatArray) -> None:
-        self.problem, self.base = problem, problem.values(rig, known)
-        self.errors = self.base - problem.measured
-        self.slopes = [(problem.values(rig, known + k.step * (np.arange(known.size) == j))
-                        - self.base) / k.step for j, k in enumerate(problem.known)]
-
-    def follows(self, index: int, chosen: BoolArray) -> FloatArray:
-        """
-        Return by how many deviations the errors follow what they should not, one by one.
-
-        Each once alone: a constant, the pressure, the time, and every number of the rig that
-        changes with time or pressure. Empty where there are too few means.
-        """
-        problem, recording = self.problem, self.problem.recordings[index]
-        mine = problem.run == index
-        time_s, inside = problem.time_s[mine], chosen[mine]
-        pressure = np.interp(
-            time_s, recording.time_s['pressure'], recording.measured['pressure'])
-
-        def means(values: FloatArray) -> FloatArray:
-            return means_of(values, time_s, FLOW_MEAN_S, inside)
-
-        errors, *slopes = (means(recent(values[mine], time_s, FLOW_MEMORY_S))
-                           for values in (self.errors, *self.slopes))
-        time, level = (_unit(means(values)) for values in (time_s, pressure))
-        rows = [np.ones(errors.size), level, time]
-        rows += [s * by for s, k in zip(slopes, problem.known) if k.of_rig
-                 for by in (time, level)]
-        if errors.size < len(rows) + len(slopes) + SPARE:
-            return np.zeros(0)
-        usual = _basis(np.column_stack(slopes))
-        columns = np.column_stack([_normal(r - usual @ (usual.T @ r)) for r in rows])
-        errors = errors - usual @ (usual.T @ errors)
-        every = _basis(columns)
-        noise = errors - every @ (every.T @ errors)
-        count = errors.size - usual.shape[1] - every.shape[1]
-        sd = math.sqrt(float(noise @ noise) / count * autocorrelation_time(noise))
-        return columns.T @ errors / max(sd, 1e-12)
-
-
 class _Certified:
     """Means of the errors of a problem on the certify data, and what is expected of them."""
 
     def __init__(self, runs: OwnRuns, problem: SubsystemProblem, rig: Rig, known: FloatArray,
                  doubt: Mapping[str, float], random: np.random.Generator) -> None:
         self._runs, self._problem, self._random = runs, problem, random
-        self.flow = _Flow(problem, rig, known)
+        self.flow = Flow(problem, rig, known)
         base, self._errors, self._slopes = self.flow.base, self.flow.errors, self.flow.slopes
         self._limits = np.array([doubt.get(k.name, 1.0) if k.of_rig else 1.0
                                  for k in problem.known])
@@ -264,24 +218,6 @@ class _Certified:
             [means(s[mine]) for s in self._slopes]), self._limits, expected)
         return Notice(self._problem.subsystem, signal, float(np.sqrt(np.mean(left ** 2))),
                       math.sqrt(expected), followed, span_s)
-
-
-def _normal(row: FloatArray) -> FloatArray:
-    """Return a row of length 1, or of none where hardly anything is left of it."""
-    size = float(np.linalg.norm(row))
-    return row / size if size > 1e-9 else np.zeros_like(row)
-
-
-def _unit(values: FloatArray) -> FloatArray:
-    """Return values about their mean, in their standard deviation."""
-    return (values - values.mean()) / max(float(values.std()), 1e-12)
-
-
-def _basis(columns: FloatArray) -> FloatArray:
-    """Return an orthonormal basis of columns, those left out that depend on others."""
-    sizes = np.maximum(np.linalg.norm(columns, axis=0), 1e-12)
-    basis, size, _ = np.linalg.svd(columns / sizes, full_matrices=False)
-    return basis[:, size > 1e-6 * size[0]]
 
 
 def stamp_sd_s(recording: Recording) -> float:
