@@ -70,7 +70,7 @@ SIGNALS = (
            r'target)|(set|target|desired|ref|reference|command(ed)?) ?(p|pressure)',
            'wanted pressure of the muscle'),
     Signal('pressure', 'pressure', 'pressure_pa', PRESSURE,
-           r'p|p(ressure)? ?(1|m|is|ist|act|actual|meas|measured|muscle|pam|sensor)?|press|druck|'
+           r'p|p(ressure)? ?(1|m|is|ist|act|actual|meas|measured|muscle|pam|sensor)?|press|'
            r'(muscle|measured|actual|pam) pressure|fluid pressure', 'pressure in the muscle'),
     Signal('reference', 'reference', 'contraction_m', LENGTH,
            r'(x|s|y|pos|position|contraction|stroke|displacement) ?(ref|reference|set|setpoint|'
@@ -78,8 +78,8 @@ SIGNALS = (
            r'(desired|target|reference) (position|contraction|displacement)',
            'wanted contraction'),
     Signal('contraction', 'contraction', 'contraction_m', LENGTH,
-           r'(x|s|y|pos|position|contraction|stroke|displacement|disp|shortening|weg|encoder)'
-           r' ?(1|is|ist|act|actual|meas|measured|muscle|pam)?|'
+           r'(x|s|y|pos|position|contraction|stroke|displacement|disp|shortening|encoder)'
+           r' ?(1|is|ist|act|actual|meas|measured|muscle|pam|sensor)?|'
            r'(measured|actual) (position|contraction|displacement)',
            'shortening of the muscle'),
     Signal('external_force', 'external_force', 'force_n', FORCE,
@@ -87,8 +87,8 @@ SIGNALS = (
     Signal('reference_force', 'reference', 'force_n', FORCE,
            r'(f|force) ?(ref|reference|set|setpoint|des|desired|target)', 'wanted force'),
     Signal('force', 'force', 'force_n', FORCE,
-           r'f|f ?(1|x|z|m|meas|measured|is|ist)|force ?(1|x|z|is|act|actual|meas|measured)?|'
-           r'load ?cell|load|tension|kraft|(measured|muscle|pam|actual) force',
+           r'f|f ?(1|x|z|m|meas|measured|is|ist)|force ?(1|x|z|is|act|actual|meas|measured|sensor|cell)?|'
+           r'load ?cell|load|tension|(measured|muscle|pam|actual) force',
            'force along the muscle'),
     Signal('fill_duty', 'valve_signal', 'fill_duty', DUTY,
            r'(duty |d |pwm )?(fill|in|inlet|charge|supply)( duty| pwm| valve)?|fill duty',
@@ -100,7 +100,7 @@ SIGNALS = (
            r'u|u ?(ppr|valve|cmd|command|ctrl|control|soll)|v|v ?(ppr|valve|cmd|command|out)|'
            r'(ppr|(prop(ortional)? )?(valve|regulator)|command|control|analog out|dac|'
            r'ao) ?(voltage|volt|v|signal|u|cmd|command|set ?point|input)|'
-           r'voltage ?(ppr|valve|cmd|command|out)?|spannung', 'voltage to the regulator'),
+           r'voltage ?(ppr|valve|cmd|command|out)?', 'voltage to the regulator'),
 )
 ANGLES = (
     Signal('reference_angle', 'joint_reference', 'angle_rad', ANGLE,
@@ -108,7 +108,7 @@ ANGLES = (
            r'des|desired|soll|target|d)|(desired|target|reference) (joint |knee )?angle',
            'wanted angle'),
     Signal('angle', 'joint_state', 'angle_rad', ANGLE,
-           r'(joint |knee |elbow |ankle |hip |measured |actual )?(angle|theta|phi|q|winkel)'
+           r'(joint |knee |elbow |ankle |hip |measured |actual )?(angle|theta|phi|q)'
            r' ?(1|is|ist|act|actual|meas|measured|joint|knee)?', 'angle of the joint'))
 JOINT_SIGNALS = (*ANGLES, *(
     replace(one, name=f'{side}/{one.name}', topic=f'{side}/{one.topic}',
@@ -119,9 +119,10 @@ ALLOWED = (f'{", ".join(one.name for one in SIGNALS)}; of a joint '
            f'{" and ".join(one.name for one in ANGLES)}, and those of a muscle after '
            f'{" or ".join(f"{side}/" for side in SIDES)}')
 # Words that other programs have for the sides.
-_SIDE_WORDS = {'flexor': 'flexor', 'flex': 'flexor', 'agonist': 'flexor', 'extensor': 'extensor',
+_SIDE_WORDS = {'flexor': 'flexor', 'flex': 'flexor', 'agonist': 'flexor', 'ago': 'flexor',
+               'extensor': 'extensor', 'antago': 'extensor',
                'antagonist': 'extensor'}
-TIME_WORDS = (r't|time|t ?(nominal|rel|s)|time ?stamp|stamp|zeit|elapsed( time)?|timer|clock|'
+TIME_WORDS = (r't|time|t ?(nominal|rel|s)|time ?stamp|stamp|elapsed( time)?|timer|clock|'
               r'seconds|sec|date ?time|date')
 
 

@@ -15,7 +15,9 @@
 """The words in the name of a column, and the unit that it ends in."""
 
 import re
+import unicodedata
 
+from pam_actuation.tables.languages import in_english
 from pam_actuation.tables.units import FACTORS, unit_of_text
 
 _BRACKETS = re.compile(r'(?!(?<=\w)\[\d+\])[\[(]([^\])]*)[\])]\s*$')     # `data[1]` has no unit
@@ -23,6 +25,7 @@ _BRACKETS = re.compile(r'(?!(?<=\w)\[\d+\])[\[(]([^\])]*)[\])]\s*$')     # `data
 
 def unit_in(name: str) -> str:
     """Return the unit in the name of a column, as ``p_bar`` or ``p [bar gauge]``; '' if none."""
+    name = _narrow(name)
     found = _BRACKETS.search(name)
     if found:
         return found[1].strip()
@@ -36,11 +39,19 @@ def unit_in(name: str) -> str:
 
 
 def words_of(name: str) -> str:
-    """Return the words of a column's name in lower case, without its unit."""
+    """Return the words of a column's name in English and lower case, without its unit."""
+    name = _narrow(name)
     unit = unit_in(name)
     text = _BRACKETS.sub('', name)
     if unit and text == name:
         parts = re.split(r'[_\s.,/]+', name.strip())
         text = ' '.join(parts[:-len(unit.split('_'))])
     text = re.sub(r'([a-z])([A-Z])', r'\1 \2', text)
-    return ' '.join(re.split(r'[_\s./-]+', text.lower().strip())).strip()
+    words = re.split(r'[_\s./-]+', text.lower().strip())
+    return ' '.join(in_english(word) for word in words).strip()
+
+
+def _narrow(name: str) -> str:
+    """Return a name with the narrow forms of brackets and letters, as `（kPa）` has wide ones."""
+    return ''.join(unicodedata.normalize('NFKC', one) if unicodedata.east_asian_width(one) == 'F'
+                   else one for one in name)

@@ -14,10 +14,12 @@
 
 """A file as a lab keeps it: what its columns are, and a zero of the encoder that is not set."""
 
+import re
+
 import numpy as np
 from pam_actuation.tables.mapping import column_of_text
 from pam_actuation.tables.plausible import doubts
-from pam_actuation.tables.signals import signal_of, SIGNALS
+from pam_actuation.tables.signals import of_words, signal_of, SIGNALS, TIME_WORDS
 from pam_actuation.tables.words import words_of
 from pam_sim.errors import InputError
 from pam_sim.units import P_ATM_PA
@@ -32,6 +34,21 @@ SHORTENED_M = np.repeat([0.0, 0.03, 0.04], 20)
     'valve cmd [V]', 'regulator_set_point_V', 'U_valve (V)', 'prop valve input [V]', 'dac_cmd_V'])
 def test_a_voltage_to_the_regulator_in_many_words(column):
     assert next(one.name for one in SIGNALS if one.is_named(words_of(column))) == 'ppr_voltage'
+
+
+@pytest.mark.parametrize('column, signal', [
+    ('force_sensor', 'force'), ('Druck_bar', 'pressure'), ('Presión (bar)', 'pressure'),
+    ('压力（kPa）', 'pressure'), ('압력(kPa)', 'pressure'), ('変位[mm]', 'contraction'),
+    ('Siła [N]', 'force'), ('Druck soll (bar)', 'pressure_command'), ('角度(deg)', 'angle'),
+    ('Tension (N)', 'force'), ('Spannung [V]', 'ppr_voltage'), ('position_weg', None)])
+def test_columns_in_the_language_of_the_lab(column, signal):
+    found = of_words(words_of(column))
+    assert (found and found.name) == signal
+
+
+@pytest.mark.parametrize('column', ['Tijd (s)', 'Zeit_ms', '時間[s]', 'Čas (s)', '시간'])
+def test_the_time_in_the_language_of_the_lab(column):
+    assert re.fullmatch(TIME_WORDS, words_of(column))
 
 
 @pytest.mark.parametrize('text, shortening', [
