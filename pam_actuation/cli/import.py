@@ -123,7 +123,7 @@ def _understood(args: argparse.Namespace) -> 'tuple[list[Table], Guess]':
     from pam_actuation.tables.formats import read_tables
     from pam_actuation.tables.guess import as_stated, ask, guess
     from pam_actuation.tables.mapping import load_mapping, TableMapping
-    from pam_actuation.tables.preview import question_sentence
+    from pam_actuation.tables.preview import how_to_begin, question_sentence
     from pam_sim.errors import InputError
     mapping = (load_mapping(args.mapping) if args.mapping else TableMapping()).with_options(
         args.maps, args.rate)
@@ -140,6 +140,10 @@ def _understood(args: argparse.Namespace) -> 'tuple[list[Table], Guess]':
             found = ask(found, _asked)
         else:
             raise InputError(question_sentence(found), args.files[0])
+    if not (found.mapping.signals or found.questions or args.preview):
+        raise InputError(
+            'no column is known by its name; --preview shows columns and ranges. Then say which '
+            f'are signals, such as {how_to_begin(tables, found)}', args.files[0])
     return tables, found
 
 
@@ -160,26 +164,21 @@ def _asked(text: str, answers: tuple[str, ...]) -> str | None:
 
 
 def _show(args: argparse.Namespace, tables: 'list[Table]', found: 'Guess') -> int:
-    from pam_actuation.tables.preview import preview, questions_text
+    from pam_actuation.tables.preview import how_to_begin, preview, questions_text
     lines = [preview(tables, found, args.missing)]
     if found.questions:
         lines += ['', 'the file does not tell:', questions_text(found)]
-    if found.mapping.signals or not found.questions:
-        lines += ['', *_mapping_lines(found)]
+    if found.mapping.signals:
+        lines += ['', 'mapping:', found.mapping.to_yaml().rstrip()]
+    elif not found.questions:
+        lines += ['', 'no column is known by its name: say which are signals, such as',
+                  f'    {how_to_begin(tables, found)}']
     emit(args, {
         'files': args.files, 'mapping': found.mapping.to_yaml(),
         'questions': [{'signal': one.signal, 'column': one.column, 'text': one.text,
                        'answers': list(one.answers)} for one in found.questions],
         'columns': [list(table.columns) for table in tables]}, '\n'.join(lines))
     return EXIT_DONE
-
-
-def _mapping_lines(found: 'Guess') -> list[str]:
-    """Return the mapping, or how to begin one."""
-    if found.mapping.signals:
-        return ['mapping:', found.mapping.to_yaml().rstrip()]
-    return ['no column is known by its name: say which are signals, such as',
-            '    --map pressure="#2:kPa_gauge" --map contraction="#3:mm"']
 
 
 def _tell(args: argparse.Namespace, recording: 'Recording', found: 'Guess',

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 SLOWEST_HZ, FASTEST_HZ = 0.1, 50_000.0
 SLOW_HZ = 10.0                              # below: another unit may be meant
 UNLIKELY_HZ = 1.0                           # below: the user has to say the unit
+FEWEST_RISING = 20                          # rows that tell a time from values that rise
 EPOCH_S = 9e8                               # seconds that can only count from 1970
 GAP_S, GAP_STEPS = 0.05, 5.0                # longer than both: rows are missing
 LATE_S = 1.0                                # messages that overtake one another by less
@@ -68,12 +69,32 @@ class Clock:
 
 
 def time_column(table: Table, mapping: TableMapping) -> TimeMap | None:
-    """Return the column of the time: the one named, else the one whose name says so."""
+    """
+    Return the column of the time: the one named, else the one whose name says so.
+
+    Where no column has a name, it is the first one, if that rises from row to row.
+    """
     if mapping.time is not None or mapping.rate_hz is not None or table.stamp_ns is not None:
         return mapping.time
     found = [name for name in table.columns if re.fullmatch(TIME_WORDS, words_of(name))]
     exact = [name for name in found if name.endswith('stamp_ns')]
+    if not found and _rises_without_name(table, mapping):
+        found = [next(iter(table.columns))]
     return TimeMap((exact or found)[0]) if found else None
+
+
+def _rises_without_name(table: Table, mapping: TableMapping) -> bool:
+    """Return whether no column has a name, and the first one, not a signal, always rises."""
+    if len(table) < FEWEST_RISING or any(
+            name != f'#{place + 1}' for place, name in enumerate(table.columns)):
+        return False
+    first = next(iter(table.columns))
+    if any(table.name_of(one.column) == first for one in mapping.signals.values()):
+        return False
+    try:
+        return bool((np.diff(table.numbers(first)) > 0.0).all())
+    except InputError:
+        return False
 
 
 def clock_of(table: Table, mapping: TableMapping, start_ns: int = START_NS,

@@ -145,6 +145,20 @@ def test_a_part_and_every_tenth_row(tmp_path, monkeypatch):
                                101_325.0 + 1e5 * np.arange(1.0, 2.005, 0.01))
 
 
+def test_a_file_without_names_begins_with_its_time(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path('a.csv').write_text(''.join(
+        f'{10 * k + k % 2}\t{0.01 * k:.2f}\t{k % 7}\n' for k in range(200)), encoding='utf-8')
+    assert main(['import', 'a.csv', '--out', 'bag']) == 2
+    said = capsys.readouterr().err
+    assert '--preview shows' in said and 'pressure="#2:kPa_gauge" --map contraction="#3:' in said
+    assert main(['import', 'a.csv', '--map', 'pressure=#2:bar_gauge', '--out', 'bag']) == 0
+    assert load_run('bag')['pressure'].stamp_ns[-1] == 10**18 + 1_991_000_000
+    # A signal that rises is no time.
+    assert main(['import', 'a.csv', '--map', 'pressure=#1:Pa_abs', '--out', 'b']) == 2
+    assert 'no column is the time' in capsys.readouterr().err
+
+
 def test_a_reference_is_of_contraction_or_of_force(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     Path('a.csv').write_text('t_s,xref_mm,force_ref_N\n' + ''.join(
