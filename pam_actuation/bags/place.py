@@ -177,7 +177,7 @@ def _bag_in(directory: Path, overwrite: bool) -> list[str]:
     if not overwrite:
         raise InputError(
             'the directory exists and is not empty; give another name or ask to overwrite '
-            '(--overwrite)', shown(directory))
+            '(--overwrite, of a node overwrite:=true)', shown(directory))
     ours = _files_of_bag(directory)
     other = [name for name in present if name not in ours]
     if other:

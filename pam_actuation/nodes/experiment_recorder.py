@@ -69,9 +69,12 @@ class ExperimentRecorder(ManagedNode):
     NAME = 'experiment_recorder'
     SPEAKS_AT_ONCE = False      # what it says before it records would be missing in the bag
     STUCK_AFTER_S = 30.0        # the disk may be slow
+    LIVE = ('output',)
     FOLLOWS_CLOCK = False       # it takes what arrives, also while the simulated time stands
     PARAMETERS = (
-        node_parameter('output', 'bags/experiment', 'Folder of the bag; must not exist.'),
+        node_parameter(
+            'output', 'bags/experiment', 'Folder of the bag; must not exist. A change counts at '
+            'the next activation.'),
         node_parameter(
             'overwrite', False, 'Replace the bag that is there, once the new one is whole.'),
         node_parameter(

@@ -14,6 +14,7 @@
 
 """Test that pages and access policies say what the nodes do."""
 
+import itertools
 from pathlib import Path
 import re
 import time
@@ -61,6 +62,14 @@ def test_every_executable_has_its_page(made):
 def test_the_page_of_a_node_is_current(made, name):
     committed = (ROOT / 'docs' / 'reference' / 'nodes' / f'{name}.md').read_text(encoding='utf-8')
     assert committed == made[f'{name}.md'], 'run: pam nodes --markdown docs/reference/nodes'
+
+
+def test_the_page_of_all_nodes_says_what_may_change_while_they_run():
+    text = (ROOT / 'docs' / 'reference' / 'nodes.md').read_text(encoding='utf-8')
+    said, = re.findall(r'can be set while a node runs: (.*?) The others', ' '.join(text.split()))
+    live = {name: node_class(name).LIVE for name in VARIANTS}
+    named = {*(name for name, own in live.items() if own), *itertools.chain(*live.values())}
+    assert {*re.findall(r'`(\w+)`', said)} - {'configure', 'activate'} == named
 
 
 def test_what_comes_with_certain_parameters_is_said_so(made):

@@ -27,9 +27,14 @@ from pam_actuation.bags.info import bag_info                                # no
 from pam_actuation.bags.recover import recover_bag                          # noqa: E402
 from pam_actuation.messages import Pressure                                 # noqa: E402
 from pam_actuation.nodes import qos                                         # noqa: E402
+from pam_actuation.nodes.experiment_recorder import ExperimentRecorder      # noqa: E402
 from pam_actuation.rigging import session                                   # noqa: E402
+from pam_actuation.rigging.client import local_context                      # noqa: E402
+from pam_actuation.rigging.domain import DomainLock                         # noqa: E402
 from pam_actuation.rigging.plan import make_plan, RECORDER                  # noqa: E402
 from pam_actuation.topics.codec import encode                                # noqa: E402
+import rclpy                                                                # noqa: E402
+from rclpy.parameter import Parameter                                       # noqa: E402
 from sensor_msgs.msg import FluidPressure                                   # noqa: E402
 
 pytestmark = pytest.mark.ros
@@ -87,6 +92,30 @@ def test_split_files_further_topics_and_changing_publishers(tmp_path):
     assert len(list(bag.glob('bag_*.mcap'))) >= 3
     for counts in independent_readers(bag).values():
         assert counts['/muscle/pressure'] == 100 and counts[EXTRA] == 50
+
+
+def test_a_bag_of_its_own_is_written_each_time_the_node_is_activated(tmp_path):
+    lock = DomainLock()
+    context = local_context(lock.domain_id)
+    recorder = ExperimentRecorder(
+        context=context, namespace='/muscle', enable_rosout=False,
+        parameter_overrides=[Parameter('output', value=str(tmp_path / 'first'))])
+    try:
+        recorder.trigger_configure()
+        recorder.trigger_activate()
+        told, = recorder.set_parameters([Parameter('output', value=str(tmp_path / 'second'))])
+        assert told.successful
+        recorder.trigger_deactivate()
+        recorder.trigger_activate()
+        recorder.trigger_deactivate()
+        recorder.trigger_activate()
+        assert recorder.core is None and 'overwrite:=true' in str(recorder.input_error)
+    finally:
+        recorder.destroy_node()
+        rclpy.try_shutdown(context=context)
+        lock.release()
+    for name in ('first', 'second'):
+        assert (tmp_path / name / 'metadata.yaml').is_file()
 
 
 def test_nodes_that_come_up_with_the_recorder_are_recorded_from_their_first_message(tmp_path):
