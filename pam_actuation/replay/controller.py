@@ -20,7 +20,8 @@ takes exactly these measurements from their topics and steps a new controller. I
 and internals bit for bit.
 """
 
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 import os
 from typing import Any, TYPE_CHECKING
@@ -127,65 +128,88 @@ def replay_controller(run: 'Run', controller: 'Controller | str | os.PathLike[st
 
     """
     states = run.require('controller_state')
-    commands = run.require('pressure_command')
-    own = controller is None
-    chosen: Controller
-    if controller is None:
-        text = run.metadata.get('controller')
-        if not text:
-            raise InputError('the recording does not say which controller ran', run.path)
-        chosen = load_controller(text)
-    elif isinstance(controller, (str, os.PathLike)):
-        rig_text = run.metadata.get('rig')
-        chosen = load_controller(controller, load_rig(rig_text) if rig_text else None)
-    else:
-        chosen = controller
+    run.require('pressure_command')
+    chosen = _chosen(run, controller)
     tracked = tracked_by(chosen)
     columns = _columns(states, tracked, run.path)
     order = np.argsort(columns['tick'], kind='stable')
     check_complete(columns, order, run.path)
-    lookups = {topic: _lookup(run, topic) for topic in _MEASURED}
-    command_at = dict(zip(commands.stamp_ns.tolist(), commands.values['pressure_pa'].tolist()))
 
     rises_slowly = HELD_BACK in states.values       # versions before did not
     core = TickCore(MuscleLaw(chosen), rises_slowly)
-    sent_after = SlowRise(active=False)     # what made the recorded commands of those of the law
-    compare = tuple(core.names) if own else ()
-    lacking = [name for name in compare if name not in columns]
-    if lacking:
-        raise InputError(f'controller_state lacks {lacking[0]}', run.path)
-    wanted = [columns[name] for name in compare]
-    differing: dict[str, int] = {}
+    compared = _compared(core.names if controller is None else (), columns, run.path)
+    lookups = {topic: _lookup(run, topic) for topic in _MEASURED}
+    sent = _SentCommands(run, columns, rises_slowly, 1.0 / chosen.rate_hz)
+    differing: Counter[str] = Counter()
     recorded, replayed = np.empty(len(order)), np.empty(len(order))
     kept = np.empty((len(order) if keep_states else 0, len(core.names)))
-    missing = 0
     for place, row in enumerate(order.tolist()):
         if progress is not None and place % _PROGRESS_EVERY == 0:
             progress(place / len(order))
         (command_pa,), values = core.run(_inputs(columns, row, lookups, tracked, run.path))
-        replayed[place] = command_pa
+        replayed[place], recorded[place] = command_pa, sent.at(row, command_pa)
         if keep_states:
             kept[place] = values
-        stamp = int(states.stamp_ns[row])
-        recorded[place] = command_at.get(stamp, np.nan)
-        running = int(columns['input_reason'][row]) in RUNNING
-        if running:
-            sent_pa = sent_after.limited(
-                float(columns['command_pa'][row]), 1.0 / chosen.rate_hz)
-        elif rises_slowly:
-            sent_after.begin()
-        if stamp not in command_at:
-            missing += 1
-            # A lost message; the state of a running tick keeps the command as well.
-            recorded[place] = sent_pa if running else command_pa
-        for name, column, value in zip(compare, wanted, values):
-            if not _same(column[row], value):
-                differing[name] = differing.get(name, 0) + 1
+        differing.update(name for (name, column), value in zip(compared.items(), values)
+                         if not _same(column[row], value))
     difference = float(np.max(np.abs(recorded - replayed))) if len(order) else 0.0
     return ReplayResult(
         states.stamp_ns[order], recorded, replayed, difference,
-        bool(np.array_equal(recorded, replayed)) and not differing, len(order), missing,
-        differing, chosen, dict(zip(core.names, kept.T)) if keep_states else {})
+        bool(np.array_equal(recorded, replayed)) and not differing, len(order), sent.missing,
+        dict(differing), chosen, dict(zip(core.names, kept.T)) if keep_states else {})
+
+
+def _chosen(run: 'Run', controller: 'Controller | str | os.PathLike[str] | None') -> 'Controller':
+    """Return the controller to step: that of the recording where none is given."""
+    if controller is None:
+        text = run.metadata.get('controller')
+        if not text:
+            raise InputError('the recording does not say which controller ran', run.path)
+        return load_controller(text)
+    if isinstance(controller, (str, os.PathLike)):
+        rig_text = run.metadata.get('rig')
+        return load_controller(controller, load_rig(rig_text) if rig_text else None)
+    return controller
+
+
+def _compared(names: Sequence[str], columns: dict[str, FloatArray], path: str
+              ) -> dict[str, FloatArray]:
+    """Return the recorded columns of the internals to be compared, in the order of a tick."""
+    for name in names:
+        if name not in columns:
+            raise InputError(f'controller_state lacks {name}', path)
+    return {name: columns[name] for name in names}
+
+
+class _SentCommands:
+    """
+    The recorded commands, tick by tick in their order.
+
+    Where the message of a tick was lost, ``controller_state`` keeps the command of the law, of
+    which the slow rise made the one that was sent. ``missing`` counts such ticks.
+    """
+
+    def __init__(self, run: 'Run', columns: dict[str, FloatArray], rises_slowly: bool,
+                 period_s: float) -> None:
+        commands = run.topics['pressure_command']
+        self.missing = 0
+        self._command_at = dict(zip(
+            commands.stamp_ns.tolist(), commands.values['pressure_pa'].tolist()))
+        self._stamp_ns = run.topics['controller_state'].stamp_ns
+        self._columns, self._rises_slowly, self._period_s = columns, rises_slowly, period_s
+        self._rise = SlowRise(active=False)
+
+    def at(self, row: int, replayed_pa: float) -> float:
+        """Return the command of the next tick [Pa]; the replayed one where nothing tells it."""
+        lost_pa = replayed_pa
+        if int(self._columns['input_reason'][row]) in RUNNING:
+            lost_pa = self._rise.limited(
+                float(self._columns['command_pa'][row]), self._period_s)
+        elif self._rises_slowly:
+            self._rise.begin()
+        sent_pa = self._command_at.get(int(self._stamp_ns[row]))
+        self.missing += sent_pa is None
+        return lost_pa if sent_pa is None else sent_pa
 
 
 def _same(a: float, b: float) -> bool:
