@@ -14,7 +14,7 @@
 
 """The table of figures of merit, one column per run."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from pam_actuation.report.page import paragraph, Section, signed, table
@@ -40,35 +40,9 @@ def metrics(named: 'Sequence[tuple[str, RunMetrics]]', key: str = 'metrics',
         Anchor and heading.
 
     """
-    found: list[tuple[str, list[str | int | None]]] = [
-        ('Tracking RMSE', _mm(m.rmse_m for _, m in named)),
-        ('Largest error', _mm(m.max_error_m for _, m in named)),
-        ('Mean error (reference − contraction)', [
-            None if m.mean_error_m is None else f'{signed(m.mean_error_m * 1e3, 3)} mm'
-            for _, m in named]),
-        ('RMSE of the first cycle', _mm(_cycle(m, 0) for _, m in named)),
-        ('RMSE of the last cycle', _mm(_cycle(m, -1) for _, m in named)),
-        ('Last cycle against the first', [_change(m) for _, m in named]),
-        ('Force tracking RMSE', _n(m.rmse_n for _, m in named)),
-        ('Largest force error', _n(m.max_error_n for _, m in named)),
-        ('Force RMSE of the first cycle', _n(value_at(m.cycle_rmse_n, 0) for _, m in named)),
-        ('Force RMSE of the last cycle', _n(value_at(m.cycle_rmse_n, -1) for _, m in named)),
-        ('Cycles', [len(m.cycle_rmse_m) or len(m.cycle_rmse_n) or None for _, m in named]),
-        ('Settling into 5 % after a step', [_settling(m) for _, m in named]),
-        ('Overshoot of steps', _mm(max((s.overshoot_m for s in m.steps), default=None)
-                                   for _, m in named)),
-        ('Valve at its upper limit', [_percent(m.saturation_high) for _, m in named]),
-        ('Valve at its lower limit', [_percent(m.saturation_low) for _, m in named]),
-        ('Vented for missing or old input', [interrupted_text(m) for _, m in named]),
-        ('Air filled into the muscle', [_air(m.air_use_kg) for _, m in named]),
-        ('Air through the fill valve', [_air(m.air_fed_kg) for _, m in named]),
-        ('From command to pressure', [None if m.path is None else m.path.text()
-                                      for _, m in named]),
-        ('Controller loop', [_loop(m, 'pressure_command') for _, m in named]),
-        ('Driver loop', [_loop(m, 'valve_signal') for _, m in named]),
-    ]
-    rows = [[name, *cells] for name, cells in found if any(c is not None for c in cells)]
-    body = table([''] + [name for name, _ in named], rows)
+    rows = [[name, *(cell(m) for _, m in named)] for name, cell in _ROWS]
+    body = table([''] + [name for name, _ in named], [
+        row for row in rows if any(cell is not None for cell in row[1:])])
     if any(m.air_use_kg is not None for _, m in named):
         body += paragraph(
             'Air is the sum of all increases of the air mass in the muscle, from measured '
@@ -80,20 +54,20 @@ def metrics(named: 'Sequence[tuple[str, RunMetrics]]', key: str = 'metrics',
     return Section(key, title, body)
 
 
-def _mm(values: Iterable[float | None]) -> list[str | int | None]:
-    return [None if v is None else f'{v * 1e3:.3f} mm' for v in values]
+def _mm(value: float | None) -> str | None:
+    return None if value is None else f'{value * 1e3:.3f} mm'
 
 
-def _n(values: Iterable[float | None]) -> list[str | int | None]:
-    return [None if v is None else f'{v:.3f} N' for v in values]
+def _n(value: float | None) -> str | None:
+    return None if value is None else f'{value:.3f} N'
+
+
+def _mean_error(m: 'RunMetrics') -> str | None:
+    return None if m.mean_error_m is None else f'{signed(m.mean_error_m * 1e3, 3)} mm'
 
 
 def _percent(value: float | None) -> str | None:
     return None if value is None else f'{100.0 * value:.1f} % of the messages'
-
-
-def _cycle(m: 'RunMetrics', index: int) -> float | None:
-    return value_at(m.cycle_rmse_m, index)
 
 
 def value_at(values: FloatArray, index: int) -> float | None:
@@ -135,3 +109,29 @@ def _loop(m: 'RunMetrics', topic: str) -> str | None:
         return None
     return (f'{timing.median_s * 1e3:.2f} ms, jitter {timing.jitter_s * 1e3:.2f} ms, '
             f'{100 * timing.late_share:.2f} % late')
+
+
+# What a row is called, and its cell for one run; None where the run does not tell.
+_ROWS: 'tuple[tuple[str, Callable[[RunMetrics], str | int | None]], ...]' = (
+    ('Tracking RMSE', lambda m: _mm(m.rmse_m)),
+    ('Largest error', lambda m: _mm(m.max_error_m)),
+    ('Mean error (reference − contraction)', _mean_error),
+    ('RMSE of the first cycle', lambda m: _mm(value_at(m.cycle_rmse_m, 0))),
+    ('RMSE of the last cycle', lambda m: _mm(value_at(m.cycle_rmse_m, -1))),
+    ('Last cycle against the first', _change),
+    ('Force tracking RMSE', lambda m: _n(m.rmse_n)),
+    ('Largest force error', lambda m: _n(m.max_error_n)),
+    ('Force RMSE of the first cycle', lambda m: _n(value_at(m.cycle_rmse_n, 0))),
+    ('Force RMSE of the last cycle', lambda m: _n(value_at(m.cycle_rmse_n, -1))),
+    ('Cycles', lambda m: len(m.cycle_rmse_m) or len(m.cycle_rmse_n) or None),
+    ('Settling into 5 % after a step', _settling),
+    ('Overshoot of steps', lambda m: _mm(max((s.overshoot_m for s in m.steps), default=None))),
+    ('Valve at its upper limit', lambda m: _percent(m.saturation_high)),
+    ('Valve at its lower limit', lambda m: _percent(m.saturation_low)),
+    ('Vented for missing or old input', interrupted_text),
+    ('Air filled into the muscle', lambda m: _air(m.air_use_kg)),
+    ('Air through the fill valve', lambda m: _air(m.air_fed_kg)),
+    ('From command to pressure', lambda m: None if m.path is None else m.path.text()),
+    ('Controller loop', lambda m: _loop(m, 'pressure_command')),
+    ('Driver loop', lambda m: _loop(m, 'valve_signal')),
+)
