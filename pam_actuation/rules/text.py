@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 NEVER = '·'
 _GAP = 2
+_CHANGED = 'changed by'
 _FEW = 2                  # columns that leave room for changes and firing beside them
 # 256-colour codes from little to much: adding pressure towards orange, taking off towards blue.
 _ADD, _TAKE = (223, 215, 208, 202), (153, 111, 69, 33)
@@ -65,46 +66,55 @@ def _grid(grid: Grid, since: str, width: int, colour: bool) -> list[str]:
     shown, rows, columns = _trimmed(grid)
     if not shown.any():
         return [f'{grid.title}: all zero, never fired']
-    limit = float(np.max(np.abs(grid.values)))
-    lines = [f'{grid.title}, kPa: {grid.rows.title} downwards'
-             + (f', {grid.columns.title} across' if grid.columns.name else '')]
-    left_out = grid.values.size - len(rows) * len(columns)
+    title = (f'{grid.title}, kPa: {grid.rows.title} downwards'
+             + (f', {grid.columns.title} across' if grid.columns.name else ''))
+    legend = _legend(grid, since, rows, columns)
+    below = [f'  ({"; ".join(legend)})'] if legend else []
+    parts = _parts(grid, rows, columns, colour)
+    names = [grid.columns.labels[c] for c in columns]
+    labels = [grid.rows.labels[r] for r in rows]
+    if len(columns) <= _FEW:
+        against = f'; changes against {since}' if _CHANGED in parts else ''
+        heads = [what or name for name in names for what in parts]
+        cells = [[part[row][c] for c in range(len(columns)) for part in parts.values()]
+                 for row in range(len(rows))]
+        return [title + against, *below, *_block(labels, heads, cells, width)]
+    lines = [title, *below]
+    for what, part in parts.items():
+        if what:
+            against = f', kPa, against {since}' if what == _CHANGED else ''
+            lines.append(f'{grid.title}, {what}{against}')
+        lines += _block(labels, names, part, width)
+    return lines
+
+
+def _legend(grid: Grid, since: str, rows: range, columns: range) -> list[str]:
+    """Return what is to be said of the marks of a grid and of what it leaves out."""
     legend = [f'{NEVER} never fired'] if grid.never[np.ix_(rows, columns)].any() else []
     if (grid.never & (np.abs(grid.change) >= _LEAST_KPA)).any() and grid.before.any():
         legend.append(grid.firing())
     if grid.change.any() and not grid.before.any():
         legend.append(f'all zero in {since}')
+    left_out = grid.values.size - len(rows) * len(columns)
     if left_out:
         legend.append(f'{left_out} rules at the borders are zero and never fired')
-    lines += [f'  ({"; ".join(legend)})'] if legend else []
-    values = _part(rows, columns, lambda r, c: _value(
-        float(grid.values[r, c]), bool(grid.never[r, c]), limit, colour))
-    largest = float(np.max(np.abs(grid.change)))
-    changes = _part(rows, columns, lambda r, c: _value(
-        float(grid.change[r, c]), abs(float(grid.change[r, c])) < _LEAST_KPA, largest, colour,
-        ''))
-    fired = _part(rows, columns, lambda r, c: _seconds(float(grid.fired_s[r, c]), colour))
-    names = [grid.columns.labels[c] for c in columns]
-    labels = [grid.rows.labels[r] for r in rows]
-    parts = [('', values), ('changed by', changes), ('fired, s', fired)]
-    told = largest >= _LEAST_KPA and grid.before.any()
-    if not told:
-        del parts[1]
-    if grid.never.all():
-        del parts[-1]
-    if len(columns) <= _FEW:
-        if told:
-            lines[0] += f'; changes against {since}'
-        heads = [name if not what else what for name in names for what, _ in parts]
-        cells = [[part[row][c] for c in range(len(columns)) for _, part in parts]
-                 for row in range(len(rows))]
-        return lines + _block(labels, heads, cells, width)
-    for what, part in parts:
-        if what:
-            against = f', kPa, against {since}' if what == 'changed by' else ''
-            lines.append(f'{grid.title}, {what}{against}')
-        lines += _block(labels, names, part, width)
-    return lines
+    return legend
+
+
+def _parts(grid: Grid, rows: range, columns: range, colour: bool
+           ) -> dict[str, list[list[tuple[str, str]]]]:
+    """Return the cells by what they say, '' for the values; what says nothing is left out."""
+    limit, largest = (float(np.max(np.abs(one))) for one in (grid.values, grid.change))
+    parts = {'': _part(rows, columns, lambda r, c: _value(
+        float(grid.values[r, c]), bool(grid.never[r, c]), limit, colour))}
+    if largest >= _LEAST_KPA and grid.before.any():
+        parts[_CHANGED] = _part(rows, columns, lambda r, c: _value(
+            float(grid.change[r, c]), abs(float(grid.change[r, c])) < _LEAST_KPA, largest, colour,
+            ''))
+    if not grid.never.all():
+        parts['fired, s'] = _part(
+            rows, columns, lambda r, c: _seconds(float(grid.fired_s[r, c]), colour))
+    return parts
 
 
 def _part(rows: range, columns: range,
