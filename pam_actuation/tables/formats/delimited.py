@@ -15,7 +15,8 @@
 """Text files with separators: CSV and its relatives."""
 
 import bz2
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterator
+import contextlib
 import gzip
 import io
 import lzma
@@ -27,7 +28,7 @@ import zlib
 import numpy as np
 from pam_actuation.tables.formats.damage import (
     check_quotes, NOT_CLOSED, WatchedText, whole_rows)
-from pam_actuation.tables.formats.layout_of_text import layout_of, SAMPLE_BYTES
+from pam_actuation.tables.formats.layout_of_text import layout_of, SAMPLE_BYTES, TextLayout
 from pam_actuation.tables.table import MOST_ROWS, Table
 from pam_sim.errors import InputError
 
@@ -42,15 +43,38 @@ _PACKED_FACTOR = 6                       # how much longer a packed text may be
 def read(path: str, every: int, wanted: Collection[str] | None,
          progress: Callable[[float], object]) -> list[Table]:
     """Return the table of a text file; see ``formats.read_tables``."""
-    import pandas as pd
+    layout = layout_of(_head(path), path)
+    frame, last = _frame(path, layout, every, _expected_rows(path, layout, every), progress)
+    lines = layout.first_line + np.arange(len(frame), dtype=np.int64) * every
+    check_quotes(frame, lines, path)
+    remarks = [layout.remark] if layout.remark else []
+    if every == 1 and len(frame) > 1 and last not in '\r\n':
+        frame, lines = frame.iloc[:-1], lines[:-1]
+        remarks.append('the last line has no end, so it may be incomplete: it was left out')
+    with _opened(path) as raw:
+        found = whole_rows(frame, lines, layout, io.TextIOWrapper(
+            raw, layout.encoding, newline=''), path)
+    frame, lines = frame[found.kept], lines[found.kept]
+    columns = {name: frame[place] for place, name in enumerate(layout.names)}
+    return [Table(path, columns, dict(zip(layout.names, layout.units)), lines,
+                  remarks=[*remarks, *found.remarks], numbered=found.numbered,
+                  called=layout.called, decimal=layout.decimal)]
+
+
+def _head(path: str) -> bytes:
+    """Return the begin of the file, unpacked."""
     try:
         with _opened(path) as stream:
-            head = stream.read(SAMPLE_BYTES)
+            head: bytes = stream.read(SAMPLE_BYTES)
     except (EOFError, lzma.LZMAError, OSError, zlib.error) as error:
         raise InputError(f'cannot be unpacked: {error}', path) from None
     if not head.strip():
         raise InputError('is empty', path)
-    layout = layout_of(head, path)
+    return head
+
+
+def _expected_rows(path: str, layout: TextLayout, every: int) -> float:
+    """Return about how many rows will be kept; InputError if these are far too many."""
     is_packed = os.path.splitext(path)[1].lower() in _OPEN
     rows = os.path.getsize(path) / layout.line_bytes * (_PACKED_FACTOR if is_packed else 1) / every
     if rows > MOST_ROWS and not is_packed:
@@ -58,10 +82,18 @@ def read(path: str, every: int, wanted: Collection[str] | None,
             f'has about {rows * every / 1e6:.0f} million rows, more than {MOST_ROWS // 10**6} '
             f'million; keep one of several, with --every {int(rows * every / MOST_ROWS) + 1}',
             path)
-    pieces, done = [], 0
-    try:
-        with _opened(path) as raw:
-            text = WatchedText(io.TextIOWrapper(raw, layout.encoding, newline=''), path, layout)
+    return rows
+
+
+def _frame(path: str, layout: TextLayout, every: int, expected_rows: float,
+           progress: Callable[[float], object]) -> 'tuple[pd.DataFrame, str]':
+    """Return one row of ``every``, and the last character of the file."""
+    import pandas as pd
+    pieces: list[pd.DataFrame] = []
+    done = 0
+    with _opened(path) as raw:
+        text = WatchedText(io.TextIOWrapper(raw, layout.encoding, newline=''), path, layout)
+        with _in_sentences(path, layout, text):
             reader = pd.read_csv(
                 text, sep=layout.separator, decimal=layout.decimal,
                 header=None, names=list(range(len(layout.names))), index_col=False,
@@ -72,11 +104,20 @@ def read(path: str, every: int, wanted: Collection[str] | None,
                 # A copy: a slice alone would keep the rows between in memory.
                 pieces.append(piece.iloc[-done % every::every].copy() if every > 1 else piece)
                 done += len(piece)
-                progress(min(done / max(rows * every, 1.0), 1.0))
+                progress(min(done / max(expected_rows * every, 1.0), 1.0))
                 if sum(map(len, pieces)) > MOST_ROWS:
                     raise InputError(
                         f'has more than {MOST_ROWS // 10**6} million rows; keep one of several, '
                         'with --every 10', path)
+    return pd.concat(pieces, ignore_index=True), text.last
+
+
+@contextlib.contextmanager
+def _in_sentences(path: str, layout: TextLayout, text: WatchedText) -> Iterator[None]:
+    """Turn what a text is refused with into one sentence, with the place in the file."""
+    import pandas as pd
+    try:
+        yield
     except pd.errors.ParserError as error:
         raise _row_error(str(error), path, layout.first_line, len(layout.names)) from None
     except pd.errors.EmptyDataError:
@@ -88,21 +129,6 @@ def read(path: str, every: int, wanted: Collection[str] | None,
     except (EOFError, lzma.LZMAError, zlib.error, gzip.BadGzipFile) as error:
         raise InputError(f'cannot be unpacked: {error}', f'{path}, after line {text.line}'
                          ) from None
-    frame = pd.concat(pieces, ignore_index=True)
-    lines = layout.first_line + np.arange(len(frame), dtype=np.int64) * every
-    check_quotes(frame, lines, path)
-    remarks = [layout.remark] if layout.remark else []
-    if every == 1 and len(frame) > 1 and text.last not in '\r\n':
-        frame, lines = frame.iloc[:-1], lines[:-1]
-        remarks.append('the last line has no end, so it may be incomplete: it was left out')
-    with _opened(path) as raw:
-        found = whole_rows(frame, lines, layout, io.TextIOWrapper(
-            raw, layout.encoding, newline=''), path)
-    frame, lines = frame[found.kept], lines[found.kept]
-    columns = {name: frame[place] for place, name in enumerate(layout.names)}
-    return [Table(path, columns, dict(zip(layout.names, layout.units)), lines,
-                  remarks=[*remarks, *found.remarks], numbered=found.numbered,
-                  called=layout.called, decimal=layout.decimal)]
 
 
 def _opened(path: str) -> Any:
