@@ -14,11 +14,12 @@
 
 """Whether the values of a mapped column can be what the user says, with the fix in words."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from pam_actuation.bags.plausibility import MAX_CONTRACTION, SHARE_HINT, value_findings
+from pam_actuation.bags.plausibility import (
+    Implausible, MAX_CONTRACTION, SHARE_HINT, value_findings)
 from pam_actuation.tables.mapping import ColumnMap
 from pam_actuation.tables.signals import BY_NAME, of_muscles, Signal
 from pam_actuation.tables.units import (
@@ -128,50 +129,102 @@ def _zero(signals: Mapping[str, tuple[IntArray, FloatArray]], mapped: Mapping[st
 
 def _of_values(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: float
                ) -> list[Doubt]:
-    apart = _apart(mapped, finite)
-    if apart is not None:
-        return [apart]
-    low, high = float(finite.min()), float(finite.max())
+    """Return the doubts on one signal by itself; the first that is certain stands alone."""
     wrong = value_findings('', signal.field, finite, lambda: length_m)
-    if any(one.unusable for one in wrong) or signal.quantity == LENGTH and (
-            high - low > 2.0 * MAX_CONTRACTION * length_m):
-        return [Doubt(f'{_shown(signal, low)} to {_shown(signal, high)}, which no rig has'
-                      f'{_fix(signal, mapped, finite, length_m)}', True)]
-    if wrong and signal.quantity == LENGTH:
-        turned = _turned(signal, mapped, finite, length_m)
-        if turned:
-            return [Doubt(f'{_shown(signal, low)} to {_shown(signal, high)}, which no muscle '
-                          f'shortens by; {turned}', True)]
+    certain = _apart(mapped, finite) or _impossible(signal, mapped, finite, length_m, wrong)
+    if certain is not None:
+        return [certain]
     no_hint = SHARE_HINT if mapped.unit.factor != 1.0 else ''      # so it is no share
     found = [Doubt(one.sentence.partition(': ')[2].removesuffix(no_hint).rstrip('.'))
              for one in wrong]
-    if low == high:
-        return [*found, Doubt(f'the value never changes ({_shown(signal, low)}): is the sensor '
-                              'connected?')]
+    if finite.min() == finite.max():
+        return [*found, Doubt(f'the value never changes ({_shown(signal, float(finite.min()))}): '
+                              'is the sensor connected?')]
+    looks = (_hardly_moves, _pulls_much, _pushes, _moves_no_muscle, _gauge_or_absolute,
+             _other_unit)
+    doubted = [look(signal, mapped, finite, length_m) for look in looks]
+    return [*found, *(doubt for doubt in doubted if doubt is not None)]
+
+
+def _impossible(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: float,
+                wrong: Sequence[Implausible]) -> Doubt | None:
+    """Return a doubt on values that no rig or no muscle has, None without."""
+    low, high = float(finite.min()), float(finite.max())
+    if any(one.unusable for one in wrong) or signal.quantity == LENGTH and (
+            high - low > 2.0 * MAX_CONTRACTION * length_m):
+        return Doubt(f'{_shown(signal, low)} to {_shown(signal, high)}, which no rig has'
+                     f'{_fix(signal, mapped, finite, length_m)}', True)
+    turned = _turned(signal, mapped, finite, length_m) if (
+        wrong and signal.quantity == LENGTH) else ''
+    if turned:
+        return Doubt(f'{_shown(signal, low)} to {_shown(signal, high)}, which no muscle '
+                     f'shortens by; {turned}', True)
+    return None
+
+
+def _moves_too_little(signal: Signal, finite: FloatArray) -> bool:
     least = LEAST_MOVE.get(signal.quantity)
-    if least is not None and high - low < least:
-        found.append(Doubt(f'it moves by {_shown(signal, high - low, difference=True)} only'
-                           f'{_fix(signal, mapped, finite, length_m)}'))
-    if signal.quantity == FORCE and max(high, -low) > MUCH_N:
-        found.append(Doubt(f'it reaches {_shown(signal, max(high, -low))}, more than a muscle '
-                           f'pulls{_fix(signal, mapped, finite, length_m)}'))
-    if signal.name.rpartition('/')[2] == 'force' and (
+    return least is not None and float(finite.max()) - float(finite.min()) < least
+
+
+# Each of these returns a doubt on the values of a signal, None without.
+
+def _hardly_moves(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: float
+                  ) -> Doubt | None:
+    if not _moves_too_little(signal, finite):
+        return None
+    moved = float(finite.max()) - float(finite.min())
+    return Doubt(f'it moves by {_shown(signal, moved, difference=True)} only'
+                 f'{_fix(signal, mapped, finite, length_m)}')
+
+
+def _pulls_much(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: float
+                ) -> Doubt | None:
+    most = max(float(finite.max()), -float(finite.min()))
+    if signal.quantity != FORCE or most <= MUCH_N:
+        return None
+    return Doubt(f'it reaches {_shown(signal, most)}, more than a muscle pulls'
+                 f'{_fix(signal, mapped, finite, length_m)}')
+
+
+def _pushes(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: float
+            ) -> Doubt | None:
+    low, high = float(finite.min()), float(finite.max())
+    if signal.name.rpartition('/')[2] != 'force' or not (
             float(np.median(finite)) < -PUSH_N and -low > FAR * high):
-        other = replace(mapped, gain=-mapped.gain)
-        found.append(Doubt(f'it is negative nearly throughout, down to {_shown(signal, low)}, and '
-                           'a pull is positive; if it counts the other way, write '
-                           f'{other.option(signal.name)}'))
-    if signal.quantity == PRESSURE and P_ATM_PA < high < P_ATM_PA + SMALL_GAUGE_PA and not (
-            least is not None and high - low < least):
-        found.append(Doubt(f'it reaches {_shown(signal, high)} only, at which no muscle moves'
-                           f'{_fix(signal, mapped, finite, length_m)}'))
-    if signal.quantity == PRESSURE:
-        found += _gauge_or_absolute(mapped, low)
-    said = unit_of_text(unit_in(mapped.column), signal.quantity) if unit_in(mapped.column) \
-        else None
-    if said is not None and said.factor != mapped.unit.factor and mapped.gain == 1.0:
-        found.append(Doubt(f'the name of the column says {said.name}'))
-    return found
+        return None
+    other = replace(mapped, gain=-mapped.gain)
+    return Doubt(f'it is negative nearly throughout, down to {_shown(signal, low)}, and a pull is '
+                 f'positive; if it counts the other way, write {other.option(signal.name)}')
+
+
+def _moves_no_muscle(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: float
+                     ) -> Doubt | None:
+    high = float(finite.max())
+    if signal.quantity != PRESSURE or _moves_too_little(signal, finite) or not (
+            P_ATM_PA < high < P_ATM_PA + SMALL_GAUGE_PA):
+        return None
+    return Doubt(f'it reaches {_shown(signal, high)} only, at which no muscle moves'
+                 f'{_fix(signal, mapped, finite, length_m)}')
+
+
+def _gauge_or_absolute(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: float
+                       ) -> Doubt | None:
+    """Ask about a gauge pressure that ends where an absolute one does when vented."""
+    if signal.quantity != PRESSURE or not mapped.unit.name.endswith(GAUGE) or (
+            abs(float(finite.min()) - 2.0 * P_ATM_PA) >= NEAR_ATMOSPHERE_PA):
+        return None
+    return Doubt('it falls to 1 atmosphere gauge and never below: is it absolute? '
+                 f'Then write {mapped.unit.name.replace(GAUGE, ABSOLUTE)}')
+
+
+def _other_unit(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: float
+                ) -> Doubt | None:
+    in_name = unit_in(mapped.column)
+    said = unit_of_text(in_name, signal.quantity) if in_name else None
+    if said is None or said.factor == mapped.unit.factor or mapped.gain != 1.0:
+        return None
+    return Doubt(f'the name of the column says {said.name}')
 
 
 def _raw(mapped: ColumnMap, values: FloatArray) -> FloatArray:
@@ -212,16 +265,6 @@ def _turned(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: flo
             replace(mapped, zero=float(f'{least:.6g}'))]
     return (f'if it is the length of the muscle, write {ways[0].option(signal.name)}, with its '
             f'length at rest; if only the zero is off, {ways[1].option(signal.name)}')
-
-
-def _gauge_or_absolute(mapped: ColumnMap, low: float) -> list[Doubt]:
-    """Ask about a gauge pressure that ends where an absolute one does when vented."""
-    if not mapped.unit.name.endswith(GAUGE):
-        return []
-    if abs(low - 2.0 * P_ATM_PA) < NEAR_ATMOSPHERE_PA:
-        return [Doubt('it falls to 1 atmosphere gauge and never below: is it absolute? '
-                      f'Then write {mapped.unit.name.replace(GAUGE, ABSOLUTE)}')]
-    return []
 
 
 def _fix(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: float) -> str:
