@@ -33,8 +33,9 @@ Written by ``to_yaml`` for recordings, which must not depend on anything else: `
 see ``lqi_files``.
 """
 
+from collections.abc import Callable
 import os
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 from pam_actuation.control.compiled_controller import CompiledController
 from pam_actuation.control.controller_text import INDEX_FORMS
@@ -170,16 +171,12 @@ def controller_from_tree(tree: Located, rig: 'JointRig | Rig | None' = None, fol
 
 
 def _built(tree: Located, rig: 'JointRig | Rig | None', folder: str) -> Controller:
+    """Return the controller that a file asks for, by its kind."""
     kind = tree.require('controller', str, choices=_KINDS)
     for key in tree:
         if key not in _NAMES + names_of(OWN_KEYS[kind]):
             raise tree.error(f'a {kind} controller has no `{key}`', key)
-    located = tree.get('settings', dict)
-    settings = dict(located.plain()) if located is not None else {}
-    where = located.where if located is not None else tree.where
-    if kind == 'sofc' and isinstance(settings.get('index_form'), str):
-        form = located.require('index_form', str, choices=INDEX_FORMS)
-        settings['index_form'] = float(INDEX_FORMS.index(form))
+    settings, where = _settings(tree, kind)
     mode = read_mode(tree, rig)
     identity = tree.get('rig', str, default=rig_identity(rig) if rig is not None else '')
     if kind in ('lqi', 'mpc') and isinstance(rig, JointRig):
@@ -195,25 +192,41 @@ def _built(tree: Located, rig: 'JointRig | Rig | None', folder: str) -> Controll
     if kind == 'mpc':
         assert not isinstance(rig, JointRig)
         return mpc_from_tree(tree, rig, inverse, settings, identity, where)
+    controller: PidController | SelfOrganizingFuzzyController
     if kind == 'pid':
-        pid = PidController(inverse, settings, identity, where)
-        return pid if mode is None else mode.wrap(pid)
-    controller = SelfOrganizingFuzzyController(
-        inverse, settings, rig_name=identity, where=where)
-    if mode is not None:
-        controller.rules.scaling.update(mode.rule_scaling())
+        controller = PidController(inverse, settings, identity, where)
+    else:
+        controller = SelfOrganizingFuzzyController(
+            inverse, settings, rig_name=identity, where=where)
+        if mode is not None:
+            controller.rules.scaling.update(mode.rule_scaling())
+        _give_rules(controller, tree, folder)
+    return controller if mode is None else mode.wrap(controller)
+
+
+def _settings(tree: Located, kind: str) -> tuple[dict[str, Any], Callable[..., str]]:
+    """Return the settings of a file as numbers, and what tells where each of them stands."""
+    located = tree.get('settings', dict)
+    if located is None:
+        return {}, tree.where
+    settings = dict(located.plain())
+    if kind == 'sofc' and isinstance(settings.get('index_form'), str):
+        form = located.require('index_form', str, choices=INDEX_FORMS)
+        settings['index_form'] = float(INDEX_FORMS.index(form))
+    return settings, located.where
+
+
+def _give_rules(controller: SelfOrganizingFuzzyController, tree: Located, folder: str) -> None:
+    """Give a controller the rules of its file, if there are any."""
     if 'rules' in tree and 'initial_rules' in tree:
         raise tree.error('give either `rules` or `initial_rules`, not both', 'rules')
-    rules = None
     if 'rules' in tree:
         path = os.path.join(folder, os.path.expanduser(tree.require('rules', str)))
-        rules = load_rules(path, controller.rules)
+        controller.rules.assign(load_rules(path, controller.rules))
     elif 'initial_rules' in tree:
         mapping = tree.require('initial_rules', dict).plain()
-        rules = rules_from_mapping(mapping, tree.where('initial_rules'), controller.rules)
-    if rules is not None:
-        controller.rules.assign(rules)
-    return controller if mode is None else mode.wrap(controller)
+        controller.rules.assign(
+            rules_from_mapping(mapping, tree.where('initial_rules'), controller.rules))
 
 
 def _static_inverse(tree: Located, rig: 'JointRig | Rig | None',

@@ -26,7 +26,7 @@ asked for where none was there and the rivals stay together without it.
 from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 import tempfile
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -122,40 +122,60 @@ def next_experiment(
         Whether a load cell that was not recorded may be asked for.
 
     """
-    truth = rivals[0][1].with_(sensors=_sensors(noise))
     known = menu(rig.valve)
+    found = _tried(rig, rivals, {name: known[name] for name in pieces or known}, recorded, noise,
+                   out_of_time, may_add_cell)
+    if not found:
+        return None
+    best = max(found)
+    # The rig's own forms blur a part of what is told: the next best piece follows.
+    others = [one for one in found if one.name != best.name and one.with_cell == best.with_cell]
+    plain = _experiment(known, [best.name, *([max(others).name] if others else [])])
+    needs = ['pressure', 'contraction', *(['force'] if best.with_cell else [])]
+    names = [rival[0] for rival in rivals]
+    text = (f'{plain["description"]}. Run with {names[0]} as the truth, the first part leaves '
+            f'{" and ".join(names[1:])} off by {best.sigma:.2g} noise floors per sample after '
+            'refit.')
+    if best.with_cell:
+        text += ' It needs a load cell, which the recording does not have.'
+    return {'name': plain['name'], 'why': text, 'separation_sigma': best.sigma,
+            'needs': needs, 'experiment': {**plain, 'needs': needs}}
+
+
+class _Tried(NamedTuple):
+    """One piece of the menu, in the order of what is better."""
+
+    is_clear: bool          # decides beyond doubt, without a further sensor
+    certainty: float        # of that, 1 at most
+    sigma: float            # noise floors per sample that the nearest rival is left off by
+    name: str
+    with_cell: bool
+
+
+def _tried(rig: Rig, rivals: Sequence[Rival], pieces: Menu, recorded: Collection[str],
+           noise: Mapping[str, float], out_of_time: Callable[[], bool], may_add_cell: bool
+           ) -> list[_Tried]:
+    """Return how well each piece separates the rivals; one that cannot run is left out."""
+    truth = rivals[0][1].with_(sensors=_sensors(noise))
     runs: dict[str, RecordedRun] = {}
-    found: list[tuple[tuple[bool, float, float], str, bool]] = []
+    found: list[_Tried] = []
     # A load cell that was not recorded is tried only where nothing is clear enough without it.
     for with_cell in (False, True) if may_add_cell and 'force' not in recorded else (False,):
-        if any(is_clear for (is_clear, _, _), _, _ in found):
+        if any(one.is_clear for one in found):
             break
-        for name in pieces or known:
+        for name in pieces:
             if out_of_time() and found:
                 break
             try:
                 if name not in runs:
-                    runs[name] = simulated(_experiment(known, [name]), truth)
+                    runs[name] = simulated(_experiment(pieces, [name]), truth)
                 sigma, sure = separation(
                     runs[name], rig, rivals, with_cell or 'force' in recorded)
             except InputError:
                 continue
-            rank = (not with_cell and sure >= 1.0 and sigma > CLEAR, min(sure, 1.0), sigma)
-            found.append((rank, name, with_cell))
-    if not found:
-        return None
-    (_, _, sigma), best, with_cell = max(found)
-    # The rig's own forms blur a part of what is told: the next best piece follows.
-    others = [f[:2] for f in found if f[1] != best and f[2] == with_cell]
-    plain = _experiment(known, [best, *([max(others)[1]] if others else [])])
-    needs = ['pressure', 'contraction', *(['force'] if with_cell else [])]
-    names = [r[0] for r in rivals]
-    text = (f'{plain["description"]}. Run with {names[0]} as the truth, the first part leaves '
-            f'{" and ".join(names[1:])} off by {sigma:.2g} noise floors per sample after refit.')
-    if with_cell:
-        text += ' It needs a load cell, which the recording does not have.'
-    return {'name': plain['name'], 'why': text, 'separation_sigma': sigma,
-            'needs': needs, 'experiment': {**plain, 'needs': needs}}
+            is_clear = not with_cell and sure >= 1.0 and sigma > CLEAR
+            found.append(_Tried(is_clear, min(sure, 1.0), sigma, name, with_cell))
+    return found
 
 
 def not_played(valve: str, names: Collection[str]) -> tuple[str, ...]:
