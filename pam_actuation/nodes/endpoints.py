@@ -207,6 +207,14 @@ class PolledSubscription:
             self._wait_set.add_subscription(handle)
             self._wait_set.wait(round(timeout_s * 1e9))
 
+    def remarks(self) -> list[str]:
+        """Return a sentence on each way in which others do not send what is to be read here."""
+        found, names = self.mismatches.sentences(), getattr(self._read, 'names', ())
+        if len(names) > 1:
+            found.append(f'{self.topic} has {len(names)} entries ({", ".join(names)}), and the '
+                         'first one counts here; give each a topic of its own')
+        return found
+
     @property
     def publishers(self) -> int:
         """Return the number of publishers this subscription is matched with."""

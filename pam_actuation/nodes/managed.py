@@ -431,8 +431,7 @@ class ManagedNode(LifecycleNode):
         # What was killed before this node began is not on its graph.
         remarks = [] if count < 2 else [
             f'{count} nodes are named {self.get_fully_qualified_name()}, end all but one']
-        remarks += [text for one in self.subscriptions_polled
-                    for text in one.mismatches.sentences()]
+        remarks += [text for one in self.subscriptions_polled for text in one.remarks()]
         self.diagnostics.remark = '; '.join(remarks)
         self.diagnostics.send()
 

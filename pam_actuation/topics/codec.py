@@ -28,7 +28,7 @@ from typing import Any
 
 import numpy as np
 from pam_actuation.topics import cdr
-from pam_actuation.topics.contents import Encode, Make, Numeric
+from pam_actuation.topics.contents import Encode, JOINT_STATE, Make, Numbers, Numeric
 from pam_actuation.topics.definitions import little_endian
 from pam_actuation.topics.table import topic_of
 from pam_sim.annotations import ByteArray, FloatArray, IntArray
@@ -150,12 +150,19 @@ class Reader:
     topic : str
         Short or full topic name.
 
+    Attributes
+    ----------
+    names : tuple of str
+        The entries of a JointState of which the first alone counts, as last seen.
+
     """
 
     def __init__(self, topic: str) -> None:
         row = topic_of(topic)
         self._content, self._numeric = row.content, row.numeric
         self.type_name = row.type_name
+        self.names: tuple[str, ...] = ()
+        self._first_counts = isinstance(row.content, Numbers) and row.type_name == JOINT_STATE
         self._layout: _Layout | None = None
 
     def __call__(self, raw: bytes) -> Any:
@@ -177,6 +184,8 @@ class Reader:
         if self._numeric is None or raw[:2] != cdr.ENCAPSULATION[:2]:
             return self._content.decode(little_endian(raw, self.type_name))
         layout = self._layout = _learned(self._numeric, raw)
+        if self._first_counts:
+            self.names = cdr.joint_numbers(raw).names
         return self._content.decode(raw) if layout is None else layout.message(raw)
 
 

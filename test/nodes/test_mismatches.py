@@ -29,12 +29,13 @@ from pam_actuation.nodes.parameters import unused_qos                       # no
 from pam_actuation.nodes.simulated_time import FollowedTime                 # noqa: E402
 from pam_actuation.rigging.client import local_context                      # noqa: E402
 from pam_actuation.rigging.domain import DomainLock                         # noqa: E402
+from pam_actuation.topics.codec import Reader                               # noqa: E402
 import rclpy                                                                # noqa: E402
 from rclpy.node import Node                                                 # noqa: E402
 from rclpy.parameter import Parameter                                       # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy       # noqa: E402
 from rosgraph_msgs.msg import Clock                                         # noqa: E402
-from sensor_msgs.msg import FluidPressure                                   # noqa: E402
+from sensor_msgs.msg import FluidPressure, JointState                       # noqa: E402
 
 pytestmark = [pytest.mark.ros, pytest.mark.shared]
 
@@ -129,6 +130,28 @@ def test_a_clock_that_is_offered_best_effort_is_followed(nodes):
     wait_for(arrived, 10.0, 'the time of the clock')
     followed.close()
     player.destroy_publisher(clock)
+
+
+def test_a_message_of_several_joints_is_told(nodes):
+    """As that of ``/joint_states``: the controller of either knee would follow the first one."""
+    listener, sensor = nodes
+    subscription = PolledSubscription(
+        listener, JointState, '/joint_states', raw=True, read=Reader('joint_state'))
+    publisher = sensor.create_publisher(JointState, '/joint_states', qos.PUBLISHER)
+    wait_for(lambda: subscription.publishers == 1, 10.0, 'the publisher')
+
+    def after(names):
+        publisher.publish(JointState(name=names, position=[0.1] * len(names)))
+        wait_for(subscription.take, 10.0, 'the message')
+        return subscription.remarks()
+
+    assert after(['left_knee']) == []
+    assert after(['left_knee', 'right_knee']) == [
+        '/joint_states has 2 entries (left_knee, right_knee), and the first one counts here; give '
+        'each a topic of its own']
+    assert after(['left_knee']) == []
+    subscription.destroy()
+    sensor.destroy_publisher(publisher)
 
 
 def test_another_mismatch_is_told_by_its_reason(nodes):
