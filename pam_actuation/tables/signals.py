@@ -87,9 +87,9 @@ SIGNALS = (
     Signal('reference_force', 'reference', 'force_n', FORCE,
            r'(f|force) ?(ref|reference|set|setpoint|des|desired|target)', 'wanted force'),
     Signal('force', 'force', 'force_n', FORCE,
-           r'f|f ?(1|x|z|m|meas|measured|is|ist)|force ?(1|x|z|is|act|actual|meas|measured|sensor|cell)?|'
-           r'load ?cell|load|tension|(measured|muscle|pam|actual) force',
-           'force along the muscle'),
+           r'f|f ?(1|x|z|m|meas|measured|is|ist)|'
+           r'force ?(1|x|z|is|act|actual|meas|measured|sensor|cell)?|load ?cell|load|tension|'
+           r'(measured|muscle|pam|actual) force', 'force along the muscle'),
     Signal('fill_duty', 'valve_signal', 'fill_duty', DUTY,
            r'(duty |d |pwm )?(fill|in|inlet|charge|supply)( duty| pwm| valve)?|fill duty',
            'duty of the fill valve'),
@@ -120,8 +120,7 @@ ALLOWED = (f'{", ".join(one.name for one in SIGNALS)}; of a joint '
            f'{" or ".join(f"{side}/" for side in SIDES)}')
 # Words that other programs have for the sides.
 _SIDE_WORDS = {'flexor': 'flexor', 'flex': 'flexor', 'agonist': 'flexor', 'ago': 'flexor',
-               'extensor': 'extensor', 'antago': 'extensor',
-               'antagonist': 'extensor'}
+               'extensor': 'extensor', 'antagonist': 'extensor', 'antago': 'extensor'}
 TIME_WORDS = (r't|time|t ?(nominal|rel|s)|time ?stamp|stamp|elapsed( time)?|timer|clock|'
               r'seconds|sec|date ?time|date')
 
