@@ -26,6 +26,8 @@ from pam_actuation.cli.options import count, number, out_path, Parser, source
 
 if TYPE_CHECKING:
     from pam_actuation.bags.load import RecordedRun
+    from pam_actuation.control.compiled_controller import CompiledController
+    from pam_actuation.control.modes.joint import JointController
     from pam_actuation.experiments.experiment import Experiment
     from pam_sim.joint.rig import JointRig
     from pam_sim.rig import Rig
@@ -89,32 +91,18 @@ def add_arguments(parser: Parser) -> None:
 def run(args: argparse.Namespace) -> int | None:
     """Tune; exit code 1 where the held-out check did not improve or the model is wrong."""
     from pam_actuation.bags.load_joint import load_recording
-    from pam_actuation.control.config import load_controller
-    from pam_actuation.control.modes.force import ForceController
-    from pam_actuation.control.modes.tracked import CONTRACTION, JOINT, tracked_by
     from pam_actuation.report.tuning_page import tuning_report
     from pam_actuation.tuning.random_rigs import random_rigs
     from pam_actuation.tuning.recording import check_recordings
     from pam_actuation.tuning.tune import HELD_OUT_SEED, tune
-    from pam_sim.errors import InputError
     from pam_sim.files import whole_files
-    from pam_sim.joint import JointRig, load_rig_or_joint
+    from pam_sim.joint import load_rig_or_joint
     written = _targets(args)
     runs = [load_recording(bag) for bag in args.bag]
     note_implausible(args, runs, must_be_right=True)
     rig = load_rig_or_joint(_rig_source(args, runs), args.valve)
     _check_kind(runs, rig)
-    controller = load_controller(
-        args.controller or _first(runs, 'controller') or _preset(args, rig),
-        rig, rules_file=args.rules, accept_other_rig=args.accept_other_rig)
-    wanted = JOINT if isinstance(rig, JointRig) else CONTRACTION
-    if isinstance(controller, ForceController) or tracked_by(controller) != wanted:
-        raise InputError(f'has `mode: {tracked_by(controller).mode}`; only what tracks '
-                         f'{wanted.topic} can be tuned on {rig.name}', 'controller')
-    if wanted == JOINT and controller.kind != 'sofc':
-        raise InputError(f'is a {controller.kind} controller; of a joint only sofc controllers '
-                         'can be tuned', 'controller')
-    controller.freeze_learning = args.freeze
+    controller = _controller(args, runs, rig)
     experiments, check = _experiments(args, runs, rig)
     rigs = [rig, *random_rigs(rig, args.randomise, args.seed)]
     others = [rig, *random_rigs(rig, args.randomise, args.seed + HELD_OUT_SEED)]
@@ -139,6 +127,28 @@ def run(args: argparse.Namespace) -> int | None:
                     *(f'{key}: {path}' for key, path in written.items())]))
     wrong = any(one.model is not None and one.model.verdict == 'wrong' for one in recordings)
     return EXIT_DONE if result.improved and not wrong else EXIT_FINDING
+
+
+def _controller(args: argparse.Namespace, runs: 'list[RecordedRun]',
+                rig: 'Rig | JointRig') -> 'CompiledController | JointController':
+    """Return the controller to tune: the one given, that of the first bag, or the preset."""
+    from pam_actuation.control.config import load_controller
+    from pam_actuation.control.modes.force import ForceController
+    from pam_actuation.control.modes.tracked import CONTRACTION, JOINT, tracked_by
+    from pam_sim.errors import InputError
+    from pam_sim.joint import JointRig
+    controller = load_controller(
+        args.controller or _first(runs, 'controller') or _preset(args, rig),
+        rig, rules_file=args.rules, accept_other_rig=args.accept_other_rig)
+    wanted = JOINT if isinstance(rig, JointRig) else CONTRACTION
+    if isinstance(controller, ForceController) or tracked_by(controller) != wanted:
+        raise InputError(f'has `mode: {tracked_by(controller).mode}`; only what tracks '
+                         f'{wanted.topic} can be tuned on {rig.name}', 'controller')
+    if wanted == JOINT and controller.kind != 'sofc':
+        raise InputError(f'is a {controller.kind} controller; of a joint only sofc controllers '
+                         'can be tuned', 'controller')
+    controller.freeze_learning = args.freeze
+    return controller
 
 
 def _targets(args: argparse.Namespace) -> dict[str, str]:
