@@ -24,6 +24,7 @@ from pam_actuation.control.sofc import dynamics, muscle_model
 from pam_actuation.control.sofc.controller import SelfOrganizingFuzzyController
 from pam_actuation.control.sofc.muscle_model import MODEL
 from pam_actuation.control.sofc.persistence import load_rules, rules_from_mapping
+from pam_actuation.control.sofc.records import OUTPUT
 from pam_actuation.control.sofc.rule_text import digest_of, MOST_SETS, rules_to_mapping
 from pam_actuation.control.sofc.settings import PARAMETERS
 from pam_actuation.control.sofc.words import sentence
@@ -249,6 +250,21 @@ def test_the_inertia_grows_with_contraction_as_the_integral_does(inverse):
         par, st = fields(controller.parameters, PARAMETERS), fields(zeros(MODEL), MODEL)
         found = [muscle_model.inertia_pa_s2_per_m(par, st, x_m) for x_m in (0.02, 0.01)]
         assert found == pytest.approx([17000.0 * share for share in shares])
+
+
+def test_the_feed_forward_takes_a_factor_of_the_inertia(inverse):
+    moving_pa = []
+    for factor in (1.0, 1.3):
+        controller = controller_with(
+            inverse, rate_feedforward_pa_s_per_m=0.0, valve_lag_s=0.0, path_learning=0.0,
+            acceleration_feedforward_pa_s2_per_m=17000.0, inertia_feedforward=factor)
+        out = fields(controller._outputs, OUTPUT)
+        for tick in range(8):
+            rate = 0.5 * tick * PERIOD_S
+            controller.step(0.014, 0.014, 0.0, 0.014, rate, False, pressure_pa=3e5)
+        moving_pa.append(float(out.dynamic_feedforward_pa))
+    assert moving_pa[0] > 1e3
+    assert moving_pa[1] == pytest.approx(1.3 * moving_pa[0])
 
 
 @pytest.mark.parametrize('time_s, expected_pa, found_pa', [

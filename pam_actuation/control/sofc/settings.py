@@ -162,6 +162,8 @@ SETTINGS = (
             'share of the friction found that grows with the pressure; 0 = the same everywhere'),
     setting('inertia_growth', '-', 0.0, 0.0, 1.0,
             'share of the inertia that grows with contraction as the integral does'),
+    setting('inertia_feedforward', '-', 1.0, 0.5, 2.0,
+            'factor of the inertia found in the feed-forward: creep and noise make it too small'),
     setting('model_drift_pa', 'Pa', 500.0, 0.0, 1e6, 'change of each such number in a second'),
     setting('creep_time_s', 's', 0.0, 0.0, 100.0,
             'time constant of the creep whose pressure is a number of the model; 0 = none'),

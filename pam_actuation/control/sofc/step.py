@@ -285,7 +285,7 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
         path = (muscle_model.rules_pa(par, path_rules, model.lead_path, lead)
                 + muscle_model.numbers_pa(par, model, model.lead_path, lead, base))
         damping = muscle_model.damping_pa_s_per_m(par, model, lead_rate)
-        inertia = muscle_model.inertia_pa_s2_per_m(par, model, lead)
+        inertia = par.inertia_feedforward * muscle_model.inertia_pa_s2_per_m(par, model, lead)
     dynamic = dynamics.dynamic_pressure_pa(
         par, st, base + par.lag_share * path, lead_rate,
         st.history_ticks < 0.5 or lead_jump != 0.0, damping, inertia,
