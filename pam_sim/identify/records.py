@@ -136,9 +136,10 @@ def offer_of(run: Run, rig: Rig, added_kg: float = 0.0) -> Offer:
     if recording.grid_s[-1] < LEAST_DURATION_S:
         raise InputError(f'has {recording.grid_s[-1]:.2f} s in which all its signals are there; '
                          f'at least {LEAST_DURATION_S:g} s are needed', where)
-    kinds = [word for word, there in (
-        ('valve', valve), ('muscle at a held length' if held else 'muscle and load', mechanics))
-        if there]
+    muscle = ('muscle and load' if not held else
+              'muscle at a measured length' if contraction and not _is_held(run, rig) else
+              'muscle at a held length')
+    kinds = [word for word, there in (('valve', valve), (muscle, mechanics)) if there]
     kind = ' and '.join(kinds) + (f'; the valve is left out: {missed}' if missed else '')
     return Offer(where, recording, valve, mechanics, kind, added_kg)
 
