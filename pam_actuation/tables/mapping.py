@@ -17,8 +17,10 @@
 from collections.abc import Iterable, Mapping as MappingOf
 from dataclasses import dataclass, field, replace
 import math
+import re
 from typing import Any
 
+import numpy as np
 from pam_actuation.tables.signals import ALLOWED, signal_of
 from pam_actuation.tables.units import checked_unit, DATE, TIME, Unit
 from pam_sim.annotations import FloatArray
@@ -28,12 +30,15 @@ from pam_sim.keys import Key, names_of
 from pam_sim.located_yaml import dump_yaml, load_yaml, Located
 
 LEAST_RATE_HZ, MOST_RATE_HZ = 0.1, 1e6
-SYNTAX = 'COLUMN:UNIT[:zero=Z][:gain=G]'
+SYNTAX = 'COLUMN:UNIT[:zero=Z][:gain=G][:missing=N]'
+_NUMBER = re.compile(r'\s*(zero|gain|missing)\s*=')
 COLUMN_KEYS = (
     Key('column', str, 'name of the column, or its number such as `#3`', required=True),
     Key('unit', str, 'unit of the column, such as `bar_gauge`', required=True),
     Key('zero', float, 'value of the column that means 0', 0.0),
-    Key('gain', float, 'units for each step of the column; -1 turns the sign round', 1.0))
+    Key('gain', float, 'units for each step of the column; -1 turns the sign round', 1.0),
+    Key('missing', float, 'number that stands for a missing value, such as 0 of a broken wire',
+        otherwise='none'))
 TIME_KEYS = (COLUMN_KEYS[0], Key(
     'unit', str, '`s`, `ms`, `us`, `ns`, `min`, `h`, or `date`', otherwise='from the name'))
 KEYS = (
@@ -56,6 +61,8 @@ class ColumnMap:
         Of the result, before SI.
     zero, gain : float
         Such as 0.5 and 2.5 for a sensor of 0.5 to 4.5 V that means 0 to 10 bar.
+    missing : float, optional
+        Number in the column that stands for a missing value.
     where : str
         Where the user said so, for messages.
 
@@ -65,10 +72,13 @@ class ColumnMap:
     unit: Unit
     zero: float = 0.0
     gain: float = 1.0
+    missing: float | None = None
     where: str = field(default='', compare=False)
 
     def to_si(self, values: FloatArray) -> FloatArray:
-        """Return the numbers of the column in SI, pressures absolute."""
+        """Return the numbers of the column in SI, pressures absolute; NaN where missing."""
+        if self.missing is not None:
+            values = np.where(values == self.missing, np.nan, values)
         if self.zero or self.gain != 1.0:
             values = (values - self.zero) * self.gain
         return self.unit.to_si(values)
@@ -80,12 +90,15 @@ class ColumnMap:
             entry['zero'] = self.zero
         if self.gain != 1.0:
             entry['gain'] = self.gain
+        if self.missing is not None:
+            entry['missing'] = self.missing
         return entry
 
     def option(self, name: str) -> str:
         """Return the words of the command line that say the same."""
         more = (f':zero={self.zero:g}' if self.zero else '') + (
-            f':gain={self.gain:g}' if self.gain != 1.0 else '')
+            f':gain={self.gain:g}' if self.gain != 1.0 else '') + (
+            f':missing={self.missing:g}' if self.missing is not None else '')
         return f'--map {name}="{self.column}:{self.unit.name}{more}"'
 
 
@@ -157,11 +170,11 @@ class TableMapping:
 
 
 def column_of_text(signal: str, text: str, where: str) -> ColumnMap:
-    """Return what ``COLUMN:UNIT[:zero=Z][:gain=G]`` says of a signal; InputError if it cannot."""
+    """Return what a text such as ``SYNTAX`` says of a signal; InputError if it cannot."""
     quantity = signal_of(signal, where).quantity
     column, words = _split(text)
-    numbers = {'zero': 0.0, 'gain': 1.0}
-    while words and words[-1].partition('=')[0].strip() in numbers and '=' in words[-1]:
+    numbers: dict[str, float] = {}
+    while words and _NUMBER.match(words[-1]):
         key, _, value = words.pop().partition('=')
         numbers[key.strip()] = _number(value, key.strip(), where)
     if len(words) > 1:
@@ -171,7 +184,7 @@ def column_of_text(signal: str, text: str, where: str) -> ColumnMap:
             f'the unit is missing: write {signal}="{column}:UNIT", such as '
             f'{signal}="{column}:{_usual(quantity)}"', where)
     return _checked(ColumnMap(column, checked_unit(words[0], quantity, where),
-                              numbers['zero'], numbers['gain'], where))
+                              where=where, **numbers))
 
 
 def load_mapping(path: StrPath) -> TableMapping:
@@ -198,10 +211,10 @@ def load_mapping(path: StrPath) -> TableMapping:
     for name, entry in signals_key.read(tree).items():
         quantity = signal_of(name, tree['signals'].where(name)).quantity
         entry = tree['signals'].require(name, dict).check_keys(names_of(COLUMN_KEYS))
-        _, unit, zero, gain = COLUMN_KEYS
+        _, unit, zero, gain, missing = COLUMN_KEYS
         signals[name] = _checked(ColumnMap(
             _column(entry), checked_unit(unit.read(entry), quantity, entry.where('unit')),
-            zero.read(entry), gain.read(entry), entry.where()))
+            zero.read(entry), gain.read(entry), missing.read(entry), entry.where()))
     return TableMapping(signals, time, rate_hz)
 
 
@@ -210,10 +223,12 @@ def _column(entry: Located) -> str:
 
 
 def _checked(one: ColumnMap) -> ColumnMap:
-    if one.gain == 0.0 or not math.isfinite(one.gain) or not math.isfinite(one.zero):
+    if one.gain == 0.0 or not all(map(math.isfinite, (
+            one.gain, one.zero, one.missing or 0.0))):
+        more = '' if one.missing is None else f', missing = {one.missing:g}'
         raise InputError(
-            f'zero = {one.zero:g} and gain = {one.gain:g}; allowed are finite numbers, and a '
-            'gain that is not 0', one.where)
+            f'zero = {one.zero:g} and gain = {one.gain:g}{more}; allowed are finite numbers, and '
+            'a gain that is not 0', one.where)
     return one
 
 

@@ -25,7 +25,7 @@ from pam_actuation.tables.signals import BY_NAME, of_muscles, Signal
 from pam_actuation.tables.units import (
     ABSOLUTE, ANGLE, FORCE, GAUGE, LENGTH, names_of, PRESSURE, unit_of_text)
 from pam_actuation.tables.words import unit_in
-from pam_sim.annotations import FloatArray, IntArray
+from pam_sim.annotations import BoolArray, FloatArray, IntArray
 from pam_sim.units import P_ATM_PA
 
 FAR = 20.0                           # times the range of the others: no value of the rig
@@ -42,6 +42,8 @@ LEAST_MOVE = {PRESSURE: 200.0, LENGTH: 5e-5, FORCE: 0.2, ANGLE: 2e-3}
 NEAR_ATMOSPHERE_PA = 5e3
 EMPTY_PA = 10e3                      # gauge, below which no muscle holds a load up
 FEWEST_EMPTY = 3                     # values there
+MOST_DROPPED = 0.1                   # of the values; more zeros are no sensor that drops out
+DROP_STEPS = 1.5                     # times the largest other step: into a zero and out of it
 KEPT_SHARE = 0.03                    # of the length: more than friction and creep keep
 
 
@@ -68,8 +70,8 @@ def doubts(signals: Mapping[str, tuple[IntArray, FloatArray]], mapped: Mapping[s
         Length of the muscle at rest, for its largest contraction.
 
     """
-    found = []
-    for name, (_, column) in signals.items():
+    found, whole = [], dict(signals)
+    for name, (stamp_ns, column) in signals.items():
         signal, finite = BY_NAME[name], column[np.isfinite(column)]
         said = f'{name} (column "{mapped[name].column}" in {mapped[name].unit.name})'
         lost = len(column) - len(finite)
@@ -79,15 +81,39 @@ def doubts(signals: Mapping[str, tuple[IntArray, FloatArray]], mapped: Mapping[s
         if lost:
             found.append(Doubt(f'{said}: {lost} of {len(column)} values are missing and were '
                                'left out'))
+        dropped = _dropped(mapped[name], column)
+        if dropped.any():
+            found.append(Doubt(
+                f'{said}: {int(dropped.sum())} of {len(column)} values are 0, and the signal '
+                'jumps there and back; if the sensor drops out, write '
+                f'{replace(mapped[name], missing=0.0).option(name)}'))
+            finite = column[np.isfinite(column) & ~dropped]
+            whole[name] = stamp_ns, np.where(dropped, np.nan, column)
         found += [Doubt(f'{said}: {one.sentence}', one.is_wrong)
                   for one in _of_values(signal, mapped[name], finite, length_m)]
     for place, names in of_muscles(signals).items():
         if {'pressure', 'contraction'} <= names:
-            own = {name: signals[f'{place}{name}'] for name in names}
+            own = {name: whole[f'{place}{name}'] for name in names}
             read = {name: mapped[f'{place}{name}'] for name in names}
             both = _held(own, read, length_m), _zero(own, read, length_m)
             found += [one for one in both if one is not None]
     return found
+
+
+def _dropped(mapped: ColumnMap, column: FloatArray) -> BoolArray:
+    """Return where a sensor drops out: zeros for a while, a long step from all other values."""
+    raw = _raw(mapped, column)
+    is_zero = np.abs(raw) < 1e-9 * max(1.0, abs(mapped.zero))
+    others = np.flatnonzero(np.isfinite(raw) & ~is_zero)
+    if not len(others):
+        return is_zero & False
+    is_zero[:others[0]] = is_zero[others[-1]:] = False      # a rig may begin and end at zero
+    at_edge = is_zero[1:] != is_zero[:-1]
+    steps = np.abs(np.diff(raw))
+    usual = steps[~at_edge & np.isfinite(steps)].max(initial=0.0)
+    is_apart = at_edge.any() and raw[others].min() * raw[others].max() > 0.0 and (
+        np.nanmin(steps[at_edge]) > DROP_STEPS * usual)
+    return is_zero & bool(is_apart and is_zero.mean() <= MOST_DROPPED)
 
 
 def _held(signals: Mapping[str, tuple[IntArray, FloatArray]], mapped: Mapping[str, ColumnMap],

@@ -65,6 +65,20 @@ def test_a_zero_that_is_off_shows_while_the_muscle_is_empty(text, shortening):
         assert (f'zero={column.zero + shortening * 31.4:.4g}' in said) == off
 
 
+@pytest.mark.parametrize('begin, end, is_told', [(20, 24, True), (0, 4, False), (20, 40, False)])
+def test_a_wire_that_breaks_is_told_with_its_option(begin, end, is_told):
+    text = 'p_mA:bar_gauge:zero=4:gain=0.75'
+    current = 8.0 + 4.0 * np.sin(np.arange(60) / 9.0)
+    current[begin:end] = 0.0
+    column = column_of_text('pressure', text, 'here')
+    said = [one.sentence for one in doubts(
+        {'pressure': (STAMP_NS, column.to_si(current))}, {'pressure': column}, 0.3)]
+    assert ('4 of 60 values are 0' in ' '.join(said)) == is_told
+    assert any(one.endswith(f'--map pressure="{text}:missing=0"') for one in said) == is_told
+    whole = column_of_text('pressure', f'{text}:missing=0', 'here')
+    assert np.isnan(whole.to_si(current)).sum() == end - begin
+
+
 def test_the_name_of_a_topic_leads_to_its_signals():
     with pytest.raises(InputError, match='a topic: fill_duty or vent_duty or ppr_voltage; allow'):
         signal_of('valve_signal', '--map')
