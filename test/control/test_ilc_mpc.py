@@ -39,11 +39,12 @@ def model_of_lag_and_mass(delay_ticks=7, lag_s=0.06, rate=30.0, damping=0.3):
     """Return the model that identification should find, of this slope at 14 mm."""
     from scipy.signal import cont2discrete
     _, slope = mpc_gains.equivalent_pa(INVERSE, 4e5, 0.014)
+    # In metres: next to a denominator of order one, a numerator in m/Pa drowns in rounding.
     numerator, denominator, _ = cont2discrete(
-        ([rate ** 2 / slope], np.polymul([lag_s, 1.0], [1.0, 2.0 * damping * rate, rate ** 2])),
+        ([rate ** 2], np.polymul([lag_s, 1.0], [1.0, 2.0 * damping * rate, rate ** 2])),
         1.0 / RATE_HZ)
     return LinearModel(RATE_HZ, delay_ticks, tuple(denominator[1:]),
-                       tuple(numerator.ravel()[1:]), 0.014, 0.0)
+                       tuple(numerator.ravel()[1:] / slope), 0.014, 0.0)
 
 
 class Muscle:
