@@ -70,16 +70,15 @@ def question_sentence(found: Guess) -> str:
 
 def how_to_begin(tables: Collection[Table], found: Guess) -> str:
     """Return the words of the command line that begin a mapping, with columns of the file."""
-    columns = dict.fromkeys(
-        name for table in tables for name in table.columns if name not in _meaning(table, found))
-    examples = zip(('pressure', 'contraction'), columns, ('kPa_gauge', 'mm'))
+    examples = zip(('pressure', 'contraction'), unread(tables, found), ('kPa_gauge', 'mm'))
     return ' '.join(f'--map {signal}="{column}:{unit}"' for signal, column, unit in examples)
 
 
 def unread(tables: Collection[Table], found: Guess) -> list[str]:
     """Return the columns that are neither the time nor a signal."""
-    return list(dict.fromkeys(name for table in tables for name in table.columns
-                              if name not in _meaning(table, found)))
+    read = [(table, _meaning(table, found)) for table in tables]
+    return list(dict.fromkeys(
+        name for table, meant in read for name in table.columns if name not in meant))
 
 
 def _meaning(table: Table, found: Guess) -> dict[str, str]:
