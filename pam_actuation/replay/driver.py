@@ -53,7 +53,8 @@ class DriverReplay:
     Recorded and replayed valve signals at the ticks of the driver.
 
     ``recorded`` and ``replayed`` map signal name to arrays, shape (N,), V or duty 0..1;
-    ``note`` says what the driver was told of the rig.
+    ``note`` says what the driver was told of the rig, and that the bag has no pressure where
+    ``has_pressure`` is false.
     """
 
     stamp_ns: IntArray
@@ -61,6 +62,7 @@ class DriverReplay:
     replayed: dict[str, FloatArray]
     note: str
     start_ns: int
+    has_pressure: bool
 
     @property
     def differences(self) -> list[Difference]:
@@ -81,7 +83,7 @@ class DriverReplay:
 
     def lines(self) -> list[str]:
         """Return the outcome for people."""
-        inputs = 'commands' if NO_PRESSURE in self.note else 'commands and pressures'
+        inputs = 'commands and pressures' if self.has_pressure else 'commands'
         return [f'driver: {len(self.stamp_ns)} ticks on the recorded {inputs}'
                 + (f' ({self.note})' if self.note else ''),
                 *(one.line() for one in self.differences)]
@@ -116,7 +118,8 @@ def replay_driver(run: Run) -> DriverReplay:
     recorded = recorded_topics(run, (*takes, 'valve_signal'), ticks=('valve_signal',))
     if not any(len(recorded.get(topic, ())) for topic in COMMANDS):
         run.require('pressure_command')
-    if not len(recorded.get('pressure', ())):
+    has_pressure = len(recorded.get('pressure', ())) > 0
+    if not has_pressure:
         note = '; '.join(filter(None, (note, NO_PRESSURE)))
     stamps: array[int] = array('q')
     told: dict[str, array[float]] = {}
@@ -138,7 +141,8 @@ def replay_driver(run: Run) -> DriverReplay:
     names = [name for name in UNITS if name in sent]
     return DriverReplay(
         np.array(stamps, dtype=np.int64), {name: np.array(told[name]) for name in names},
-        {name: np.array(sent[name]) for name in names}, note, run.start_ns)
+        {name: np.array(sent[name]) for name in names}, note, run.start_ns,
+        has_pressure)
 
 
 def _driver(run: Run, signals: Series) -> tuple[DriverLoop, str]:
