@@ -119,7 +119,8 @@ def offer_of(run: Run, rig: Rig, added_kg: float = 0.0) -> Offer:
     command = tells_of(run, rig.valve)
     contraction, force = (
         name in run and len(run[name]) >= LEAST_SAMPLES for name in ('contraction', 'force'))
-    held = rig.is_driven or (force and _is_held(run, rig))
+    is_still = _is_held(run, rig)
+    held = rig.is_driven or (force and is_still)
     isometric_m = rig.parameters.get('contraction_m') if rig.load == 'isometric' else None
     mechanics = (force and (contraction or isometric_m is not None)) if held else contraction
     missed = missed_pulses(run['valve_signal'].stamp_ns) if command and rig.valve == 'hsv' else ''
@@ -137,7 +138,7 @@ def offer_of(run: Run, rig: Rig, added_kg: float = 0.0) -> Offer:
         raise InputError(f'has {recording.grid_s[-1]:.2f} s in which all its signals are there; '
                          f'at least {LEAST_DURATION_S:g} s are needed', where)
     muscle = ('muscle and load' if not held else
-              'muscle at a measured length' if contraction and not _is_held(run, rig) else
+              'muscle at a measured length' if contraction and not is_still else
               'muscle at a held length')
     kinds = [word for word, there in (('valve', valve), (muscle, mechanics)) if there]
     kind = ' and '.join(kinds) + (f'; the valve is left out: {missed}' if missed else '')
