@@ -163,11 +163,14 @@ class SubsystemProblem:
 
     def shift_inputs(self, noise_sd: float) -> None:
         """Shift measured inputs by so many deviations of their noise, until ``disturb``."""
-        self._forget()
-        self._disturb(None)
+        self._as_measured()
 
     def delay_inputs(self, late_s: float) -> None:
         """Take measured inputs as stamped so late against what is compared, until ``disturb``."""
+        self._as_measured()
+
+    def _as_measured(self) -> None:
+        """Take the measured inputs as they are."""
         self._forget()
         self._disturb(None)
 
