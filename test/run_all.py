@@ -13,9 +13,9 @@
 # limitations under the License.
 
 """
-Run every test: the live ones that judge times in two lanes, and beside them all others.
+Run every test: the live ones that judge times one after the other, and beside them all others.
 
-Live nodes wait more than they compute, and the other tests take the rest of the cores. Those
+The live nodes of one test take about half of two cores, and the other tests take the rest. Those
 have a low priority: a live process that wakes gets a core at once. Live tests that failed while
 the machine stood still, or among those of low priority, are run once more with the machine to
 themselves.
@@ -32,26 +32,22 @@ import tempfile
 from stall_watch import EXIT_CROWDED, EXIT_STOOD_STILL, NAMES_A_LIVE_TEST, TIMED
 
 ROOT = Path(__file__).resolve().parent.parent
-# Whole runs as a user starts them: the longest live tests, about half of the time of all.
-WHOLE_RUNS = (
-    'test/docs/test_tutorials.py', 'test/cli/test_verbs.py', 'test/nodes/test_session.py',
-    'test/nodes/test_simulated_time.py', 'test/nodes/test_stopped.py')
 # One process more than cores: some of these tests wait as well. File by file in this order, so
 # that the long files do not come last.
+# They wait for cores as well, so that their limit is for what never ends.
 OTHERS = ('-m', f'not ({TIMED})', '--numprocesses', str(1 + (os.cpu_count() or 1)),
-          '--dist', 'loadfile', '--no-loadscope-reorder')
+          '--dist', 'loadfile', '--no-loadscope-reorder', '-o', 'timeout=900')
 # A tenth of the time where a live process wants the core as well.
 NICE = 10
 
 
-def live_lanes():
-    """Return the arguments of pytest for the two lanes of live tests; they share no file."""
-    others = [name for path in sorted((ROOT / 'test').rglob('test_*.py'))
-              if NAMES_A_LIVE_TEST.search(path.read_text(encoding='utf-8'))
-              and (name := path.relative_to(ROOT).as_posix()) not in WHOLE_RUNS]
-    # A cache of their own: the list of what failed last belongs to one run.
-    return [('-m', TIMED, '-o', f'cache_dir=.pytest_cache/live_{number}', *files)
-            for number, files in enumerate((WHOLE_RUNS, others))]
+def live_tests():
+    """Return the arguments of pytest for the live tests; only their files are collected."""
+    files = [path.relative_to(ROOT).as_posix()
+             for path in sorted((ROOT / 'test').rglob('test_*.py'))
+             if NAMES_A_LIVE_TEST.search(path.read_text(encoding='utf-8'))]
+    # A cache of its own: the list of what failed last belongs to one run.
+    return ('-m', TIMED, '-o', 'cache_dir=.pytest_cache/live', *files)
 
 
 def pytest(*arguments, **options):
@@ -81,24 +77,21 @@ def to_background():
 
 def main():
     """Run the tests and print what they say; return 1 if any failed."""
-    lanes = live_lanes()
-    with contextlib.ExitStack() as files:
-        said = [files.enter_context(tempfile.TemporaryFile('w+')) for _ in lanes]
-        live = [pytest(*lane, stdout=file, stderr=subprocess.STDOUT)
-                for lane, file in zip(lanes, said)]
-        *codes, others = ended(*live, pytest(*OTHERS, preexec_fn=to_background))
-        for file in said:
-            file.seek(0)
-            print('\nThe live tests that ran beside them:\n', file.read(), sep='', flush=True)
-    for place, lane in enumerate(lanes):
-        if codes[place] == EXIT_STOOD_STILL:
-            print('The machine stood still during the live tests that failed; these once more:',
-                  flush=True)
-            codes[place], = ended(pytest(*lane, '--last-failed'))
+    live_arguments = live_tests()
+    with tempfile.TemporaryFile('w+') as said:
+        live, others = ended(
+            pytest(*live_arguments, stdout=said, stderr=subprocess.STDOUT),
+            pytest(*OTHERS, preexec_fn=to_background))
+        said.seek(0)
+        print('\nThe live tests that ran beside them:\n', said.read(), sep='', flush=True)
+    if live == EXIT_STOOD_STILL:
+        print('The machine stood still during the live tests that failed; these once more:',
+              flush=True)
+        live, = ended(pytest(*live_arguments, '--last-failed'))
     if others == EXIT_CROWDED:
         print('Of the tests of low priority only live ones failed; these once more:', flush=True)
         others, = ended(pytest('-m', 'shared', '--last-failed'))
-    return int(any((*codes, others)))
+    return int(any((live, others)))
 
 
 if __name__ == '__main__':

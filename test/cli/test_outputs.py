@@ -133,7 +133,7 @@ def test_a_file_system_that_refuses_half_way(arguments, bags):
         'sys.exit(main(sys.argv[1:]))\n')
     done = subprocess.run(
         [sys.executable, '-c', code, *arguments], cwd=bags, capture_output=True, text=True,
-        timeout=100, check=False, env=dict(os.environ, PYTHONPATH=str(ROOT)))
+        check=False, env=dict(os.environ, PYTHONPATH=str(ROOT)))
     assert done.returncode == 2 and done.stderr.count('\n') == 1, done.stderr
     assert 'cannot be written: File too large' in done.stderr
     assert listed(bags) == before and not (bags / 'full').exists()
@@ -142,7 +142,7 @@ def test_a_file_system_that_refuses_half_way(arguments, bags):
 def test_an_output_that_is_full(bags):
     done = subprocess.run(
         f'{sys.executable} -m pam_actuation.cli.main models > /dev/full', shell=True, cwd=ROOT,
-        stderr=subprocess.PIPE, text=True, timeout=100, check=False)
+        stderr=subprocess.PIPE, text=True, check=False)
     assert done.stderr == 'pam models: No space left on device\n' and done.returncode == 2
 
 

@@ -26,11 +26,11 @@ from pam_actuation.cli.overview import VERBS
 import pytest
 
 
-def pam(*arguments, cwd=None, timeout=120):
+def pam(*arguments, cwd=None):
     """Run ``pam`` as a process and return the finished process."""
     return subprocess.run(
         [sys.executable, '-m', 'pam_actuation.cli.main', *map(str, arguments)],
-        capture_output=True, text=True, cwd=cwd, timeout=timeout, check=False)
+        capture_output=True, text=True, cwd=cwd, check=False)
 
 
 def pam_here(*arguments):
@@ -210,7 +210,7 @@ def test_the_whole_demo_in_short(tmp_path):
     done = subprocess.run(
         [sys.executable, '-m', 'pam_actuation.cli.main', 'demo', '--quick', '--json', '--out',
          str(tmp_path / 'demo')],
-        capture_output=True, text=True, timeout=280, env=environment, check=False)
+        capture_output=True, text=True, env=environment, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     found = json.loads(done.stdout)
     assert os.path.getsize(found['page']) > 1e6

@@ -98,7 +98,6 @@ def run(house, *arguments):
     """Run Python in the copy; return what it printed."""
     done = subprocess.run(
         [sys.executable, *map(str, arguments)], cwd=house, capture_output=True, text=True,
-        timeout=300.0,
         # A copy would be compiled anew, and no number of this test depends on machine code.
         env={**os.environ, 'PYTHONPATH': str(house), 'NUMBA_DISABLE_JIT': '1'})
     assert done.returncode == 0, done.stderr[-3000:]

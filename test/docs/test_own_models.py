@@ -65,5 +65,5 @@ def test_the_examples_of_the_guides_work_together(tmp_path):
         (folder / f'{name}.py').write_text(files[name], encoding='utf-8')
         environment[variable] = str(folder)
     done = subprocess.run([sys.executable, '-c', USE], capture_output=True, text=True,
-                          timeout=200, cwd=tmp_path, env=environment)
+                          cwd=tmp_path, env=environment)
     assert done.stdout == '3.0\n', done.stderr

@@ -155,7 +155,7 @@ def test_files_load_and_simulate_as_the_terms_that_were_tried(drag, tmp_path):
     (tmp_path / 'pairs.json').write_text(json.dumps(pairs, default=float))
     answer = subprocess.run(
         [sys.executable, '-c', SCRIPT, str(tmp_path / 'pairs.json')],
-        capture_output=True, text=True, timeout=300,
+        capture_output=True, text=True,
         env={**os.environ, 'PAM_EFFECTS_PATH': str(tmp_path), 'NUMBA_DISABLE_JIT': '1',
              'PYTHONPATH': os.pathsep.join(sys.path), 'PAM_CACHE_DIR': str(tmp_path / 'cache')})
     assert answer.returncode == 0, answer.stderr

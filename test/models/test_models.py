@@ -152,7 +152,7 @@ def test_a_file_in_a_folder_is_listed_loaded_and_simulated(tmp_path):
 
     def run(*arguments):
         done = subprocess.run(
-            [sys.executable, *arguments], capture_output=True, text=True, timeout=200,
+            [sys.executable, *arguments], capture_output=True, text=True,
             cwd=tmp_path, env=environment, check=False)
         assert done.returncode == 0, done.stderr
         return done.stdout

@@ -52,5 +52,5 @@ def test_last_words_are_written_before_the_end():
     said = subprocess.run(
         [sys.executable, '-c', 'from pam_actuation.nodes.console import Console\n'
          'console = Console("/driver")\nconsole.say("ERROR", 5, "vented")'],
-        capture_output=True, text=True, check=True, timeout=60).stderr
+        capture_output=True, text=True, check=True).stderr
     assert said == '[ERROR] [0.000000005] [driver]: vented\n'

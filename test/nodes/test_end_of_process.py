@@ -55,7 +55,7 @@ def test_participant_is_gone(tmp_path, parameter, code):
                 if line.rstrip().endswith('active'):
                     break
             process.send_signal(signal.SIGTERM)
-        output, errors = process.communicate(timeout=60)
+        output, errors = process.communicate()
     finally:
         process.kill()
         lock.release()

@@ -232,7 +232,7 @@ def test_a_file_in_a_folder_is_a_new_effect(tmp_path):
         'b = rig.with_(effects=[]).simulate(np.full(50, 4.0), initial_pressure_pa=501325.0)\n'
         'print(abs(a.contraction_m - b.contraction_m).max() > 1e-6)\n')
     answer = subprocess.run(
-        [sys.executable, '-c', script], capture_output=True, text=True, timeout=200,
+        [sys.executable, '-c', script], capture_output=True, text=True,
         env={**os.environ, 'PAM_EFFECTS_PATH': str(tmp_path), 'NUMBA_DISABLE_JIT': '1',
              'PYTHONPATH': os.pathsep.join(sys.path), 'PAM_CACHE_DIR': str(tmp_path / 'cache')})
     assert answer.stdout.strip() == 'True', answer.stderr

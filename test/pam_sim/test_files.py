@@ -125,7 +125,7 @@ def test_a_folder_without_the_right_to_write(tmp_path):
 def _python(code, *arguments):
     return subprocess.run(
         [sys.executable, '-c', code, *map(str, arguments)], capture_output=True, text=True,
-        timeout=60, check=False, env=dict(os.environ, PYTHONPATH=str(ROOT)))
+        check=False, env=dict(os.environ, PYTHONPATH=str(ROOT)))
 
 
 @pytest.mark.parametrize('name', [

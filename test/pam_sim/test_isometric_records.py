@@ -55,7 +55,6 @@ def test_fitted_laws_follow_the_records():
 
 
 def test_without_records_there_is_one_sentence(tmp_path):
-    done = subprocess.run([sys.executable, PROGRAM, tmp_path], capture_output=True, text=True,
-                          timeout=100)
+    done = subprocess.run([sys.executable, PROGRAM, tmp_path], capture_output=True, text=True)
     assert done.returncode == 2 and done.stderr.count('\n') == 1
     assert 'contraction_00.csv: is missing' in done.stderr

@@ -245,7 +245,7 @@ print(abs(response.contraction_m - wanted).max() < 1e-9, load_rig(rig.to_yaml())
 def test_a_law_in_a_folder_of_the_user_moves_a_rig(tmp_path):
     (tmp_path / 'straight.py').write_text(LAW)
     answer = subprocess.run(
-        [sys.executable, '-c', USE_OF_LAW], capture_output=True, text=True, timeout=200,
+        [sys.executable, '-c', USE_OF_LAW], capture_output=True, text=True,
         env={**os.environ, 'PAM_MUSCLE_LAWS_PATH': str(tmp_path), 'NUMBA_DISABLE_JIT': '1',
              'PYTHONPATH': os.pathsep.join(sys.path), 'PAM_CACHE_DIR': str(tmp_path / 'cache')})
     assert answer.stdout.split() == ['True', 'True'], answer.stderr

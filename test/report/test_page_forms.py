@@ -161,7 +161,7 @@ def test_no_value_stands_outside_a_phone_screen(tmp_path):
         [CHROMIUM, '--headless', '--no-sandbox', '--disable-gpu', '--no-first-run',
          '--disable-background-networking', f'--user-data-dir={tmp_path / "profile"}',
          '--virtual-time-budget=3000', '--dump-dom', outer.as_uri()],
-        capture_output=True, text=True, timeout=120)
+        capture_output=True, text=True)
     measured = re.search(r'widest (\d+) of (\d+)', done.stdout)
     if measured is None:
         pytest.skip(f'chromium does not draw here: {done.stderr[-200:]}')

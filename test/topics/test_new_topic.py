@@ -112,7 +112,7 @@ def run(house, *arguments, **options):
                    **options.pop('environment', {})}
     done = subprocess.run(
         [sys.executable, *map(str, arguments)], cwd=house, env=environment, capture_output=True,
-        text=True, timeout=300.0)
+        text=True)
     assert done.returncode == 0, done.stderr[-3000:]
     return done.stdout
 

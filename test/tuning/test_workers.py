@@ -51,7 +51,7 @@ def test_same_bytes_with_any_number_of_threads_and_on_a_dask_cluster(rig, monkey
     with distributed.LocalCluster(
             n_workers=2, threads_per_worker=1, host='127.0.0.1', dashboard_address=None,
             worker_dashboard_address=None) as cluster:
-        cluster.wait_for_workers(2, timeout=60)
+        cluster.wait_for_workers(2)
         spread = tuned(rig, cluster=cluster.scheduler_address)
         monkeypatch.setattr(dask_cluster, 'SILENT_S', 0.5)
         with Workers(cluster=cluster.scheduler_address) as workers:
