@@ -20,7 +20,9 @@ Here signals only ask the loop to end; the safe signal and the last diagnostics 
 out before the context closes. Exit codes: 0 done, 1 the node failed, 2 bad input.
 """
 
+import atexit
 from collections.abc import Sequence
+import faulthandler
 import os
 import re
 import signal
@@ -45,6 +47,7 @@ SIGNALS: dict[int, str] = {number: number.name for number in interrupts.ENDING}
 SERVICE_WAIT_S = 0.5        # longest sleep of the thread that answers services
 SERVICE_END_S = 3.0         # for a service that is still being answered at the end
 LONGEST_START_S = 60.0      # compiling at the first start cannot be interrupted
+LEAVE_S = 4.0               # for the way out once everything is safe and sent
 
 
 class _Stopper(threading.Thread):
@@ -88,6 +91,20 @@ def _noted(number: int, frame: object) -> None:
     """Stand in for the default action of a signal; the thread above does the work."""
 
 
+def _leave_within(limit_s: float, code: int) -> threading.Timer:
+    """
+    End this process even if the middleware hangs on the way out; cancel with the result.
+
+    A thread ends it with the exit code. A middleware that holds the lock of the interpreter stops
+    that thread as well. Then the process ends with 1, and all threads are in the log.
+    """
+    timer = threading.Timer(limit_s, os._exit, [code])
+    timer.daemon = True
+    timer.start()
+    faulthandler.dump_traceback_later(limit_s + 0.5, exit=True)
+    return timer
+
+
 def run(node_class: type[ManagedNode], args: Sequence[str] | None = None) -> int:
     """
     Run one node as a process.
@@ -108,6 +125,8 @@ def run(node_class: type[ManagedNode], args: Sequence[str] | None = None) -> int
     answered = arguments.answer(node_class.NAME, sys.argv[1:]) if args is None else None
     if answered is not None:
         return answered
+    # The last of what runs at the end of the interpreter, and what comes after it may hang, too.
+    atexit.register(faulthandler.dump_traceback_later, LEAVE_S, exit=True)
     stopper = _Stopper()
     try:
         return _run(node_class, args, stopper)
@@ -149,6 +168,8 @@ def _run(node_class: type[ManagedNode], args: Sequence[str] | None, stopper: '_S
         why = stopper.reason or 'ended'
         node.finish(why)
         stopper.safe.set()
+        code = node.exit_code or node.result_code
+        leaving = _leave_within(LEAVE_S, code)
         ended.set()
         executor.wake()
         serving.join(timeout=SERVICE_END_S)
@@ -158,11 +179,13 @@ def _run(node_class: type[ManagedNode], args: Sequence[str] | None, stopper: '_S
             # Everything is safe and sent; what is left is memory the system takes back. To
             # destroy the services of a node while another thread waits on them would crash.
             sys.stderr.flush()
-            os._exit(node.exit_code or node.result_code)
+            os._exit(code)
         executor.shutdown()
         node.destroy_node()
         rclpy.try_shutdown()
-    return node.exit_code or node.result_code
+        leaving.cancel()
+        faulthandler.cancel_dump_traceback_later()
+    return code
 
 
 def _serve(node: ManagedNode, executor: SingleThreadedExecutor, ended: threading.Event) -> None:

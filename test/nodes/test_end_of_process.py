@@ -61,3 +61,36 @@ def test_participant_is_gone(tmp_path, parameter, code):
         lock.release()
     assert process.returncode == code, errors
     assert "left: ['dds.shm.wdog']" in output or 'left: []' in output, output
+
+
+# The middleware hangs on the way out: with the lock of the interpreter free, and with it held.
+HANGS = {'time.sleep': 0, 'ctypes.PyDLL(None).sleep': 1}
+HANGING = """
+import ctypes, sys, time
+import rclpy
+from pam_actuation.nodes import runner
+from pam_actuation.nodes.pid_controller import PidNode
+
+rclpy.try_shutdown = lambda: {hang}(600)
+sys.exit(runner.run(PidNode))
+"""
+
+
+def test_a_node_ends_though_the_middleware_hangs(tmp_path):
+    lock = DomainLock()
+    try:
+        done = {hang: subprocess.Popen(
+            [sys.executable, '-c', HANGING.format(hang=hang), '--ros-args', '-r',
+             f'__node:=hang_{code}', '-p', 'autostart:=true'],
+            env=node_environment(lock.domain_id, tmp_path), text=True, stderr=subprocess.PIPE)
+            for hang, code in HANGS.items()}
+        for process in done.values():
+            assert any(line.rstrip().endswith('active') for line in process.stderr)
+            process.send_signal(signal.SIGTERM)
+        said = {hang: process.communicate()[1] for hang, process in done.items()}
+    finally:
+        for process in done.values():
+            process.kill()
+        lock.release()
+    assert {hang: process.returncode for hang, process in done.items()} == HANGS, said
+    assert 'in _run' in said['ctypes.PyDLL(None).sleep']
