@@ -22,7 +22,6 @@ out before the context closes. Exit codes: 0 done, 1 the node failed, 2 bad inpu
 
 import atexit
 from collections.abc import Sequence
-import faulthandler
 import os
 import re
 import signal
@@ -47,7 +46,9 @@ SIGNALS: dict[int, str] = {number: number.name for number in interrupts.ENDING}
 SERVICE_WAIT_S = 0.5        # longest sleep of the thread that answers services
 SERVICE_END_S = 3.0         # for a service that is still being answered at the end
 LONGEST_START_S = 60.0      # compiling at the first start cannot be interrupted
-LEAVE_S = 4.0               # for the way out once everything is safe and sent
+# For the way out once everything is safe and sent. Fast DDS now and then never comes back from
+# taking its tables down, with the lock of the interpreter held: only the system can end that.
+LEAVE_S = 4.0
 
 
 class _Stopper(threading.Thread):
@@ -91,18 +92,10 @@ def _noted(number: int, frame: object) -> None:
     """Stand in for the default action of a signal; the thread above does the work."""
 
 
-def _leave_within(limit_s: float, code: int) -> threading.Timer:
-    """
-    End this process even if the middleware hangs on the way out; cancel with the result.
-
-    A thread ends it with the exit code. A middleware that holds the lock of the interpreter stops
-    that thread as well. Then the process ends with 1, and all threads are in the log.
-    """
-    timer = threading.Timer(limit_s, os._exit, [code])
-    timer.daemon = True
-    timer.start()
-    faulthandler.dump_traceback_later(limit_s + 0.5, exit=True)
-    return timer
+def _leave_within(limit_s: float) -> None:
+    """Have the system end this process by SIGALRM after a time; 0: no more."""
+    signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    signal.setitimer(signal.ITIMER_REAL, limit_s)
 
 
 def run(node_class: type[ManagedNode], args: Sequence[str] | None = None) -> int:
@@ -125,8 +118,7 @@ def run(node_class: type[ManagedNode], args: Sequence[str] | None = None) -> int
     answered = arguments.answer(node_class.NAME, sys.argv[1:]) if args is None else None
     if answered is not None:
         return answered
-    # The last of what runs at the end of the interpreter, and what comes after it may hang, too.
-    atexit.register(faulthandler.dump_traceback_later, LEAVE_S, exit=True)
+    atexit.register(_leave_within, LEAVE_S)     # what comes after may hang as well
     stopper = _Stopper()
     try:
         return _run(node_class, args, stopper)
@@ -169,7 +161,7 @@ def _run(node_class: type[ManagedNode], args: Sequence[str] | None, stopper: '_S
         node.finish(why)
         stopper.safe.set()
         code = node.exit_code or node.result_code
-        leaving = _leave_within(LEAVE_S, code)
+        _leave_within(LEAVE_S)
         ended.set()
         executor.wake()
         serving.join(timeout=SERVICE_END_S)
@@ -183,8 +175,7 @@ def _run(node_class: type[ManagedNode], args: Sequence[str] | None, stopper: '_S
         executor.shutdown()
         node.destroy_node()
         rclpy.try_shutdown()
-        leaving.cancel()
-        faulthandler.cancel_dump_traceback_later()
+        _leave_within(0.0)
     return code
 
 
