@@ -121,6 +121,7 @@ def _node(executable, *parameters, side='', condition=None):
         parameters=[{'realtime_priority': ParameterValue(priority, value_type=int),
                      'use_sim_time': ParameterValue(
                          LaunchConfiguration('use_sim_time'), value_type=bool),
+                     'end_with_parent': True,
                      'muscle': _text(LaunchConfiguration(NAME))}, *parameters])
 
 

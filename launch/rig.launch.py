@@ -109,7 +109,8 @@ def _node(executable, *parameters, condition=None):
     recorder = IfElseSubstitution(LaunchConfiguration('record'), RECORDER, '')
     priority = LaunchConfiguration('realtime_priority')
     common = {
-        'autostart': True, 'await_subscriber': ParameterValue(recorder, value_type=str),
+        'autostart': True, 'end_with_parent': True,
+        'await_subscriber': ParameterValue(recorder, value_type=str),
         'realtime_priority': ParameterValue(priority, value_type=int),
         'use_sim_time': ParameterValue(LaunchConfiguration('use_sim_time'), value_type=bool)}
     return LifecycleNode(

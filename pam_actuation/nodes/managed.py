@@ -71,6 +71,10 @@ COMMON_PARAMETERS = (
         'realtime_priority', 0, 'Real-time priority (Linux, SCHED_RR), the same for all nodes of '
         'a rig; 0: none. What must be on time comes first: watchdog and driver add 3 to it, plant '
         'and sensors 2, controllers 1. Without the right to it the node runs as before.', 0, 96),
+    node_parameter(
+        'end_with_parent', False, 'End in order, as by SIGTERM, when the process that started the '
+        'node is gone (Linux). The launch files ask for it: ros2 launch leaves its nodes behind '
+        'where SIGTERM or SIGKILL ends it.'),
     node_parameter('muscle', 'muscle', 'Name of the muscle or joint in the messages sent.'),
     node_parameter(
         'frame_id', '', 'Name of a frame of tf2, header.frame_id of all messages of the rig that '

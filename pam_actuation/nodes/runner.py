@@ -35,6 +35,7 @@ from pam_actuation import interrupts
 from pam_actuation.nodes import arguments
 from pam_actuation.nodes.diagnostics import WARN
 from pam_actuation.nodes.managed import ManagedNode
+from pam_actuation.rigging.processes import end_with_parent
 from pam_actuation.transport import prepare_middleware
 from pam_sim.errors import InputError
 import rclpy
@@ -151,6 +152,8 @@ def _run(node_class: type[ManagedNode], args: Sequence[str] | None, stopper: '_S
         target=_serve, args=(node, executor, ended), daemon=True, name='services')
     stopper.node = node
     stopper.start()
+    if node.value('end_with_parent'):
+        end_with_parent(os.getppid())
     serving.start()
     try:
         if node.value('autostart'):

@@ -89,3 +89,28 @@ def test_a_node_ends_in_order_though_the_middleware_hangs(tmp_path):
     finally:
         process.send_signal(signal.SIGKILL)
         lock.release()
+
+
+# As ros2 launch does, which leaves its nodes behind when SIGTERM or SIGKILL ends it.
+LAUNCHER = """
+import subprocess, sys, time
+subprocess.Popen([sys.executable, '-m', 'pam_actuation.nodes.valve_driver', '--ros-args', '-p',
+                  'end_with_parent:=true'])
+time.sleep(600)
+"""
+
+
+@pytest.mark.skipif(sys.platform != 'linux', reason='Linux tells of the end of a parent')
+def test_a_node_ends_in_order_with_the_process_that_started_it(tmp_path):
+    lock = DomainLock()
+    launcher = subprocess.Popen(
+        [sys.executable, '-c', LAUNCHER], env=node_environment(lock.domain_id, tmp_path),
+        text=True, stderr=subprocess.PIPE)
+    try:
+        assert any(line.endswith(']: active\n') for line in launcher.stderr)
+        launcher.kill()
+        # The node has the same end of the pipe: the text is over when it has ended, too.
+        assert any(line.endswith('stopped by SIGTERM\n') for line in launcher.stderr)
+    finally:
+        launcher.kill()
+        lock.release()
