@@ -15,13 +15,14 @@
 """The session's own ROS node: lifecycle requests out, diagnostics in."""
 
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 import os
 import time
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState
+from lifecycle_msgs.msg import State, Transition
+from lifecycle_msgs.srv import ChangeState, GetState
 from pam_actuation.topics.codec import Reader
 from pam_actuation.topics.quality import USUAL
 from pam_actuation.transport import prepare_middleware, RANGE
@@ -36,6 +37,12 @@ TRANSITIONS = {
     'activate': Transition.TRANSITION_ACTIVATE,
     'deactivate': Transition.TRANSITION_DEACTIVATE,
 }
+SERVICES = {'change_state': ChangeState, 'get_state': GetState}
+LEADS_TO = {'configure': State.PRIMARY_STATE_INACTIVE, 'activate': State.PRIMARY_STATE_ACTIVE,
+            'deactivate': State.PRIMARY_STATE_INACTIVE}
+# After that the node is asked for its state. An answer is sent once, and is lost where the node
+# does not yet know of its receiver, as on a busy machine.
+LATE_ANSWER_S = 3.0
 
 
 def local_context(domain_id: int, arguments: Sequence[str] = ()) -> rclpy.Context:
@@ -64,6 +71,60 @@ def _open(context: rclpy.Context, domain_id: int, arguments: Sequence[str]) -> N
     prepare_middleware()
     rclpy.init(context=context, domain_id=domain_id, args=list(arguments),
                signal_handler_options=SignalHandlerOptions.NO)
+
+
+class _Asked:
+    """
+    A node that is asked for a transition, and for its state where the answer is late.
+
+    Parameters
+    ----------
+    client : callable
+        Returns the client of a service of the node by its name.
+    transition : str
+        A key of ``TRANSITIONS``.
+
+    """
+
+    def __init__(self, client: Callable[[str], Any], transition: str) -> None:
+        self._client, self._transition = client, transition
+        self._changes: list[Any] = []       # futures of the requests
+        self._state: Any = None             # future of the state
+        self._late_at_s = 0.0
+
+    def answer(self) -> bool | None:
+        """Go on; return whether the node made it, None while that is not known."""
+        if any(change.done() and change.result().success for change in self._changes):
+            return True
+        refused = bool(self._changes) and self._changes[-1].done()
+        if refused and len(self._changes) == 1:
+            return False
+        if not self._changes:
+            self._request()
+        elif self._state is not None and self._state.done():
+            if self._state.result().current_state.id == LEADS_TO[self._transition]:
+                return True
+            if refused:
+                return False
+            # Request or answer is lost, or it is not its turn yet; a second one is then refused.
+            self._state = None
+            self._request()
+        elif (refused and self._state is None) or time.monotonic() > self._late_at_s:
+            self._state = self._called('get_state', GetState.Request())
+        return None
+
+    def _request(self) -> None:
+        change = self._called('change_state', ChangeState.Request(
+            transition=Transition(id=TRANSITIONS[self._transition])))
+        self._changes += [] if change is None else [change]
+
+    def _called(self, service: str, request: Any) -> Any:
+        """Return the future of a request, None while the node offers no service yet."""
+        client = self._client(service)
+        if not client.service_is_ready():
+            return None
+        self._late_at_s = time.monotonic() + LATE_ANSWER_S
+        return client.call_async(request)
 
 
 class RigClient:
@@ -144,35 +205,27 @@ class RigClient:
 
         """
         deadline = time.monotonic() + timeout_s
-        waiting: dict[str, Any] = dict.fromkeys(full_names)      # future of each request
+        waiting = {name: _Asked(partial(self._client, name), transition) for name in full_names}
         refused: list[str] = []
         while waiting and time.monotonic() < deadline:
-            for name, future in list(waiting.items()):
-                if future is None:
-                    waiting[name] = self._request(name, transition)
-                elif future.done():
+            for name, asked in list(waiting.items()):
+                done = asked.answer()
+                if done is None and not alive(name):
+                    done = False
+                if done is not None:
                     del waiting[name]
-                    if not future.result().success:
-                        refused.append(name)
-                    continue
-                if not alive(name):
-                    del waiting[name]
+                if done is False:
                     refused.append(name)
             if waiting:
                 self.executor.spin_once(timeout_sec=0.02)
         return refused + list(waiting)
 
-    def _request(self, full_name: str, transition: str) -> Any:
-        """Return the future of a request, None while the node offers no service yet."""
-        client = self._clients.get(full_name)
-        if client is None:
-            client = self._clients[full_name] = self.node.create_client(
-                ChangeState, f'{full_name}/change_state')
-        if not client.service_is_ready():
-            return None
-        request = ChangeState.Request()
-        request.transition.id = TRANSITIONS[transition]
-        return client.call_async(request)
+    def _client(self, full_name: str, service: str) -> Any:
+        """Return the client of a service of a node, always the same."""
+        key = f'{full_name}/{service}'
+        if key not in self._clients:
+            self._clients[key] = self.node.create_client(SERVICES[service], key)
+        return self._clients[key]
 
     def published(self) -> dict[str, int]:
         """Return full topic name to messages published, by the last status of every node."""

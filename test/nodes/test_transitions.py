@@ -15,6 +15,8 @@
 
 import time
 
+from pam_actuation.rigging.domain import DomainLock
+from pam_actuation.rigging.processes import end_all, node_environment, NodeProcess
 from pam_actuation.rigging.transitions import change, SessionFailed
 import pytest
 
@@ -55,3 +57,36 @@ def test_other_failures_do_not_name_the_compiler():
     assert said('configure', True, 60.0) == 'controller did not configure: reading the rig'
     assert said('activate', False, 0.02) == (
         'controller did not activate within 0.02 s: reading the rig')
+
+
+@pytest.mark.ros
+@pytest.mark.shared
+@pytest.mark.parametrize('is_sent', [True, False])
+def test_a_lost_request_or_answer_is_noticed(is_sent, tmp_path, monkeypatch):
+    pytest.importorskip('rclpy')
+    from pam_actuation.rigging.client import ChangeState, RigClient
+    from rclpy.client import Client as RosClient
+    from rclpy.task import Future
+    asked, send = [], RosClient.call_async
+
+    def call(client, request):
+        lost = isinstance(request, ChangeState.Request) and not asked
+        asked.append(type(request).__name__)
+        future = send(client, request) if is_sent or not lost else None
+        return Future() if lost else future
+    monkeypatch.setattr(RosClient, 'call_async', call)
+    lock = DomainLock()
+    node = NodeProcess('pid_controller', '/muscle', {'autostart': False},
+                       node_environment(lock.domain_id, tmp_path), tmp_path)
+    client = RigClient(lock.domain_id)
+    try:
+        assert client.change_states([node.full_name], 'configure', 300.0) == []
+        assert asked == ['ChangeState_Request', 'GetState_Request'] + (
+            [] if is_sent else ['ChangeState_Request'])
+        # What is refused is refused at once, without a look at the state.
+        assert client.change_states([node.full_name], 'deactivate', 300.0) == [node.full_name]
+        assert asked[-1] == 'ChangeState_Request'
+    finally:
+        client.close()
+        end_all([node])
+        lock.release()
