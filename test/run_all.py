@@ -16,9 +16,8 @@
 Run every test: the live ones that judge times one after the other, and beside them all others.
 
 The live nodes of one test take about half of two cores, and the other tests take the rest. Those
-have a low priority: a live process that wakes gets a core at once. Live tests that failed while
-the machine stood still, or among those of low priority, are run once more with the machine to
-themselves.
+have a low priority: a live process that wakes gets a core at once. Live tests that failed
+among all others are run once more, with the machine to themselves. Both times are printed.
 """
 
 import contextlib
@@ -29,7 +28,7 @@ import subprocess
 import sys
 import tempfile
 
-from stall_watch import EXIT_CROWDED, EXIT_STOOD_STILL, NAMES_A_LIVE_TEST, TIMED
+from stall_watch import EXIT_CROWDED, NAMES_A_LIVE_TEST, TIMED
 
 ROOT = Path(__file__).resolve().parent.parent
 # One process more than cores: some of these tests wait as well. File by file in this order, so
@@ -37,6 +36,7 @@ ROOT = Path(__file__).resolve().parent.parent
 # They wait for cores as well, so that their limit is for what never ends.
 OTHERS = ('-m', f'not ({TIMED})', '--numprocesses', str(1 + (os.cpu_count() or 1)),
           '--dist', 'loadfile', '--no-loadscope-reorder', '-o', 'timeout=900')
+TESTS_FAILED = 1            # exit code of pytest
 # A tenth of the time where a live process wants the core as well.
 NICE = 10
 
@@ -84,9 +84,8 @@ def main():
             pytest(*OTHERS, preexec_fn=to_background))
         said.seek(0)
         print('\nThe live tests that ran beside them:\n', said.read(), sep='', flush=True)
-    if live == EXIT_STOOD_STILL:
-        print('The machine stood still during the live tests that failed; these once more:',
-              flush=True)
+    if live == TESTS_FAILED:
+        print('Live tests failed beside all others; these once more:', flush=True)
         live, = ended(pytest(*live_arguments, '--last-failed'))
     if others == EXIT_CROWDED:
         print('Of the tests of low priority only live ones failed; these once more:', flush=True)

@@ -32,10 +32,8 @@ import time
 TIMED = 'timed or ros and not shared'
 # A file whose text names no such marker has no such test; conftest.py holds every file to it.
 NAMES_A_LIVE_TEST = re.compile(r'\bmark\.(ros|timed)\b')
-# Exit code of a run in which tests failed, but only while the machine stood still.
-EXIT_STOOD_STILL = 75       # EX_TEMPFAIL of sysexits.h: try again
 # Exit code of a run in which only live tests of low priority failed.
-EXIT_CROWDED = 76
+EXIT_CROWDED = 75       # EX_TEMPFAIL of sysexits.h: try again
 PERIOD_S = 0.01
 STALL_S = 0.025     # a quarter of the shortest time limit of the rig
 
