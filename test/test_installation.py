@@ -122,7 +122,7 @@ def test_installed_executables_answer_at_once(isolated_install, tmp_path):
     folder = isolated_install / 'pam_actuation' / 'lib' / 'pam_actuation'
     environment = environment_of(isolated_install / 'setup.bash')
     for name in (*NODES, *FOR_OTHER_RIGS):
-        shown = run([folder / name, '--help'], cwd=tmp_path, env=environment)
+        shown = run([folder / name, '--help'], cwd=tmp_path, env=environment, timeout=20)
         assert shown.startswith(f'usage: {name} ') and 'Parameters of every node:' in shown
 
 
@@ -169,7 +169,7 @@ def test_every_executable_starts_and_ends_from_the_colcon_install(isolated_insta
 def end(process):
     """Wait for a process, kill it if it does not end; return what it printed."""
     try:
-        return process.communicate()[0]
+        return process.communicate(timeout=20)[0]
     except subprocess.TimeoutExpired:
         process.kill()
         return process.communicate()[0]

@@ -50,7 +50,7 @@ LONGEST_START_S = 60.0      # compiling at the first start cannot be interrupted
 # For the way out once everything is safe and sent. Fast DDS now and then never comes back from
 # taking its tables down, with the lock of the interpreter held: only the system can end that.
 # https://github.com/eProsima/Fast-DDS/issues/6193
-LEAVE_S = 4.0
+LEAVE_S = 3.5
 
 
 class _Stopper(threading.Thread):
