@@ -30,6 +30,8 @@ from typing import Any
 import joblib
 import numpy as np
 from pam_actuation.control.config import load_controller
+from pam_actuation.control.delay_estimate import DelayEstimator
+from pam_actuation.control.valve_delay import ValveDelayEstimator
 from pam_actuation.experiments import Experiment, load_experiment
 from pam_actuation.experiments.offline import simulate_experiment
 from pam_actuation.parallel import in_processes
@@ -48,6 +50,7 @@ NOMINAL_RIG = 'dmsp_5_300_hanging_mass'
 FORCE_RIG = 'dmsp_5_300_isometric_realistic'
 JOINT = 'joint_dmsp_5_300'
 LAWS = ('sofc_ppr', 'pid', 'lqi', 'ilc_ppr', 'mpc_ppr')
+RATE_HZ = 200.0
 ROWS = 10       # of a rollout: it is compiled before the first one
 
 
@@ -85,6 +88,9 @@ def rollouts() -> None:
     with_terms(found.outputs, 'force', reading.parameters, rig.parameters)
     follow(*np.zeros((3, ROWS)))
     mean_openings_with_lift(np.zeros(ROWS), 0.01, 0.0, 0.0, 0.0, 0.0, np.empty(ROWS))
+    # As a report does, which finds the dead time of a recorded valve.
+    DelayEstimator(RATE_HZ).steps(*np.zeros((2, ROWS)))
+    ValveDelayEstimator(RATE_HZ).steps(*np.zeros((4, ROWS)))
 
 
 def limb() -> None:
