@@ -86,6 +86,7 @@ def run(args: argparse.Namespace) -> int:
     from pam_actuation.cli.common import check_outputs
     from pam_actuation.tables.importer import digest_of, recording_of, write_bag
     from pam_actuation.tables.preview import unread
+    from pam_actuation.tables.repeats import without_repeats
     from pam_actuation.tables.resample import hint, resampled
     from pam_sim.files import write_text
     from pam_sim.joint import load_rig_or_joint
@@ -103,6 +104,7 @@ def run(args: argparse.Namespace) -> int:
         length_m=MUSCLE_LENGTH_M if rig is None else rig.muscle.length_m)
     if args.begin_s > 0.0 or args.end_s < float('inf'):
         recording = recording.between(args.begin_s, args.end_s)
+    recording = without_repeats(recording)
     if args.resample is not None:
         recording = resampled(recording, args.resample)
     elif said := hint(recording):

@@ -23,7 +23,7 @@ from pam_actuation.bags.plausibility import (
 from pam_actuation.tables.mapping import ColumnMap
 from pam_actuation.tables.signals import BY_NAME, of_muscles, Signal
 from pam_actuation.tables.units import (
-    ABSOLUTE, ANGLE, FORCE, GAUGE, LENGTH, names_of, PRESSURE, unit_of_text)
+    ABSOLUTE, ANGLE, FORCE, GAUGE, LENGTH, names_of, of_output, PRESSURE, unit_of_text)
 from pam_actuation.tables.words import unit_in
 from pam_sim.annotations import BoolArray, FloatArray, IntArray
 from pam_sim.units import P_ATM_PA
@@ -247,6 +247,8 @@ def _gauge_or_absolute(signal: Signal, mapped: ColumnMap, finite: FloatArray, le
 def _other_unit(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: float
                 ) -> Doubt | None:
     in_name = unit_in(mapped.column)
+    if mapped.gain == 1.0 and (output := of_output(in_name, signal.quantity)):
+        return Doubt(f'the name of the column says {in_name}; {output}')
     said = unit_of_text(in_name, signal.quantity) if in_name else None
     if said is None or said.factor == mapped.unit.factor or mapped.gain != 1.0:
         return None

@@ -15,15 +15,20 @@
 """What a table holds and how it would be read, as lines for people."""
 
 from collections.abc import Collection
+import re
 
 import numpy as np
 from pam_actuation.tables.clock import time_column
 from pam_actuation.tables.guess import Guess
 from pam_actuation.tables.signals import BY_NAME
 from pam_actuation.tables.table import Table
+from pam_actuation.tables.words import unit_in, words_of
 from pam_sim.errors import InputError
 
 _MOST_COLUMNS = 60
+# Signal, unit, words of a likely column, gain of a sensor of 4 to 20 mA (10 bar, 100 mm).
+_EXAMPLES = (('pressure', 'kPa_gauge', r'\bp\b|press', 62.5),
+             ('contraction', 'mm', r'\bx\b|dist|pos|len|disp|stroke|contract', 6.25))
 
 
 def preview(tables: Collection[Table], found: Guess, missing: Collection[str] = ()) -> str:
@@ -70,8 +75,15 @@ def question_sentence(found: Guess) -> str:
 
 def how_to_begin(tables: Collection[Table], found: Guess) -> str:
     """Return the words of the command line that begin a mapping, with columns of the file."""
-    examples = zip(('pressure', 'contraction'), unread(tables, found), ('kPa_gauge', 'mm'))
-    return ' '.join(f'--map {signal}="{column}:{unit}"' for signal, column, unit in examples)
+    columns, said = unread(tables, found), []
+    for signal, unit, words, gain in _EXAMPLES:
+        if not columns:
+            break
+        column = next((one for one in columns if re.search(words, words_of(one))), columns[0])
+        columns.remove(column)
+        more = f':zero=4:gain={gain:g}' if unit_in(column) == 'mA' else ''
+        said.append(f'--map {signal}="{column}:{unit}{more}"')
+    return ' '.join(said)
 
 
 def unread(tables: Collection[Table], found: Guess) -> list[str]:

@@ -47,6 +47,12 @@ _OTHER_NAMES = {'µm': 'um', 'μm': 'um', 'µs': 'us', 'μs': 'us', 'sec': 's', 
                 'grad': 'deg', 'radian': 'rad', 'radians': 'rad'}
 
 
+# What sensors put out: where that begins, and how far it goes.
+_OUTPUTS = {'mA': (4.0, 16.0), 'V': (0.0, 10.0), 'mV': (0.0, 20.0)}
+_SPANS = {PRESSURE: (10.0, 'bar_gauge'), LENGTH: (100.0, 'mm'), FORCE: (1000.0, 'N'),
+          ANGLE: (180.0, 'deg')}
+
+
 @dataclass(frozen=True)
 class Unit:
     """
@@ -115,13 +121,25 @@ def checked_unit(text: str, quantity: str, where: str) -> Unit:
         names = names_of(quantity)
         article = 'an' if quantity == ANGLE else 'a'
         raise InputError(
-            f'{text!r} is no unit of {article} {quantity}{did_you_mean(text, names)}; allowed: '
-            + ', '.join(names), where)
+            f'{text!r} is no unit of {article} {quantity}'
+            + (f'; {said}' if (said := of_output(text, quantity)) else did_you_mean(text, names))
+            + '; allowed: ' + ', '.join(names), where)
     if not unit.is_complete:
         raise InputError(
             f'{text!r} does not say whether the pressure is gauge or absolute; write '
             f'{unit.name}_gauge (0 for a vented muscle) or {unit.name}_abs', where)
     return unit
+
+
+def of_output(text: str, quantity: str) -> str:
+    """Return how the output of a sensor, in V or mA, is mapped; '' where the unit is another."""
+    if text not in _OUTPUTS or quantity not in _SPANS:
+        return ''
+    (zero, wide), (span, unit) = _OUTPUTS[text], _SPANS[quantity]
+    begin = f':zero={zero:g}' if zero else ''
+    return (f'{text} is what a sensor puts out: state the unit of what it measures, with zero '
+            f'and gain, such as COLUMN:{unit}{begin}:gain={span / wide:g} for {span:g} '
+            f'{unit.partition("_")[0]} over {zero:g} to {zero + wide:g} {text}')
 
 
 def si_unit(quantity: str) -> Unit:

@@ -17,12 +17,16 @@
 import re
 
 import numpy as np
-from pam_actuation.tables.mapping import column_of_text
+from pam_actuation.tables.guess import guess
+from pam_actuation.tables.mapping import column_of_text, TableMapping
 from pam_actuation.tables.plausible import doubts
+from pam_actuation.tables.preview import how_to_begin
 from pam_actuation.tables.signals import of_words, signal_of, SIGNALS, TIME_WORDS
+from pam_actuation.tables.table import Table
 from pam_actuation.tables.words import words_of
 from pam_sim.errors import InputError
 from pam_sim.units import P_ATM_PA
+import pandas as pd
 import pytest
 
 PRESSURE_PA = P_ATM_PA + np.repeat([2e3, 3e5, 4e5], 20)
@@ -82,3 +86,24 @@ def test_a_wire_that_breaks_is_told_with_its_option(begin, end, is_told):
 def test_the_name_of_a_topic_leads_to_its_signals():
     with pytest.raises(InputError, match='a topic: fill_duty or vent_duty or ppr_voltage; allow'):
         signal_of('valve_signal', '--map')
+
+
+@pytest.mark.parametrize('text, is_told', [
+    ('Piezo_P_(mA):bar_gauge', True), ('Piezo_P_(mA):bar_gauge:zero=4:gain=0.75', False),
+    ('p_bar:bar_gauge', False)])
+def test_a_sensor_in_milliamperes_without_a_gain(text, is_told):
+    column = column_of_text('pressure', text, 'here')
+    said = ' '.join(one.sentence for one in doubts(
+        {'pressure': (STAMP_NS, column.to_si(5.0 + 0.02 * np.arange(60.0)))},
+        {'pressure': column}, 0.3))
+    assert ('mA is what a sensor puts out' in said) == is_told
+
+
+def test_how_to_begin_with_names_that_nobody_knows():
+    columns = {name: pd.Series(np.arange(9.0)) for name in (
+        'T_(ms)', 'Sys_Volts_(V)', 'Piezo_P_(mA)', 'V_dist_(mA)')}
+    tables = [Table('daq.dat', columns)]
+    found = guess(tables, TableMapping())
+    assert not found.mapping.signals and how_to_begin(tables, found) == (
+        '--map pressure="Piezo_P_(mA):kPa_gauge:zero=4:gain=62.5" '
+        '--map contraction="V_dist_(mA):mm:zero=4:gain=6.25"')

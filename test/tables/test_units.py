@@ -50,6 +50,15 @@ def test_a_pressure_says_gauge_or_absolute():
         checked_unit('bar', PRESSURE, 'here')
 
 
+@pytest.mark.parametrize('text, quantity, option', [
+    ('mA', PRESSURE, 'COLUMN:bar_gauge:zero=4:gain=0.625 for 10 bar over 4 to 20 mA'),
+    ('mA', 'length', 'COLUMN:mm:zero=4:gain=6.25 for 100 mm'), ('V', 'force', ':N:gain=100 for')])
+def test_the_output_of_a_sensor_is_no_unit_of_what_it_measures(text, quantity, option):
+    with pytest.raises(InputError, match=option) as error:
+        checked_unit(text, quantity, 'here')
+    assert 'did you mean' not in str(error.value)
+
+
 @pytest.mark.parametrize('name, unit, words', [
     ('p_bar', 'bar', 'p'), ('Pressure [kPa gauge]', 'kPa gauge', 'pressure'),
     ('t_nominal_s', 's', 't nominal'), ('Force (N)', 'N', 'force'), ('time', '', 'time'),
