@@ -22,6 +22,7 @@ from pam_actuation import messages
 from pam_actuation.bags.load import load_run
 from pam_actuation.bags.writer import BagWriter
 from pam_actuation.cli.main import main
+from pam_actuation.tables.formats.layout_of_text import layout_of
 from pam_actuation.topics.codec import encode
 from pam_actuation.topics.table import topic_of
 from pam_sim.errors import InputError
@@ -199,3 +200,27 @@ def test_measurements_of_others(tmp_path, file, options, topics):
     assert set(load_run(tmp_path / 'bag').topics) == topics
     assert main(['report', str(tmp_path / 'bag'), '--out', str(tmp_path / 'report.html')]) in (
         0, 1)
+
+
+@pytest.mark.parametrize('preamble', [
+    (), ('Rate{0}200', 'Date{0}2024-01-01', 'Operator{0}Max'),
+    ('Rate: 200', 'Date: 2024-01-01 10:00', 'Channels: 3', '')])
+@pytest.mark.parametrize('dated', [False, True])
+@pytest.mark.parametrize('state', ['', 'OK', 'valve open'])
+@pytest.mark.parametrize('separator, decimal', [
+    (';', '.'), (';', ','), ('\t', '.'), ('\t', ','), (',', '.'), ('|', ',')])
+def test_a_table_of_few_columns_is_read_as_it_is_meant(separator, decimal, state, dated, preamble):
+    for count in range(1, 5):
+        names = [*(['Day'] if dated else []), *'tpxF'[:count], *(['state'] if state else [])]
+        if len(names) == 1:
+            continue
+        lines = [line.format(separator) for line in preamble] + [separator.join(names)]
+        for row in range(30):
+            values = [f'{0.005 * row + 7 * place:.3f}'.replace('.', decimal)
+                      for place in range(count)]
+            lines.append(separator.join([
+                *([f'2024-01-01 10:00:{row:02d}'] if dated else []), *values,
+                *([state] if state else [])]))
+        found = layout_of('\n'.join([*lines, '']).encode(), 'table.csv')
+        assert (found.separator, found.names) == (separator, tuple(names)), lines[-1]
+        assert (found.decimal, found.first_line) == (decimal, len(lines) - 29), lines[-1]

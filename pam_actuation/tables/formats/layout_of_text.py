@@ -30,7 +30,8 @@ LINE_END = re.compile(r'\r\n|\r|\n')               # as pandas counts lines; no 
 _SEPARATORS = (';', '\t', ',', '|', r'\s+')
 _NUMBER = r'[+-]?(\d+{0}?\d*|{0}\d+)([eEdD][+-]?\d+)?'
 _DATE = re.compile(
-    r'\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}([T ]\d{1,2}:\d{2}.*)?|\d{1,2}:\d{2}(:[\d.,]+)?')
+    r'\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}([T ]\d{1,2}:\d{2}[^;|\t]*)?|\d{1,2}:\d{2}(:[\d.,]+)?')
+_DATE_AND_TIME = re.compile(r'\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4} +\d{1,2}:\d{2}')
 _EMPTY = {'', 'nan', 'na', 'n/a', 'null', 'none', '-', 'inf', '+inf', '-inf', '#n/a'}
 COMMENTS = ('#', '%', '//')
 _LOOKED_AT = 200                     # lines
@@ -95,19 +96,22 @@ def layout_of(head: bytes, source: str) -> TextLayout:
     said = None
     if lines and re.fullmatch(r'sep=.', lines[0].strip()):
         said = lines[0].strip()[4:]
-    best: tuple[tuple[int, int, int], str, str, int] | None = None
+    best: tuple[tuple[float, ...], str, str, int] | None = None
+    count = 0
     for separator in (said,) if said else _SEPARATORS:
         for decimal in '.,':
             if decimal == separator and not any('"' in line for line in lines[-_LOOKED_AT:]):
                 continue
-            begin, count, numbers = _first_row(lines, separator, decimal)
-            rank = len(lines) - begin, count, numbers
-            if count and (best is None or rank > best[0]):
-                best = (rank, separator, decimal, begin)
+            begin, share, fields, numbers = _first_row(lines, separator, decimal)
+            # Fields that are numbers before many fields: 0,5;1,5 has two, and no third "5;1".
+            rank = (len(lines) - begin, share, _names(lines[:begin], separator) == fields,
+                    separator != r'\s+', fields, numbers)
+            if fields and (best is None or rank > best[0]):
+                best, count = (rank, separator, decimal, begin), fields
     if best is None:
         raise InputError(
             'holds no rows of numbers with a separator that is ; , | a tab or spaces', source)
-    (_, count, _), separator, decimal, begin = best
+    _, separator, decimal, begin = best
     named, units = _header(lines[:begin], separator, count, begin, source, decimal)
     names = _unique(named or [''] * count)
     called = {own: name for own, name in zip(names, named) if name and own != name}
@@ -119,6 +123,12 @@ def layout_of(head: bytes, source: str) -> TextLayout:
     line_bytes = sum(len(line) + 1 for line in rows) / len(rows)
     return TextLayout(encoding, separator, decimal, names, units, begin + 1,
                       line_bytes * WIDTH.get(encoding, 1), remark, called)
+
+
+def _names(above: list[str], separator: str) -> int:
+    """Return how many names the line above the rows holds with a separator, 0 for one alone."""
+    fields = split(next((line for line in reversed(above) if line.strip()), ''), separator)
+    return len(fields) if len(fields) > 1 else 0
 
 
 def _counts(fields: list[str]) -> bool:
@@ -157,30 +167,51 @@ def split(line: str, separator: str) -> list[str]:
     return [one.strip() for one in line.strip(' \r\n').split(separator)]
 
 
-def _first_row(lines: list[str], separator: str, decimal: str) -> tuple[int, int, int]:
-    """Return where the rows begin, their number of fields, and how many numbers all hold."""
+def _first_row(lines: list[str], separator: str, decimal: str) -> tuple[int, float, int, int]:
+    """
+    Return where the rows begin, and what they hold.
+
+    That is the share of their fields that are numbers, dates or empty, the number of fields of a
+    row, and how many numbers all rows hold.
+    """
     number = re.compile(_NUMBER.format(re.escape(decimal)))
-    numbers = 0
+    numbers = fitting = of_rows = 0
 
     def kind(line: str) -> int:
-        nonlocal numbers
+        nonlocal numbers, fitting, of_rows
         fields = split(line, separator)
         numeric = sum(bool(number.fullmatch(one)) for one in fields)
         dates = sum(bool(_DATE.fullmatch(one)) for one in fields)
         empty = sum(one.lower() in _EMPTY for one in fields)
         numbers += numeric
         # A text in a row of numbers is a flag, or a value that the import will name.
-        return len(fields) if numeric and 2 * (numeric + dates + empty) >= len(fields) else 0
+        if separator == r'\s+':      # a date and its time stand for one value
+            dates -= len(_DATE_AND_TIME.findall(line))
+        known = numeric + dates + empty
+        if not numeric or 2 * known < len(fields):
+            return 0
+        fitting, of_rows = fitting + known, of_rows + len(fields)
+        return len(fields)
 
     looked_at = [kind(line) for line in lines[:_LOOKED_AT]]
+    # Settings above a table, such as "Rate;200", begin with a word, and its rows with a number.
+    rows = [place for place, count in enumerate(looked_at) if count]
+    numbered = [place for place in rows if not _begins_with_word(split(lines[place], separator))]
+    if 2 * len(numbered) > len(rows):
+        looked_at[:numbered[0]] = [0] * numbered[0]
     counts = Counter(count for count in looked_at if count)
     if not counts:
-        return 0, 0, 0
+        return 0, 0.0, 0, 0
     usual = max(counts, key=lambda count: (counts[count], count))
     if 2 * counts[usual] < sum(1 for line in lines[:_LOOKED_AT] if line.strip()) and (
             counts[usual] < 3):
-        return 0, 0, 0
-    return looked_at.index(usual), usual, numbers
+        return 0, 0.0, 0, 0
+    return looked_at.index(usual), fitting / of_rows, usual, numbers
+
+
+def _begins_with_word(fields: list[str]) -> bool:
+    """Return whether the first field is no number, and does not stand for a missing one."""
+    return fields[0][:1].isalpha() and fields[0].lower() not in _EMPTY
 
 
 def _header(above: list[str], separator: str, count: int, begin: int, source: str,
