@@ -29,7 +29,7 @@ from pam_actuation.control.sofc.settings import SETTINGS as SOFC_SETTINGS
 from pam_actuation.drivers.config import DRIVER_PARAMETERS
 from pam_actuation.experiments import experiment
 from pam_actuation.experiments.chain import DOMAINS, FORCE
-from pam_actuation.experiments.primitives.make import keys_of, PRIMITIVES, range_of
+from pam_actuation.experiments.primitives.make import is_list, keys_of, PRIMITIVES, range_of
 from pam_actuation.hardware.back_ends import SENSOR_INPUTS, VALVE_OUTPUTS
 from pam_actuation.tables import mapping, units
 from pam_actuation.tables.signals import ANGLES, SIGNALS
@@ -185,7 +185,8 @@ def experiment_page():
             lower, upper, unit = range_of(field)
             rows.append((
                 f'`{field.name if quantity else key}`' + (r'\*' if quantity else ''),
-                _KINDS[int if field.type is int else float],
+                'a list of numbers' if is_list(field)
+                else _KINDS[int if field.type is int else float],
                 f'`{field.default}`' if isinstance(field.default, (int, float)) else 'required',
                 'range of the domain' if quantity else f'{lower:g} to {upper:g} {unit}'.strip(),
                 plain(field.metadata.get('meaning', ''))))

@@ -211,7 +211,8 @@ def add_seed_option(parser: Parser, text: str) -> None:
         '--seed', type=count(0, HIGHEST_SEED), default=0, metavar='N', help=text)
 
 
-def add_overwrite_option(parser: Parser, what: str = 'files that are there already') -> None:
+def add_overwrite_option(parser: 'argparse._ActionsContainer',
+                         what: str = 'files that are there already') -> None:
     """Add the option without which no verb replaces ``what``."""
     parser.add_argument('--overwrite', action='store_true', help=f'replace {what}')
 

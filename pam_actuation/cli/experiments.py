@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""``pam experiments``: the experiments, rigs and controllers that can be named."""
+"""``pam experiments``: those that can be named, and one that follows a column of a table."""
 
 import argparse
 import shutil
@@ -21,27 +21,42 @@ from typing import Any, TYPE_CHECKING
 from pam_actuation.cli.common import emit, EXIT_DONE
 from pam_actuation.cli.options import Parser, source
 from pam_actuation.cli.overview import wrapped
+from pam_actuation.cli.samples import add_samples_options, make, refuse_without_samples
 
 if TYPE_CHECKING:
     from pam_actuation.experiments.experiment import Experiment
 
-HELP = 'List the experiments with length and what they track, and the names of rigs and ' \
-    'controllers.'
+HELP = """List the experiments with length and what they track, the rigs and the controllers.
+
+With --samples a column of a table, such as a gait that was measured, becomes an experiment."""
 EXAMPLE = 'pam experiments staircase'
 # What a person reads for each domain; those in brackets run without a controller.
 TRACKS = {
     'contraction': 'contraction', 'force': 'force', 'joint_angle': 'joint angle',
     'pressure': '- (pressure)', 'ppr_voltage': '- (ppr voltage)', 'hsv_duty': '- (hsv duty)'}
+# What pam simulate needs for experiments that are not for one muscle with a load.
+NEEDS = {'joint_angle': ' --rig joint_dmsp_5_300_realistic',
+         'force': ' --rig dmsp_5_300_isometric_realistic --controller sofc_force_ppr'}
 
 
 def add_arguments(parser: Parser) -> None:
     """Declare the options of the verb."""
     parser.add_argument('name', type=source, nargs='?', default=None, metavar='NAME|FILE',
                         help='show this experiment in full')
+    add_samples_options(parser)
 
 
 def run(args: argparse.Namespace) -> int | None:
     """Print one line per experiment, or one experiment in full."""
+    if args.samples is not None:
+        out, made = make(args)
+        name, told = made.experiment.name, made.told
+        emit(args, {'experiment': out, **_summary(name, made.experiment), 'remarks': told},
+             '\n'.join([f'{name}: {told[0]}', *(f'  {text}' for text in told[1:]),
+                        f'experiment: {out}',
+                        f'next: pam simulate {out}{NEEDS.get(made.experiment.domain, "")}']))
+        return EXIT_DONE
+    refuse_without_samples(args)
     from pam_actuation.experiments import load_experiment
     from pam_actuation.resources import list_config
     from pam_sim.joint.model_file import joint_preset_names

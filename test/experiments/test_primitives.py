@@ -52,11 +52,14 @@ EXAMPLES = {
               'rates': 3},
     'triangle_loops': {'low_m': 0.002, 'high_m': 0.02, 'depth_m': 0.003, 'loops': 2,
                        'period_s': 8.0, 'cycles': 2},
+    'samples': {'values_m': [0.003, 0.004, 0.009, 0.007, 0.007, 0.012, 0.005, 0.003],
+                'every_s': 0.2,
+                'cycles': 3},
     'two_bands': {'low_center_m': 0.006, 'high_center_m': 0.016, 'amplitude_m': 0.002,
                   'frequency_hz': 0.5, 'cycles': 2, 'move_s': 1.0},
 }
 SMOOTH = ('rest', 'hold', 'ramp', 'sine', 'chirp', 'increments', 'multisine', 'decay',
-          'knee_gait', 'two_bands')
+          'knee_gait', 'samples', 'two_bands')
 NAMED = list_config('experiments')
 
 
@@ -134,6 +137,29 @@ def test_two_bands_make_the_same_motion_twice():
         assert high[0] - low[0] == pytest.approx(0.01)
         assert high[1] == pytest.approx(low[1])
     assert primitive.at(0.0)[0] == 0.003 and primitive.end == pytest.approx(0.014)
+
+
+def test_samples_go_through_every_value_and_cycles_join_without_a_corner():
+    primitive = make('samples')
+    assert primitive.duration_s == pytest.approx(4.2)
+    assert primitive.periods == (pytest.approx(1.4), 3)
+    for k in range(22):
+        value = EXAMPLES['samples']['values_m'][k % 7]
+        assert primitive.at(0.2 * k)[0] == pytest.approx(value, abs=1e-12)
+    assert [primitive.at(1.4 + s)[1] for s in (-1e-7, 1e-7)] == pytest.approx([0.0] * 2, abs=1e-6)
+    between = [primitive.at(0.001 * k)[0] for k in range(4201)]
+    assert min(between) >= 0.003 and max(between) <= 0.012
+
+
+@pytest.mark.parametrize('keys, told', [
+    ({'values_m': [0.001]}, 'has 1 values; allowed are 2 to 15000'),
+    ({'values_m': [0.001, 'x']}, "item 2 of samples.values_m is 'x'; a finite number is needed"),
+    ({'values_m': 0.001}, 'samples.values_m is 0.001; a list of numbers is needed'),
+    ({'values_m': [0.001, 0.002], 'cycles': 2}, 'the last value must be the first'),
+    ({'values_m': [0.001, 0.002], 'every_s': 0.001}, 'samples.every_s is 0.001; allowed is')])
+def test_samples_that_make_no_path_are_refused(keys, told):
+    with pytest.raises(InputError, match=re.escape(told)):
+        make_primitive('samples', {'every_s': 0.1, **keys}, 0.0, 0.0, 'm')
 
 
 def test_knee_gait_has_two_flexions_per_stride_and_stays_in_its_range():

@@ -65,6 +65,11 @@ def range_of(field: Field[Any]) -> tuple[float, float, str]:
         field.name.rsplit('_', 1)[-1], (1 if field.type is int else 1e-3, _LARGEST_COUNT, ''))
 
 
+def is_list(field: Field[Any]) -> bool:
+    """Return whether a key holds a list of numbers."""
+    return field.type == list[float]
+
+
 def make_primitive(name: str, arguments: Mapping[str, Any], start: float, rest_value: float,
                    suffix: str, where: str = '', domain: str | None = None) -> Primitive:
     """
@@ -119,7 +124,18 @@ def make_primitive(name: str, arguments: Mapping[str, Any], start: float, rest_v
 
 
 def _check(what: str, field: Field[Any], value: object, is_quantity: bool, where: str) -> None:
-    """Raise InputError unless the value is a number in the range of its kind."""
+    """Raise InputError unless the value is a number in the range of its kind, or a list."""
+    if is_list(field):
+        if not isinstance(value, list):
+            raise InputError(f'{what} is {value!r}; a list of numbers is needed', where)
+        for place, item in enumerate(value):
+            _check_number(f'item {place + 1} of {what}', field, item, is_quantity, where)
+        return
+    _check_number(what, field, value, is_quantity, where)
+
+
+def _check_number(what: str, field: Field[Any], value: object, is_quantity: bool,
+                  where: str) -> None:
     if isinstance(value, bool) or not isinstance(value, (int, float)) \
             or not math.isfinite(value):
         raise InputError(f'{what} is {value!r}; a finite number is needed', where)
