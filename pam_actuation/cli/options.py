@@ -37,6 +37,7 @@ EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
 LONGEST_NAME_BYTES = 255      # of one file or folder, on every file system in use
 HIGHEST_SEED = 2**32 - 1
+_NEGATIVE_RANGE = re.compile(r'-\.?\d[^:]*:')
 _DECIMAL_COMMA = re.compile(r'[+-]?\d*,\d+')
 
 
@@ -51,7 +52,7 @@ class Parser(argparse.ArgumentParser):
         """Parse as always; note first whether mistakes are to be reported as JSON."""
         words = sys.argv[1:] if args is None else list(args)
         self.as_json = any(len(word) > 2 and '--json'.startswith(word) for word in words)
-        found, unknown = super().parse_known_args(args, namespace)
+        found, unknown = super().parse_known_args(_with_ranges(words), namespace)
         if unknown and self._subparsers is None:        # of a verb: its options are known here
             known = [word for action in self._actions for word in action.option_strings]
             hint = did_you_mean(unknown[0].partition('=')[0], known, '')
@@ -73,6 +74,17 @@ class Parser(argparse.ArgumentParser):
             raise argparse.ArgumentError(
                 None if action.dest == 'verb' else action,
                 f'{str(value)!r} is {what}{did_you_mean(value, names)}; allowed: {shown}')
+
+
+def _with_ranges(words: Sequence[str]) -> list[str]:
+    """Return words in which a range such as -15:15 is told from an option."""
+    found: list[str] = []
+    for word in words:
+        if _NEGATIVE_RANGE.match(word) and found and re.fullmatch('--[a-z-]+', found[-1]):
+            found[-1] += f'={word}'
+        else:
+            found.append(word)
+    return found
 
 
 def complain(sentence: str, code: int, program: str, as_json: bool = False) -> int:

@@ -65,6 +65,9 @@ NUMBERS = {
     ('campaign', '--jobs'): '1 to 1024, or -1 for one a core',
     ('valves', '--seed'): '0 to 4294967295', ('valves', '--hold'): '2 to 3600 s',
     ('rules', '--top'): '0 or more',
+    ('experiments', '--period'): '0.02 to 3600 s', ('experiments', '--cycles'): '1 to 1000',
+    ('experiments', '--lowpass'): '0.1 to 20 Hz', ('experiments', '--rate'): '0.1 to 1000000 Hz',
+    ('experiments', '--from'): '0 s or more', ('experiments', '--to'): '0 s or more',
     ('view', '--domain-id'): '0 to 232', ('view', '--port'): '0 to 65535'}
 
 

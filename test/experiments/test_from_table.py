@@ -94,6 +94,12 @@ def test_pressures_are_gauge_for_people_and_absolute_in_the_file(here, capsys):
     assert one.at(4.0)[0] == 401325.0 and one.at(one.duration_s)[0] == 201325.0
 
 
+def test_a_range_may_begin_below_zero(here):
+    write(here / 'knee.csv', {'t': np.arange(101) / 50.0, 'knee': KNEE})
+    one = made('knee.csv', '--map', 'angle=knee', '--range', '-15:15')
+    assert np.degrees(one.chain.extremes()) == pytest.approx((-15.0, 15.0), abs=0.01)
+
+
 @pytest.mark.parametrize('words, told', [
     (['--map', 'contraction=knee'], 'the unit is missing: write SIGNAL="COLUMN:UNIT", or add'),
     ([], 'say what is followed, such as --map contraction="COLUMN:mm"'),
