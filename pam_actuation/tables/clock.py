@@ -20,6 +20,7 @@ from typing import NamedTuple, TYPE_CHECKING
 
 import numpy as np
 from pam_actuation.messages import START_NS
+from pam_actuation.tables.dates import Dates, dates_of, days_as_ns
 from pam_actuation.tables.mapping import TableMapping, TimeMap
 from pam_actuation.tables.signals import TIME_WORDS
 from pam_actuation.tables.table import Table
@@ -154,7 +155,7 @@ def _from_column(table: Table, column: TimeMap, start_ns: int) -> _Times:
     is_text = not is_date and not pd.api.types.is_numeric_dtype(values) and column.unit in (
         '', DATE)
     if is_date or is_text and _is_date(values):
-        return _Times(_dates(table, name), f'column "{name}", dates')
+        return _dates(table, name, start_ns)
     unit = column.unit or _unit_of_name(table, name)
     if pd.api.types.is_integer_dtype(values) and unit == 'ns':
         stamps = values.to_numpy(dtype=np.int64)
@@ -166,6 +167,12 @@ def _from_column(table: Table, column: TimeMap, start_ns: int) -> _Times:
         raise InputError(
             f'column "{name}" has no time here ({len(missing)} such rows); delete the rows, or '
             'give --rate HZ', table.place(int(missing[0])))
+    days = days_as_ns(numbers) if unit in ('', DATE) else None
+    if days is not None:
+        return _Times(days, f'column "{name}" in days', _resolution_ns(days))
+    if unit == DATE:
+        raise InputError(f'column "{name}" holds numbers that are no days of a spreadsheet or of '
+                         f'MATLAB; add --map time="{name}:s" (or ms, us, ns)', table.source)
     unit = unit or _unit_by_rate(table, name, numbers)
     factor = FACTORS[TIME][unit]
     start = 0 if len(numbers) and numbers[0] * factor > EPOCH_S else start_ns
@@ -180,17 +187,24 @@ def _is_date(values: 'pd.Series') -> bool:
     return bool(re.search(r'\d[-/:.]\d', first)) and not re.fullmatch(r'[+-]?[\d.]+', first)
 
 
-def _dates(table: Table, name: str) -> IntArray:
+def _dates(table: Table, name: str, start_ns: int) -> _Times:
+    """Return the times in a column of texts, or of dates as other files hold them."""
     import pandas as pd
     values = table.columns[name]
-    dates = pd.to_datetime(values, errors='coerce', utc=True, format=(
-        None if pd.api.types.is_datetime64_any_dtype(values) else 'ISO8601'))
-    wrong = np.flatnonzero(dates.isna().to_numpy())
-    if len(wrong):
+    if pd.api.types.is_datetime64_any_dtype(values):
+        dates = pd.to_datetime(values, errors='coerce', utc=True)
+        wrong = np.flatnonzero(dates.isna().to_numpy())
+        found = int(wrong[0]) if len(wrong) else Dates(
+            dates.dt.as_unit('ns').astype('int64').to_numpy(), 'dates')
+    else:
+        found = dates_of(values)
+    if isinstance(found, int):
         raise InputError(
-            f'column "{name}" holds {str(values.iloc[wrong[0]])!r}, which is no date and time '
-            'as in 2026-11-25T09:30:00.125', table.place(int(wrong[0])))
-    return dates.dt.as_unit('ns').astype('int64').to_numpy()
+            f'column "{name}" holds {str(values.iloc[found])!r}, which is no date and time as in '
+            '2026-11-25T09:30:00.125', table.place(found))
+    stamps = found.stamp_ns + (start_ns if found.is_of_day else 0)
+    return _Times(stamps, f'column "{name}", {found.told}', _resolution_ns(found.stamp_ns),
+                  found.remark)
 
 
 def _unit_of_name(table: Table, name: str) -> str:

@@ -17,6 +17,7 @@
 import codecs
 
 import numpy as np
+from pam_actuation.messages import START_NS
 
 
 def _cut(draft, kept):
@@ -277,8 +278,9 @@ def dates_of_the_country(draft, random):
     begin = datetime(2026, 3, 4, 9, 30, tzinfo=timezone.utc)
     draft.names[0] = 'timestamp'
     stamps = [(begin + timedelta(seconds=float(one))).strftime(form) for one in draft.time_s]
-    if form.startswith('%Y'):
-        draft.start_s = begin.timestamp()
+    of_day_s = 9.5 * 3600.0
+    # 03/04 may be in March or in April: only the time of day is certain.
+    draft.start_s = begin.timestamp() if form[:2] in ('%Y', '%d') else 1e-9 * START_NS + of_day_s
 
     def change(rows):
         for row, stamp in zip(rows, stamps):

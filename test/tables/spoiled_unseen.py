@@ -71,6 +71,7 @@ def days_of_a_spreadsheet(draft, random):
     """Spoil: the time is a number of days, as a spreadsheet holds dates."""
     draft.columns[0].numbers = 46_351.4 + draft.time_s / 86_400.0
     draft.columns[0].form = '.12f'
+    draft.start_s = (46_351.4 - 25_569.0) * 86_400.0
     draft.names[0] = random.choice(['time', 'Date'])
 
 

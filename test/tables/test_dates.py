@@ -1,0 +1,103 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Dates and times of day as loggers, spreadsheets and people write them."""
+
+from datetime import datetime, timedelta
+
+import numpy as np
+from pam_actuation.messages import START_NS
+from pam_actuation.tables.clock import clock_of
+from pam_actuation.tables.dates import dates_of, days_as_ns
+from pam_actuation.tables.formats import read_tables
+from pam_actuation.tables.mapping import TableMapping
+from pam_sim.errors import InputError
+import pandas as pd
+import pytest
+
+BEGIN = datetime(2026, 3, 14, 23, 59, 59, 900_000)      # the rows go over midnight
+AT = [BEGIN + timedelta(milliseconds=5 * row) for row in range(60)]
+SINCE_MIDNIGHT_NS = 86_399_900_000_000
+EPOCH_NS = 1_773_532_799_900_000_000
+STEPS_NS = 5_000_000 * np.arange(60)
+
+
+@pytest.mark.parametrize('form, told, dated', [
+    ('%Y-%m-%dT%H:%M:%S.%f', 'dates', True), ('%Y/%m/%d %H:%M:%S.%f', 'dates', True),
+    ('%d.%m.%Y %H:%M:%S,%f', 'day, month, year', True),
+    ('%d/%m/%Y %H:%M:%S.%f', 'day, month, year', True),
+    ('%m/%d/%Y %I:%M:%S.%f %p', 'month, day, year', True),
+    ('%d.%m.%y  %H:%M:%S.%f', 'day, month, year', True), ('%H:%M:%S.%f', 'times of day', False),
+    ('%I:%M:%S.%f %p', 'times of day', False)])
+def test_what_a_clock_writes_is_read_over_midnight(form, told, dated):
+    found = dates_of(pd.Series([one.strftime(form) for one in AT]))
+    assert told in found.told and found.is_of_day is not dated and not found.remark
+    start_ns = EPOCH_NS if dated else SINCE_MIDNIGHT_NS
+    assert found.stamp_ns.tolist() == (start_ns + STEPS_NS).tolist()
+
+
+def test_minutes_and_seconds_are_told_from_hours_and_minutes():
+    found = dates_of(pd.Series([f'{int(t // 60):02d}:{t % 60:06.3f}' for t in (59.99, 60.005)]))
+    assert found.told == 'minutes and seconds'
+    assert found.stamp_ns.tolist() == [59_990_000_000, 60_005_000_000]
+
+
+def test_a_date_of_two_meanings_is_left_out_and_one_that_goes_on_is_not():
+    said = [f'03/04/2026 09:30:00.{row:03d}' for row in range(0, 100, 5)]
+    found = dates_of(pd.Series(said))
+    assert found.is_of_day and '03/04/2026 can be read in two ways' in found.remark
+    assert found.stamp_ns[0] == 34_200_000_000_000
+    over = dates_of(pd.Series(['03/04/2026 23:59:59.995', '03/05/2026 00:00:00.000']))
+    assert over.told == 'dates, month, day, year'
+    assert np.diff(over.stamp_ns).tolist() == [5_000_000]
+
+
+@pytest.mark.parametrize('text', ['31.02.2026 10:00:00', '10:61:00.0', '25:00:00.0', 'noon',
+                                  '13:00:00.0 PM', '3.4. 10:00:00'])
+def test_what_no_clock_shows_is_named_with_its_row(tmp_path, text):
+    before = '01.02.2026 09:00:00' if '2026' in text else '09:00:00.0'
+    (tmp_path / 'log.csv').write_text(f'time;p\n{before};1.5\n{text};1.5\n')
+    table, = read_tables(tmp_path / 'log.csv')
+    with pytest.raises(InputError, match=r'log.csv:3: column "time" holds .*no date and time'):
+        clock_of(table, TableMapping())
+
+
+def test_a_time_of_day_counts_from_the_midnight_before(tmp_path):
+    (tmp_path / 'log.csv').write_text('time;p\n' + ''.join(
+        f'{one:%H:%M:%S.%f};1.5\n' for one in AT))
+    table, = read_tables(tmp_path / 'log.csv')
+    clock = clock_of(table, TableMapping())
+    assert clock.stamp_ns.tolist() == (START_NS + SINCE_MIDNIGHT_NS + STEPS_NS).tolist()
+
+
+@pytest.mark.parametrize('day_1970', [25_569, 719_529])
+def test_days_of_a_spreadsheet_and_of_matlab(day_1970):
+    days = day_1970 + (EPOCH_NS + STEPS_NS) / 86_400e9
+    tolerance_ns = 1e9 * 86_400 * np.spacing(days[0]) + 1000
+    assert np.abs(days_as_ns(days) - EPOCH_NS - STEPS_NS).max() <= tolerance_ns
+
+
+@pytest.mark.parametrize('numbers', [
+    np.arange(25_000.0, 40_000.0, 5.0), 26_000.0 + 0.005 * np.arange(500), np.arange(5.0),
+    np.full(5, 46_000.0)])
+def test_milliseconds_and_seconds_are_no_days(numbers):
+    assert days_as_ns(numbers) is None
+
+
+def test_numbers_that_are_called_dates_are_told(tmp_path, capsys):
+    from pam_actuation.cli.main import main
+    (tmp_path / 'log.csv').write_text('t,p_kPa\n' + ''.join(f'{k},3\n' for k in range(50)))
+    assert main(['import', str(tmp_path / 'log.csv'), '--map', 'time=t:date', '--map',
+                 'pressure=p_kPa:kPa_gauge', '--out', str(tmp_path / 'bag')]) == 2
+    assert 'numbers that are no days of a spreadsheet' in capsys.readouterr().err
