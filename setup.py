@@ -77,6 +77,8 @@ FOXGLOVE_REQUIRES = [
 TABLE_REQUIRES = [
     'pyarrow>=14.0',     # Parquet
     'h5py>=3.10',        # HDF5, and MAT files of version 7.3
+    'openpyxl>=3.1',     # Excel
+    'npTDMS>=1.7',       # TDMS of LabVIEW
 ]
 
 TEST_REQUIRES = [

@@ -58,7 +58,8 @@ ROSDEP_KEYS = {
 WITH_ROS = {'rclpy', 'ament_index_python'}
 # Only where a cluster is named (pam_actuation/workers says what to install), for kinds of
 # tables, for the live page, for Foxglove.
-OPTIONAL = {'dask', 'distributed', 'ray', 'foxglove', 'h5py', 'pyarrow', 'tornado'}
+OPTIONAL = {'dask', 'distributed', 'ray', 'foxglove', 'h5py', 'nptdms', 'openpyxl', 'pyarrow',
+            'tornado'}
 
 
 @pytest.fixture(scope='module')

@@ -20,7 +20,7 @@ from pam_actuation.cli.common import (
     add_overwrite_option, add_recover_option, check_outputs, emit, EXIT_DONE, note_implausible)
 from pam_actuation.cli.options import number, out_path, Parser, source
 
-HELP = 'Write a bag as a table: CSV, TSV, Parquet, MAT or HDF5. Values are SI, pressures absolute.'
+HELP = 'Write a bag as a table: CSV, Excel, MAT, Parquet or NumPy. All in SI, pressures absolute.'
 EXAMPLE = 'pam export runs/first --out first.csv --rate 500'
 
 
@@ -28,7 +28,8 @@ def add_arguments(parser: Parser) -> None:
     """Declare the options of the verb."""
     parser.add_argument('bag', type=source, help='bag directory, or a lone .mcap file')
     parser.add_argument('--out', type=out_path, required=True, metavar='FILE',
-                        help='the table; its ending says the kind: .csv .tsv .parquet .mat .h5')
+                        help='the table; its ending says the kind: .csv .tsv .xlsx .mat '
+                             '.parquet .h5 .npz')
     parser.add_argument(
         '--rate', type=number(0.1, 1e5, 'Hz'), default=None, metavar='HZ',
         help='rows at equal distances; default: one row for each stamp of any topic')

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from pam_actuation.tables.importer import Recording
     from pam_actuation.tables.table import Table
 
-HELP = """Make a bag of a table measured elsewhere: CSV, TSV, Parquet, MAT, HDF5, or a foreign bag.
+HELP = """Make a bag of a table measured elsewhere: CSV, Excel, LabVIEW, MAT, or a foreign bag.
 
 Without --map the columns are found by name, unit and range; --preview shows how. What the file
 cannot tell is asked for. Several files are one recording: the next part, or other signals."""

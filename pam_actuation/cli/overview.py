@@ -27,7 +27,7 @@ GROUPS = {
         'simulate': 'simulate an experiment without ROS, faster than real time',
         'run': 'run an experiment on live nodes and record it',
         'up': 'bring up the nodes of a rig, a joint or both knees',
-        'import': 'make a bag of a table measured elsewhere: CSV, Parquet, MAT, HDF5',
+        'import': 'make a bag of a table measured elsewhere: CSV, Excel, LabVIEW, MAT',
         'rig': 'write a commented file of a rig, known and unknown numbers, or check one',
         'demo': 'see everything once with live nodes, in two and a half minutes'},
     'Operate running nodes': {
@@ -41,7 +41,7 @@ GROUPS = {
         'report': 'one HTML page with plots and metrics',
         'replay': 'step controller, driver and plant again on what was recorded',
         'rules': 'what the rules of a controller say, and what learning changed',
-        'export': 'write a bag as a table: CSV, Parquet, MAT, HDF5'},
+        'export': 'write a bag as a table: CSV, Excel, MAT, Parquet'},
     'Make a controller or a model better': {
         'tune': 'tune a controller on a model',
         'identify': 'determine the unknown numbers of a rig',

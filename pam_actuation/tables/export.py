@@ -25,8 +25,8 @@ from pam_sim.files import shown, StrPath, whole_file
 if TYPE_CHECKING:
     import pandas as pd
 
-WRITTEN = tuple(ending for ending, kind in ENDINGS.items() if kind != 'bag' and ending not in (
-    '.txt', '.dat', '.asc', '.log'))
+WRITTEN = tuple(ending for ending, kind in ENDINGS.items() if kind not in ('bag', 'tdms') and (
+    ending not in ('.txt', '.dat', '.asc', '.log')))
 
 
 def write_table(frame: 'pd.DataFrame', path: StrPath) -> Path:

@@ -53,7 +53,7 @@ def bag(tmp_path_factory):
     return path
 
 
-@pytest.mark.parametrize('ending', ['csv', 'tsv', 'parquet', 'mat', 'h5'])
+@pytest.mark.parametrize('ending', ['csv', 'tsv', 'parquet', 'mat', 'h5', 'npz', 'npy'])
 def test_export_and_import_are_inverse(bag, tmp_path, ending, capsys):
     table = str(tmp_path / f'table.{ending}')
     assert main(['export', str(bag), '--out', table]) == 0
@@ -67,6 +67,17 @@ def test_export_and_import_are_inverse(bag, tmp_path, ending, capsys):
         np.testing.assert_array_equal(second[name].stamp_ns, series.stamp_ns)
         for field, values in series.values.items():
             np.testing.assert_array_equal(second[name].values[field], values)
+
+
+def test_a_workbook_keeps_stamps_and_fifteen_digits(bag, tmp_path):
+    table = str(tmp_path / 'table.xlsx')
+    assert main(['export', str(bag), '--out', table]) == 0
+    assert main(['import', table, '--out', str(tmp_path / 'back')]) == 1
+    first, second = load_run(bag), load_run(tmp_path / 'back')
+    for name, series in first.topics.items():
+        np.testing.assert_array_equal(second[name].stamp_ns, series.stamp_ns)
+        for field, values in series.values.items():
+            np.testing.assert_allclose(second[name].values[field], values, rtol=1e-15)
 
 
 def test_the_same_table_gives_the_same_bag(bag, tmp_path):
@@ -88,6 +99,56 @@ def test_a_data_frame_on_a_grid_holds_commands(bag):
         load_run(bag).to_dataframe(topics=['presure'])
     with pytest.raises(InputError, match='0.1 to'):
         load_run(bag).to_dataframe(rate_hz=0.0)
+
+
+def test_a_waveform_of_labview(tmp_path, capsys):
+    from nptdms import ChannelObject, GroupObject, TdmsWriter
+    wave = {'wf_increment': 0.002, 'wf_start_offset': 0.5}
+    with TdmsWriter(tmp_path / 'rig.tdms') as writer:
+        writer.write_segment([
+            GroupObject('Rig'), ChannelObject('Settings', 'gain', np.array([2.0])),
+            ChannelObject('Rig', 'Pressure', np.linspace(0.5, 3.0, 300),
+                          {**wave, 'unit_string': 'bar(g)'}),
+            ChannelObject('Rig', 'x', np.linspace(0.0, 9.0, 300), {**wave, 'unit_string': 'mm'})])
+    assert main(['import', str(tmp_path / 'rig.tdms'), '--out', str(tmp_path / 'bag')]) == 0
+    run = load_run(tmp_path / 'bag')
+    np.testing.assert_allclose(run['pressure']['pressure_pa'],
+                               101_325.0 + 1e5 * np.linspace(0.5, 3.0, 300))
+    np.testing.assert_allclose(run['contraction']['contraction_m'][-1], 0.009)
+    assert np.diff(run['pressure'].stamp_ns).tolist() == [2_000_000] * 299
+
+
+def test_a_workbook_with_a_sheet_of_remarks_dates_and_units(tmp_path, capsys):
+    from datetime import datetime, timedelta
+    import openpyxl
+    book = openpyxl.Workbook()
+    book.active.title = 'Remarks'
+    book.active.append(['DMSP-5, valve', 'VPPM'])
+    sheet = book.create_sheet('Run 3')
+    for row in (['Operator', 'M. Muster'], [], ['Time', 'p', 'x'], [None, 'bar(g)', 'mm']):
+        sheet.append(row)
+    for k in range(200):
+        sheet.append([datetime(2026, 3, 14, 9, 30) + timedelta(milliseconds=10 * k),
+                      0.01 * k, 0.05 * k if k != 70 else None])
+    book.save(tmp_path / 'lab.xlsx')
+    assert main(['import', str(tmp_path / 'lab.xlsx'), '--out', str(tmp_path / 'bag')]) == 1
+    assert '1 of 200 values are missing' in capsys.readouterr().out
+    run = load_run(tmp_path / 'bag')
+    np.testing.assert_allclose(run['pressure']['pressure_pa'], 101_325.0 + 1e3 * np.arange(200))
+    assert np.diff(run['pressure'].stamp_ns).tolist() == [10_000_000] * 199
+    sheet['B80'] = 'OVL'
+    book.save(tmp_path / 'lab.xlsx')
+    assert main(['import', str(tmp_path / 'lab.xlsx'), '--out', str(tmp_path / 'two')]) == 2
+    assert 'lab.xlsx, sheet Run 3:80: column "p" holds \'OVL\'' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('ending', ['npz', 'npy', 'xlsx', 'tdms', 'mat', 'h5', 'parquet'])
+def test_a_file_that_is_not_what_its_ending_says(tmp_path, capsys, ending):
+    place = tmp_path / f'broken.{ending}'
+    for content in (b'', b'not at all', b'PK\x03\x04' + bytes(200), b'TDSm' + bytes(24)):
+        place.write_bytes(content)
+        assert main(['import', str(place), '--out', str(tmp_path / 'bag')]) == 2
+        assert capsys.readouterr().err.count('\n') == 1
 
 
 def test_a_struct_of_matlab(tmp_path, capsys):

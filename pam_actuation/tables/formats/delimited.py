@@ -35,6 +35,7 @@ from pam_sim.errors import InputError
 if TYPE_CHECKING:
     import pandas as pd
 
+Opened = Callable[[], Any]
 _OPEN: dict[str, Callable[..., Any]] = {'.gz': gzip.open, '.bz2': bz2.open, '.xz': lzma.open}
 _CHUNK_ROWS = 250_000
 _PACKED_FACTOR = 6                       # how much longer a packed text may be
@@ -43,15 +44,51 @@ _PACKED_FACTOR = 6                       # how much longer a packed text may be
 def read(path: str, every: int, wanted: Collection[str] | None,
          progress: Callable[[float], object]) -> list[Table]:
     """Return the table of a text file; see ``formats.read_tables``."""
-    layout = layout_of(_head(path), path)
-    frame, last = _frame(path, layout, every, _expected_rows(path, layout, every), progress)
+    ending = os.path.splitext(path)[1].lower()
+    size = os.path.getsize(path) * (_PACKED_FACTOR if ending in _OPEN else 1)
+    return tables_of_text(path, lambda: _OPEN.get(ending, open)(path, 'rb'), size, every, progress,
+                          is_packed=ending in _OPEN)
+
+
+def tables_of_text(path: str, opened: Opened, size: float, every: int,
+                   progress: Callable[[float], object], is_packed: bool = False) -> list[Table]:
+    """
+    Return the table of a text.
+
+    Parameters
+    ----------
+    path : str
+        Where it is, for messages.
+    opened : callable
+        Returns the text as a stream of bytes, from its beginning.
+    size : float
+        Its length in bytes, of a packed one about.
+    every, progress
+        As ``formats.read_tables``.
+    is_packed : bool
+        Whether the length is an estimate.
+
+    Raises
+    ------
+    InputError
+        As ``formats.read_tables``.
+
+    """
+    layout = layout_of(_head(path, opened), path)
+    rows = size / layout.line_bytes / every
+    if rows > MOST_ROWS and not is_packed:
+        raise InputError(
+            f'has about {rows * every / 1e6:.0f} million rows, more than {MOST_ROWS // 10**6} '
+            f'million; keep one of several, with --every {int(rows * every / MOST_ROWS) + 1}',
+            path)
+    frame, last = _frame(path, opened, layout, every, rows, progress)
     lines = layout.first_line + np.arange(len(frame), dtype=np.int64) * every
     check_quotes(frame, lines, path)
     remarks = [layout.remark] if layout.remark else []
     if every == 1 and len(frame) > 1 and last not in '\r\n':
         frame, lines = frame.iloc[:-1], lines[:-1]
         remarks.append('the last line has no end, so it may be incomplete: it was left out')
-    with _opened(path) as raw:
+    with opened() as raw:
         found = whole_rows(frame, lines, layout, io.TextIOWrapper(
             raw, layout.encoding, newline=''), path)
     frame, lines = frame[found.kept], lines[found.kept]
@@ -61,10 +98,10 @@ def read(path: str, every: int, wanted: Collection[str] | None,
                   called=layout.called, decimal=layout.decimal)]
 
 
-def _head(path: str) -> bytes:
+def _head(path: str, opened: Opened) -> bytes:
     """Return the begin of the file, unpacked."""
     try:
-        with _opened(path) as stream:
+        with opened() as stream:
             head: bytes = stream.read(SAMPLE_BYTES)
     except (EOFError, lzma.LZMAError, OSError, zlib.error) as error:
         raise InputError(f'cannot be unpacked: {error}', path) from None
@@ -73,25 +110,13 @@ def _head(path: str) -> bytes:
     return head
 
 
-def _expected_rows(path: str, layout: TextLayout, every: int) -> float:
-    """Return about how many rows will be kept; InputError if these are far too many."""
-    is_packed = os.path.splitext(path)[1].lower() in _OPEN
-    rows = os.path.getsize(path) / layout.line_bytes * (_PACKED_FACTOR if is_packed else 1) / every
-    if rows > MOST_ROWS and not is_packed:
-        raise InputError(
-            f'has about {rows * every / 1e6:.0f} million rows, more than {MOST_ROWS // 10**6} '
-            f'million; keep one of several, with --every {int(rows * every / MOST_ROWS) + 1}',
-            path)
-    return rows
-
-
-def _frame(path: str, layout: TextLayout, every: int, expected_rows: float,
+def _frame(path: str, opened: Opened, layout: TextLayout, every: int, expected_rows: float,
            progress: Callable[[float], object]) -> 'tuple[pd.DataFrame, str]':
     """Return one row of ``every``, and the last character of the file."""
     import pandas as pd
     pieces: list[pd.DataFrame] = []
     done = 0
-    with _opened(path) as raw:
+    with opened() as raw:
         text = WatchedText(io.TextIOWrapper(raw, layout.encoding, newline=''), path, layout)
         with _in_sentences(path, layout, text):
             reader = pd.read_csv(
@@ -129,10 +154,6 @@ def _in_sentences(path: str, layout: TextLayout, text: WatchedText) -> Iterator[
     except (EOFError, lzma.LZMAError, zlib.error, gzip.BadGzipFile) as error:
         raise InputError(f'cannot be unpacked: {error}', f'{path}, after line {text.line}'
                          ) from None
-
-
-def _opened(path: str) -> Any:
-    return _OPEN.get(os.path.splitext(path)[1].lower(), open)(path, 'rb')
 
 
 def _exact_numbers(version: str) -> dict[str, Any]:

@@ -219,7 +219,8 @@ def _header(above: list[str], separator: str, count: int, begin: int, source: st
     """Return names and units from the lines above the rows; no names without any."""
     rows = []
     for line in above:
-        text = line.strip().lstrip('\ufeff')
+        # A row of units may begin with an empty field, which a tab ends.
+        text = (line.strip(' \r\n') if separator == '\t' else line.strip()).lstrip('\ufeff')
         for mark in COMMENTS:
             text = text.removeprefix(mark).strip() if text.startswith(mark) else text
         if text and not re.fullmatch(r'sep=.', text):
