@@ -92,6 +92,8 @@ def _rises_without_name(table: Table, mapping: TableMapping) -> bool:
     first = next(iter(table.columns))
     if any(table.name_of(one.column) == first for one in mapping.signals.values()):
         return False
+    if _is_text_date(table.columns[first]):
+        return True
     try:
         return bool((np.diff(table.numbers(first)) > 0.0).all())
     except InputError:
@@ -152,9 +154,7 @@ def _from_column(table: Table, column: TimeMap, start_ns: int) -> _Times:
     name = table.require(column.column, column.where)
     values = table.columns[name]
     is_date = pd.api.types.is_datetime64_any_dtype(values)
-    is_text = not is_date and not pd.api.types.is_numeric_dtype(values) and column.unit in (
-        '', DATE)
-    if is_date or is_text and _is_date(values):
+    if is_date or column.unit in ('', DATE) and _is_text_date(values):
         return _dates(table, name, start_ns)
     unit = column.unit or _unit_of_name(table, name)
     if pd.api.types.is_integer_dtype(values) and unit == 'ns':
@@ -182,7 +182,11 @@ def _from_column(table: Table, column: TimeMap, start_ns: int) -> _Times:
                   _rate_remark(table, name, unit, stamps, bool(column.unit)))
 
 
-def _is_date(values: 'pd.Series') -> bool:
+def _is_text_date(values: 'pd.Series') -> bool:
+    """Return whether a column holds texts, and the first one is a date or a time of day."""
+    import pandas as pd
+    if pd.api.types.is_numeric_dtype(values) or pd.api.types.is_datetime64_any_dtype(values):
+        return False
     first = next((str(one) for one in values if isinstance(one, str)), '')
     return bool(re.search(r'\d[-/:.]\d', first)) and not re.fullmatch(r'[+-]?[\d.]+', first)
 

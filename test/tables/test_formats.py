@@ -22,7 +22,10 @@ from pam_actuation import messages
 from pam_actuation.bags.load import load_run
 from pam_actuation.bags.writer import BagWriter
 from pam_actuation.cli.main import main
+from pam_actuation.tables.clock import clock_of
+from pam_actuation.tables.formats import read_tables
 from pam_actuation.tables.formats.layout_of_text import layout_of
+from pam_actuation.tables.mapping import TableMapping
 from pam_actuation.topics.codec import encode
 from pam_actuation.topics.table import topic_of
 from pam_sim.errors import InputError
@@ -140,6 +143,29 @@ def test_a_workbook_with_a_sheet_of_remarks_dates_and_units(tmp_path, capsys):
     book.save(tmp_path / 'lab.xlsx')
     assert main(['import', str(tmp_path / 'lab.xlsx'), '--out', str(tmp_path / 'two')]) == 2
     assert 'lab.xlsx, sheet Run 3:80: column "p" holds \'OVL\'' in capsys.readouterr().err
+
+
+def test_a_motion_of_opensim(tmp_path, capsys):
+    rows = ''.join(f'      {0.01 * k:.8f}\t      {-30 - 0.1 * k:.8f}\t       1.5\r\n'
+                   for k in range(1, 100))
+    (tmp_path / 'ik.mot').write_bytes((
+        'Coordinates\r\nversion=1\r\nnRows=99\r\nnColumns=3\r\ninDegrees=yes\r\n\r\nUnits are '
+        'S.I. units (second, meters, Newtons, ...)\r\nendheader\r\ntime\tknee_angle_r\tpelvis_tx'
+        '\r\n' + rows).encode())
+    assert main(['import', str(tmp_path / 'ik.mot'), '--preview']) == 0
+    said = capsys.readouterr().out
+    assert '99 rows, 3 columns' in said and 'knee_angle_r  -39.9' in said
+    table, = read_tables(tmp_path / 'ik.mot')
+    assert list(table.columns) == ['time', 'knee_angle_r', 'pelvis_tx'] and table.lines[0] == 10
+
+
+def test_a_first_row_with_empty_fields_is_no_row_of_names(tmp_path):
+    (tmp_path / 'board.csv').write_text('2025-03-27T20:37:38.640,,\n' + ''.join(
+        f'2025-03-27T20:37:{38.652 + 0.012 * k:.3f},{k},0.5\n' for k in range(100)))
+    table, = read_tables(tmp_path / 'board.csv')
+    assert list(table.columns) == ['#1', '#2', '#3']
+    clock = clock_of(table, TableMapping())
+    assert clock.told == 'column "#1", dates' and np.diff(clock.stamp_ns)[0] == 12_000_000
 
 
 @pytest.mark.parametrize('ending', ['npz', 'npy', 'xlsx', 'tdms', 'mat', 'h5', 'parquet'])

@@ -27,7 +27,8 @@ from pam_sim.files import refuse_pipe, shown, StrPath
 # Ending to the module that reads and writes it.
 ENDINGS = {
     '.csv': 'delimited', '.tsv': 'delimited', '.txt': 'delimited', '.dat': 'delimited',
-    '.asc': 'delimited', '.log': 'delimited', '.parquet': 'parquet', '.pq': 'parquet',
+    '.asc': 'delimited', '.log': 'delimited', '.lvm': 'delimited', '.mot': 'delimited',
+    '.sto': 'delimited', '.parquet': 'parquet', '.pq': 'parquet',
     '.mat': 'mat', '.h5': 'hdf5', '.hdf5': 'hdf5', '.hdf': 'hdf5', '.npz': 'numpy_file',
     '.npy': 'numpy_file', '.xlsx': 'workbook', '.tdms': 'tdms', '.mcap': 'bag', '.db3': 'bag',
     '.bag': 'bag'}

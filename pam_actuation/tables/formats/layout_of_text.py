@@ -240,6 +240,10 @@ def _header(above: list[str], separator: str, count: int, begin: int, source: st
                 f'{count} (separator {_told(separator)}, decimal sign "{decimal}"); correct '
                 'the header, or write decimal points', f'{source}:{begin}')
         return [], ()
+    number = re.compile(_NUMBER.format(re.escape(decimal)))
+    if all(number.fullmatch(one) or _DATE.fullmatch(one) or one.lower() in _EMPTY
+           for one in last):
+        return [], ()               # the first row of a file without names, with empty fields
     previous = rows[-2] if len(rows) > 1 else []
     if len(previous) == count and all(previous) and _are_units(last):
         return previous, tuple(last)
