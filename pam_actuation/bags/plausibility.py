@@ -148,6 +148,10 @@ def missing_topics(namespaces: Mapping[str, Collection[str]],
                     if row.name not in present and (not valve or valve in row.valves)]
         needed, optional = ([row.name for row in expected if row.need == need]
                             for need in (NEEDED, USED))
+        if 'valve_signal' in needed and 'pressure_command' in present and not valve:
+            needed.remove('valve_signal')       # a regulator that takes pressures over a bus
+            notes.append(f'{namespace or "/"} has no messages on valve_signal: pam gap and pam '
+                         'identify take pressure_command for the input of a regulator.')
         if needed:
             remarks.append(
                 f'{namespace or "/"} has no messages on {", ".join(needed)}: most analyses '
@@ -177,7 +181,8 @@ def _time_remarks(topic: 'TopicData', info: 'TopicInfo', stamp_ns: IntArray) -> 
     if steady and info.rate_hz is not None and info.rate_hz < (
             RATE_TOLERANCE * MIN_RATE_HZ):
         remarks.append(
-            f'{name}: {info.rate_hz:.1f} Hz is below {MIN_RATE_HZ:.0f} Hz.')
+            f'{name}: {info.rate_hz:.1f} Hz is below {MIN_RATE_HZ:.0f} Hz; pam gap takes 10 Hz '
+            'and more, and sees less.')
     if info.gaps and steady and info.max_gap_s is not None and info.rate_hz is not None and (
             info.max_gap_s > GAP_LIMIT_S):
         remarks.append(

@@ -85,7 +85,7 @@ def doubts(signals: Mapping[str, tuple[IntArray, FloatArray]], mapped: Mapping[s
         if dropped.any():
             found.append(Doubt(
                 f'{said}: {int(dropped.sum())} of {len(column)} values are 0, and the signal '
-                'jumps there and back; if the sensor drops out, write '
+                'jumps there or back; if the sensor drops out, write '
                 f'{replace(mapped[name], missing=0.0).option(name)}'))
             finite = column[np.isfinite(column) & ~dropped]
             whole[name] = stamp_ns, np.where(dropped, np.nan, column)
@@ -107,7 +107,8 @@ def _dropped(mapped: ColumnMap, column: FloatArray) -> BoolArray:
     others = np.flatnonzero(np.isfinite(raw) & ~is_zero)
     if not len(others):
         return is_zero & False
-    is_zero[:others[0]] = is_zero[others[-1]:] = False      # a rig may begin and end at zero
+    if mapped.zero == 0.0:                                  # a rig may begin and end at rest
+        is_zero[:others[0]] = is_zero[others[-1]:] = False
     at_edge = is_zero[1:] != is_zero[:-1]
     steps = np.abs(np.diff(raw))
     usual = steps[~at_edge & np.isfinite(steps)].max(initial=0.0)

@@ -263,6 +263,12 @@ def test_a_muscle_of_a_joint_needs_no_reference_and_a_regulator_no_supply(
     assert alone.notes == [f'/flexor has no messages on {also}reference.']
     unsaid = bag_info(write_bag(tmp_path / 'unsaid', leave_out=left_out, metadata={}))
     assert unsaid.notes == ['/muscle has no messages on supply_pressure, reference.']
+    # Of an imported table nobody says the valve, and a commanded pressure is a command as well.
+    commanded = bag_info(write_bag(tmp_path / 'commanded', leave_out=('valve_signal',),
+                                   metadata={}))
+    assert not said(commanded, 'valve_signal') and commanded.notes == [
+        '/muscle has no messages on valve_signal: pam gap and pam identify take '
+        'pressure_command for the input of a regulator.']
 
 
 def test_foreign_topics_are_listed(tmp_path):

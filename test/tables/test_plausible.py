@@ -69,9 +69,11 @@ def test_a_zero_that_is_off_shows_while_the_muscle_is_empty(text, shortening):
         assert (f'zero={column.zero + shortening * 31.4:.4g}' in said) == off
 
 
-@pytest.mark.parametrize('begin, end, is_told', [(20, 24, True), (0, 4, False), (20, 40, False)])
-def test_a_wire_that_breaks_is_told_with_its_option(begin, end, is_told):
-    text = 'p_mA:bar_gauge:zero=4:gain=0.75'
+@pytest.mark.parametrize('begin, end, zero, is_told', [
+    (20, 24, ':zero=4', True), (0, 4, ':zero=4', True), (0, 4, '', False),
+    (20, 40, ':zero=4', False)])
+def test_a_wire_that_breaks_is_told_with_its_option(begin, end, zero, is_told):
+    text = f'p_mA:bar_gauge{zero}:gain=0.75'
     current = 8.0 + 4.0 * np.sin(np.arange(60) / 9.0)
     current[begin:end] = 0.0
     column = column_of_text('pressure', text, 'here')
