@@ -24,6 +24,7 @@ fitted part. In a free run the model feeds back its own output, as a simulation 
 import itertools
 
 import numpy as np
+from pam_sim.compiled import compiled
 
 ORDERS, DELAYS = (1, 2, 3), range(16)
 DEGREES, PENALTIES = (2, 3), (1e-8, 1e-4, 1e-2)
@@ -35,10 +36,15 @@ def rms(values):
     return float(np.sqrt(np.mean(np.square(values))))
 
 
-def table_of(u, y, order, inputs, delay):
-    """Return (rows, regressors): past outputs, then inputs ``delay`` samples ago and before."""
+def table_of(u, y, order, inputs, delay, begins=(0,)):
+    """
+    Return (rows, regressors): past outputs, then inputs ``delay`` samples ago and before.
+
+    ``begins`` are the first samples of recordings that stand one after the other in ``u``.
+    """
     first = max(order, inputs + delay)
-    rows = np.arange(first, len(u))
+    ends = (*begins[1:], len(u))
+    rows = np.concatenate([np.arange(begin + first, end) for begin, end in zip(begins, ends)])
     return rows, np.column_stack([
         *(y[rows - k] for k in range(1, order + 1)),
         *(u[rows - delay - k] for k in range(inputs))])
@@ -63,15 +69,28 @@ def free_run(u, y, order, inputs, delay, powers, weights, offset):
     places = np.array([[*one, *[order + inputs] * (max(map(len, powers)) - len(one))]
                        for one in powers])
     row = np.ones(order + inputs + 1)
+    _run_on(run, u, row, first, order, inputs, delay, places, weights, offset, limit)
+    return run
+
+
+@compiled
+def _run_on(run, u, row, first, order, inputs, delay, places, weights, offset, limit):
+    """Put the free run into ``run`` from sample ``first`` on; ``row`` ends in 1."""
     for i in range(first, len(u)):
-        row[:order] = run[i - order:i][::-1]
-        row[order:-1] = u[i - delay - inputs + 1:i - delay + 1][::-1]
-        value = float(weights @ np.prod(row[places], axis=1)) + offset
+        for k in range(order):
+            row[k] = run[i - 1 - k]
+        for k in range(inputs):
+            row[order + k] = u[i - delay - k]
+        value = offset
+        for k in range(places.shape[0]):
+            product = weights[k]
+            for place in places[k]:
+                product *= row[place]
+            value += product
         if not abs(value) < limit:
             run[i:] = limit
-            break
+            return
         run[i] = value
-    return run
 
 
 def _scaled(values):
@@ -81,17 +100,20 @@ def _scaled(values):
     return (values - 0.5 * (high + low)) / half, 0.5 * (high + low), half
 
 
-def _best(u, y, part, fits):
+def _best(u, y, part, fits, begins):
     """Return (free run, one step ahead, label) of the model that runs best on a part."""
+    pieces = [slice(*one) for one in zip(begins, (*begins[1:], len(u)))]
     scaled_u, _, _ = _scaled(u)
     scaled_y, middle, half = _scaled(y)
     best, least = None, np.inf
     for order, inputs, delay, degree, fit in fits:
         powers = powers_of(order + inputs, degree)
-        rows, table = table_of(scaled_u, scaled_y, order, inputs, delay)
+        rows, table = table_of(scaled_u, scaled_y, order, inputs, delay, begins)
         products = expanded(table, powers)
         weights, offset = fit(products[part[rows]], scaled_y[rows][part[rows]])
-        run = free_run(scaled_u, scaled_y, order, inputs, delay, powers, weights, offset)
+        run = np.concatenate([
+            free_run(scaled_u[one], scaled_y[one], order, inputs, delay, powers, weights, offset)
+            for one in pieces])
         off = rms((run - scaled_y)[part])
         if off < least:
             ahead = scaled_y.copy()
@@ -102,19 +124,25 @@ def _best(u, y, part, fits):
     return best
 
 
-def arx(u, y, part, delays=DELAYS):
-    """Return (free run, one step ahead, label) of the ARX model that runs best on a part."""
+def arx(u, y, part, delays=DELAYS, begins=(0,)):
+    """
+    Return (free run, one step ahead, label) of the ARX model that runs best on a part.
+
+    Recordings may stand one after the other, each from one of ``begins`` on.
+    """
     def least_squares(products, target):
         weights = np.linalg.lstsq(np.column_stack([products, np.ones(len(products))]), target,
                                   rcond=None)[0]
         return weights[:-1], float(weights[-1])
     return _best(u, y, part, ((order, inputs, delay, 1, least_squares) for order, inputs, delay
-                              in itertools.product(ORDERS, ORDERS, delays)))
+                              in itertools.product(ORDERS, ORDERS, delays)), begins)
 
 
-def narx(u, y, part, delays=DELAYS):
+def narx(u, y, part, delays=DELAYS, begins=(0,)):
     """
     Return (free run, one step ahead, label) of the NARX model that runs best on a part.
+
+    Recordings may stand one after the other, each from one of ``begins`` on.
 
     Raises
     ------
@@ -131,4 +159,4 @@ def narx(u, y, part, delays=DELAYS):
         return fit
     return _best(u, y, part, (
         (order, inputs, delay, degree, ridge(penalty)) for order, inputs, delay, degree, penalty
-        in itertools.product((1, 2, 3), (1, 2), delays, DEGREES, PENALTIES)))
+        in itertools.product((1, 2, 3), (1, 2), delays, DEGREES, PENALTIES)), begins)
