@@ -39,6 +39,9 @@ def without_repeats(recording: Recording) -> Recording:
     a fresh reading never equals the one before. Of a signal at rest one row in as many as a
     reading lasts is kept.
 
+    A reading that is new in a row came at some time since the row before. Its stamp is the middle
+    between the two, for the time of the row is late by half a row, as a lag of the sensor is.
+
     Parameters
     ----------
     recording : Recording
@@ -53,10 +56,16 @@ def without_repeats(recording: Recording) -> Recording:
         fresh = fresh_rows(stamps[known], values[known])
         if fresh.all():
             continue
-        signals[name] = stamps[known][fresh], values[known][fresh]
+        signals[name] = _between_rows(stamps[known])[fresh], values[known][fresh]
         told.append(f'{name}: rows repeat old readings, {int(fresh.sum())} of {fresh.size} were '
                     'kept')
     return replace(recording, signals=signals, told=[*recording.told, *told])
+
+
+def _between_rows(stamps: IntArray) -> IntArray:
+    """Return the middle between each row and the one before, as rows usually follow."""
+    before = np.diff(stamps, prepend=stamps[:1])
+    return stamps - np.minimum(before, int(np.median(before))) // 2
 
 
 def fresh_rows(stamps: IntArray, values: FloatArray) -> BoolArray:
