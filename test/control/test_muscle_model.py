@@ -20,7 +20,7 @@ import re
 import numpy as np
 from pam_actuation.bags.load import load_run
 from pam_actuation.control.config import load_controller
-from pam_actuation.control.sofc import dynamics, muscle_model
+from pam_actuation.control.sofc import dynamics, muscle_model, predictor
 from pam_actuation.control.sofc.controller import SelfOrganizingFuzzyController
 from pam_actuation.control.sofc.muscle_model import MODEL
 from pam_actuation.control.sofc.persistence import load_rules, rules_from_mapping
@@ -72,7 +72,8 @@ def observed(controller, contraction_m, pressure_pa):
     st.strength = 1.0
     innovations = []
     for x, p in zip(contraction_m, pressure_pa):
-        muscle_model.observe(par, controller.static_inverse, controller.rules.path, st, x, p)
+        muscle_model.observe(
+            par, controller.static_inverse, controller.rules.path, st, x, PERIOD_S, p)
         muscle_model.learn(par, controller.rules.path, controller.rules.path_fired, st)
         innovations.append(float(st.innovation_pa))
     return np.array(innovations)
@@ -126,13 +127,13 @@ def test_a_sensor_of_pressure_that_is_lost_lets_the_disturbance_fade(inverse):
     st.strength = 1.0
     held_pa = inverse_pressure_pa(inverse, 0.014) + 20e3
     for _ in range(200):
-        muscle_model.observe(par, inverse, controller.rules.path, st, 0.014, held_pa)
+        muscle_model.observe(par, inverse, controller.rules.path, st, 0.014, PERIOD_S, held_pa)
     assert st.disturbance_pa == pytest.approx(20e3, rel=0.02)
     before = st.disturbance_pa
-    muscle_model.observe(par, inverse, controller.rules.path, st, 0.014, math.nan)
+    muscle_model.observe(par, inverse, controller.rules.path, st, 0.014, PERIOD_S, math.nan)
     assert 0.9 * before < st.disturbance_pa < before
     for _ in range(2000):
-        muscle_model.observe(par, inverse, controller.rules.path, st, 0.014, math.nan)
+        muscle_model.observe(par, inverse, controller.rules.path, st, 0.014, PERIOD_S, math.nan)
     assert abs(st.disturbance_pa) < 1.0
 
 
@@ -188,7 +189,7 @@ def found_inertia(inverse, contraction_m, pressure_pa, **settings):
         model_noise_pa=18800.0, model_filter_s=0.0203, **settings)
     par, st = fields(controller.parameters, PARAMETERS), fields(zeros(MODEL), MODEL)
     for x, p in zip(contraction_m, pressure_pa):
-        muscle_model.observe(par, inverse, controller.rules.path, st, x, p)
+        muscle_model.observe(par, inverse, controller.rules.path, st, x, PERIOD_S, p)
         muscle_model.find_numbers(par, inverse, st, False)
     return float(muscle_model.inertia_pa_s2_per_m(par, st, 0.015))
 
@@ -231,7 +232,7 @@ def test_friction_that_grows_with_the_pressure_is_found_at_400_kpa(inverse):
         for one in x:
             static_pa = inverse_pressure_pa(inverse, one)
             grown = (static_pa - P_ATM_PA) / 4e5 * dynamics.load_shape(par, one)
-            muscle_model.observe(par, inverse, controller.rules.path, st, one,
+            muscle_model.observe(par, inverse, controller.rules.path, st, one, PERIOD_S,
                                  static_pa + 8e3 * grown * st.path[1])
             muscle_model.find_numbers(par, inverse, st, False)
         paths[growth] = [
@@ -277,15 +278,16 @@ def test_creep_is_told_apart_and_begins_anew_after_a_move(inverse, time_s, expec
     st.slow_m = slow
     for one in x:
         slow += PERIOD_S / (1.0 + PERIOD_S) * (one - slow)
-        muscle_model.observe(par, inverse, controller.rules.path, st, one, inverse_pressure_pa(
-            inverse, one) + 3e3 * (one - slow) / 0.01)
+        muscle_model.observe(
+            par, inverse, controller.rules.path, st, one, PERIOD_S,
+            inverse_pressure_pa(inverse, one) + 3e3 * (one - slow) / 0.01)
         muscle_model.find_numbers(par, inverse, st, False)
     creep_pa = float(st.number_pa[muscle_model._CREEP])
     assert creep_pa == pytest.approx(found_pa, rel=0.15)
     before = muscle_model.numbers_pa(par, st, st.path, 0.02, 4e5)
     for tick in range(400):      # two seconds at rest, the first without the sensor of pressure
         pressure_pa = math.nan if tick < 200 else inverse_pressure_pa(inverse, x[-1])
-        muscle_model.observe(par, inverse, controller.rules.path, st, x[-1], pressure_pa)
+        muscle_model.observe(par, inverse, controller.rules.path, st, x[-1], PERIOD_S, pressure_pa)
     slower = x[-1] + (slow - x[-1]) * math.exp(-2.0)
     assert muscle_model.numbers_pa(par, st, st.path, 0.02, 4e5) - before == pytest.approx(
         creep_pa * (slow - slower) / 0.01, abs=60.0)
@@ -383,3 +385,45 @@ def test_a_quick_regulator_makes_no_lasting_oscillation():
         loop = ClosedLoop(rig, load_experiment(motion), seed=seed, preview_s=0.0,
                           driver=driver_config(nominal))
         assert loop.run(load_controller('sofc_model_ppr', nominal)).rmse_m(13.0, 33.0) < 0.15e-3
+
+
+@pytest.mark.parametrize('sensor_hz', [100.0, 250.0, 333.0])
+def test_a_sensor_of_another_rate_tells_the_same_rate_and_residual(inverse, sensor_hz):
+    controller = controller_with(
+        inverse, rate_feedforward_pa_s_per_m=0.0, acceleration_feedforward_pa_s2_per_m=0.0,
+        predicted_rate_filter_s=0.01)
+    par = fields(controller.parameters, PARAMETERS)
+    st = fields(zeros(MODEL), MODEL)
+    t = np.arange(0.0, 4.0, PERIOD_S)
+    read_s = np.floor(t * sensor_hz + 1e-9) / sensor_hz      # of the newest reading
+    x = 0.014 + 0.008 * np.sin(6.0 * read_s)
+    rates, left_pa = [], []
+    for number, one in enumerate(x):
+        elapsed_s = read_s[number] - read_s[number - 1] if number else math.nan
+        static_pa = inverse_pressure_pa(inverse, one)
+        muscle_model.observe(par, inverse, controller.rules.path, st, one, elapsed_s, static_pa)
+        rates.append(predictor.fast_rate(par, st, one, elapsed_s))
+        left_pa.append(float(st.innovation_pa))
+    wanted = 0.048 * np.cos(6.0 * (read_s - 0.01))
+    assert np.abs(np.array(rates) - wanted)[200:].max() < 0.1 * 0.048
+    assert np.abs(left_pa[200:]).max() < 5e3
+
+
+def test_a_gait_is_followed_as_well_with_a_sensor_of_its_own_rate(tmp_path):
+    rig = load_rig('dmsp_5_300_realistic')
+    experiment = load_experiment("""
+name: gait
+segments:
+  - ramp: {to_m: 0.004, duration_s: 2.0}
+  - knee_gait: {low_m: 0.004, high_m: 0.020, frequency_hz: 0.8, cycles: 8}
+""")
+    exact = ClosedLoop(rig, experiment).run(load_controller('sofc_model_ppr', rig))
+    simulate_experiment(
+        experiment, rig, load_controller('sofc_model_ppr', rig), str(tmp_path / 'b'))
+    run = load_run(tmp_path / 'b')      # contraction 250, controller 200 times a second
+    stamp_ns = run['contraction'].stamp_ns
+    error = run['contraction']['contraction_m'] - np.interp(
+        stamp_ns, run['reference'].stamp_ns, run['reference']['contraction_m'])
+    late = stamp_ns - run['reference'].stamp_ns[0] > 5e9
+    # With rates over a whole period it was seven times as much.
+    assert np.std(error[late]) < 2.5 * np.std(exact.error_m[exact.time_s > 5.0])

@@ -80,6 +80,7 @@ MODEL = record(
     'disturbance_pa',
     'held',                           # part of its change that is held back, 0 = none
     'fast_contraction_m',             # for the rate the prediction begins with
+    'fast_rate_m_per_s',              # that rate
     'feedback_pa',                    # on the predicted error, filtered
     'squared_error_m2',               # of the reference, mean
     'strength',                       # 0 to 1, of that feedback and of the disturbance
@@ -267,6 +268,7 @@ def _begin(st: np.record, contraction_m: float, pressure_pa: float) -> None:
     st.contraction_once_m = contraction_m
     st.contraction_m = contraction_m
     st.fast_contraction_m = contraction_m
+    st.fast_rate_m_per_s = 0.0
     st.pressure_once_pa = pressure_pa
     st.pressure_pa = pressure_pa
 
@@ -278,13 +280,16 @@ def _low_pass(former: float, value: float, part: float) -> float:
 
 @compiled
 def observe(par: np.record, inverse: FloatArray, rules: FloatArray, st: np.record,
-            contraction_m: float, pressure_pa: float) -> None:
+            contraction_m: float, elapsed_s: float, pressure_pa: float) -> None:
     """
     Compare one measurement with the model; ``st`` is a ``MODEL``.
 
-    A pressure that is not finite leaves the disturbance to fade.
+    ``elapsed_s`` lies between this contraction and the one before, NaN for a period. A pressure
+    that is not finite leaves the disturbance to fade.
     """
     period = par.period_s
+    if not math.isfinite(elapsed_s):
+        elapsed_s = period
     if not math.isfinite(pressure_pa):
         st.known = 0.0
         st.innovation_pa = 0.0
@@ -295,12 +300,15 @@ def observe(par: np.record, inverse: FloatArray, rules: FloatArray, st: np.recor
         _begin(st, contraction_m, pressure_pa)
     part = period / (par.model_filter_s + period)
     former_m, former_rate = st.contraction_m, st.rate_m_per_s
-    once_m = _low_pass(st.contraction_once_m, contraction_m, part)
-    x = _low_pass(former_m, once_m, part)
+    once_m, x, rate = st.contraction_once_m, former_m, former_rate
+    if elapsed_s > 0.0:
+        share = elapsed_s / (par.model_filter_s + elapsed_s)
+        once_m = _low_pass(once_m, contraction_m, share)
+        x = _low_pass(former_m, once_m, share)
+        rate = (x - former_m) / elapsed_s
     once_pa = _low_pass(st.pressure_once_pa, pressure_pa, part)
     p = _low_pass(st.pressure_pa, once_pa, part)
-    rate = (x - former_m) / period
-    acceleration = (rate - former_rate) / period
+    acceleration = (rate - former_rate) / (elapsed_s if elapsed_s > 0.0 else period)
     st.contraction_once_m, st.contraction_m = once_m, x
     st.pressure_once_pa, st.pressure_pa = once_pa, p
     st.rate_m_per_s, st.acceleration_m_per_s2 = rate, acceleration
@@ -315,9 +323,9 @@ def observe(par: np.record, inverse: FloatArray, rules: FloatArray, st: np.recor
     if not par.disturbance_time_s > 0.0 or x < _LIFTED_M:
         st.disturbance_pa *= _FADE
         return
-    share = (1.0 - st.held) * st.strength * period / (par.disturbance_time_s + period)
+    kept = (1.0 - st.held) * st.strength * period / (par.disturbance_time_s + period)
     limit = par.integral_limit_pa
-    disturbance = _low_pass(st.disturbance_pa, innovation, share)
+    disturbance = _low_pass(st.disturbance_pa, innovation, kept)
     st.disturbance_pa = min(max(disturbance, -limit), limit)
 
 

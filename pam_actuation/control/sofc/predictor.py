@@ -20,6 +20,8 @@ contraction and rate for the moment at which a command of now arrives. Feedback 
 no dead time in its loop (Smith 1957; in the time domain Manitius and Olbrot 1979).
 """
 
+import math
+
 import numpy as np
 from pam_actuation.control.sofc import valve_lag
 from pam_actuation.control.sofc.credit import Ring
@@ -53,8 +55,26 @@ def engage(par: np.record, st: np.record, error_m: float, announced: float) -> N
 
 
 @compiled
+def fast_rate(par: np.record, st: np.record, contraction_m: float, elapsed_s: float) -> float:
+    """
+    Return the filtered rate [m/s] of a measured contraction.
+
+    ``elapsed_s`` lies between this measurement and the one before, NaN for a period. A sensor has
+    a rate of its own: at 250 Hz, three of four ticks at 200 Hz see 4 ms of motion, and one 8 ms.
+    """
+    if not math.isfinite(elapsed_s):
+        elapsed_s = par.period_s
+    if elapsed_s > 0.0:
+        part = elapsed_s / (par.predicted_rate_filter_s + elapsed_s)
+        moved = part * (contraction_m - st.fast_contraction_m)
+        st.fast_contraction_m += moved
+        st.fast_rate_m_per_s = moved / elapsed_s
+    return float(st.fast_rate_m_per_s)
+
+
+@compiled
 def predict(par: np.record, inverse: FloatArray, rules: FloatArray, ring: Ring, tick: int,
-            st: np.record, contraction_m: float, pressure_pa: float,
+            st: np.record, contraction_m: float, elapsed_s: float, pressure_pa: float,
             valve: np.record) -> tuple[float, float]:
     """
     Return contraction [m] and rate [m/s] for the moment at which a command of now arrives.
@@ -63,10 +83,7 @@ def predict(par: np.record, inverse: FloatArray, rules: FloatArray, ring: Ring, 
     ``valve`` is a ``LAG``.
     """
     period = par.period_s
-    part = period / (par.predicted_rate_filter_s + period)
-    moved = part * (contraction_m - st.fast_contraction_m)
-    st.fast_contraction_m += moved
-    x, rate, p = contraction_m, moved / period, pressure_pa
+    x, rate, p = contraction_m, fast_rate(par, st, contraction_m, elapsed_s), pressure_pa
     for q in range(int(par.path_sets)):
         st.predicted_path[q] = st.path[q]
     inertia = inertia_pa_s2_per_m(par, st, contraction_m)

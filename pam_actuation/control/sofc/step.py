@@ -280,7 +280,8 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
         model.held = 1.0 - par.jump_disturbance if surprising_move else 0.0
         if surprising_move:
             muscle_model.forget(par, model)
-        muscle_model.observe(par, inverse, path_rules, model, inp.contraction_m, measured)
+        muscle_model.observe(par, inverse, path_rules, model, inp.contraction_m,
+                             inp.elapsed_s, measured)
         muscle_model.go(par, model.lead_path, way)
         path = (muscle_model.rules_pa(par, path_rules, model.lead_path, lead)
                 + muscle_model.numbers_pa(par, model, model.lead_path, lead, base))
@@ -294,8 +295,8 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
     acts = par.predicted_proportional_pa_per_m > 0.0 or par.predicted_derivative_pa_s_per_m > 0.0
     if acts and st.history_ticks >= par.answer_ticks:
         ahead_m, ahead_rate = predictor.predict(
-            par, inverse, path_rules, ring, int(st.tick), model, inp.contraction_m, pressure,
-            st.lag)
+            par, inverse, path_rules, ring, int(st.tick), model, inp.contraction_m,
+            inp.elapsed_s, pressure, st.lag)
         predicted = predictor.predicted_feedback_pa(
             par, model, lead - ahead_m, lead_rate - ahead_rate, st.lag.lag_s)
         muscle_model.settle(par, model, lead - ahead_m, lead_rate)
