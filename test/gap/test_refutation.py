@@ -76,6 +76,34 @@ def test_a_name_of_a_set_goes_where_the_certify_data_contradict_it(moved, apart,
     assert final is fits[left[0]]
 
 
+@pytest.mark.parametrize('t, rest, whole, goes', [
+    (4.0, 0.0, True, True),      # two motions say so
+    (4.0, 0.0, False, False),    # one motion in two parts: no formulation is that true
+    (4.0, 3.0, True, False),     # what is left may be its doing
+    (2.0, 0.0, True, False),     # the certify data alone
+    (np.nan, 0.0, True, False)])
+def test_a_name_that_both_motions_leave_behind_is_held_to_what_the_best_leaves(
+        t, rest, whole, goes):
+    time_s = np.arange(SAMPLES) * 0.005
+    truth = 20.0 * np.sin(time_s)
+    noise = np.random.default_rng(3).standard_normal(SAMPLES)
+    runs = {(): 0.0 * truth, NAMES[:1]: truth, NAMES[1:]: truth + 1.5 * np.cos(time_s)}
+    validation = Validation.__new__(Validation)
+    validation.drift = [{'contraction': 0.1 * np.cos(time_s)}]
+    validation.recording = SimpleNamespace(signals=('contraction',), measured={
+        'contraction': truth + noise + rest * np.sin(7.0 * time_s)})
+    validation.part = {'contraction': np.ones(SAMPLES, dtype=bool)}
+    validation.noise, validation.floor = {'contraction': 1.0}, {'contraction': 1.1}
+    validation.run = lambda found, whole: {'contraction': runs[found.hypothesis.names]}
+    validation.after = {'contraction': truth}
+    rivals = [Rival(NAMES[0], found_of(NAMES[0])),
+              Rival(NAMES[1], found_of(NAMES[1]), t={'muscle': t})]
+    named = [NamedEffect(NAMES[0], 'muscle', rivals, NAMES)]
+    estimator = SimpleNamespace(criteria=CRITERIA, polish=lambda found: found)
+    kept, _ = refute(named, estimator, found_of(), rivals[0].found, validation, whole)
+    assert kept[0].names == NAMES[:1 if goes else 2]
+
+
 @pytest.mark.parametrize('spurious', NAMES)
 def test_the_name_that_the_certify_data_confirm_least_goes_first(spurious):
     time_s = np.arange(SAMPLES) * 0.005

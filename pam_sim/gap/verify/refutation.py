@@ -18,6 +18,9 @@ Which names of a set the certify data contradict.
 Where two effects of a set differ on the certify data, the errors of the true one are noise alone.
 Those of the other are larger by the difference of the two. As a name needs to explain 90 % of a
 gap and no more, for no formulation is the muscle's own, a smaller difference says nothing.
+
+A name that the searched data leave behind beyond doubt is held to what the better one leaves, if
+that is less and the certify data are a recording of their own. Two motions then say the same.
 """
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -70,8 +73,10 @@ def refute(named: Iterable[NamedEffect], estimator: Estimator, base: Fit, final:
         before = validation.run(less([w.name], estimator, base, final), whole)
         told = {name: validation.fall(before, run) for name, run in runs.items()}
         best = max(told, key=lambda name: told[name][0] * told[name][1] ** 2)
+        form = math.sqrt(1.0 - criteria.named_share) * told[best][1]
         gone = {name for name in runs if name != best and _contradicted(
-            validation, runs[name], runs[best], told[best][1], criteria)}
+            validation, runs[name], runs[best], min(form, validation.left())
+            if whole and best == w.name and _is_behind(w, name, criteria) else form, criteria)}
         names = tuple(n for n in w.names if n not in gone)
         # The recordings hardly tell them apart: where the certify data do not find the first
         # again, but another, that one is likelier.
@@ -159,15 +164,20 @@ def refuted_alone(named: Sequence[NamedEffect], estimator: Estimator, base: Fit,
     return name, fits[name]
 
 
+def _is_behind(w: NamedEffect, name: str, criteria: Criteria) -> bool:
+    """Return whether the searched data leave a name of a set behind its first, beyond doubt."""
+    return any(r.name == name and r.t.get(w.subsystem, math.nan) >= criteria.certain_sd
+               for r in w.rivals)
+
+
 def _contradicted(validation: Validation, run: Mapping[str, FloatArray],
-                  best: Mapping[str, FloatArray], moved: float, criteria: Criteria) -> bool:
+                  best: Mapping[str, FloatArray], form: float, criteria: Criteria) -> bool:
     """
     Return whether the certify data speak against a run, and for the best one beyond doubt.
 
-    ``moved`` is how far the best one is from none.
+    ``form`` is how far two true formulations may be apart.
     """
     fell, apart = validation.fall(run, best)
-    form = math.sqrt(1.0 - criteria.named_share) * moved
     # Were it true, the squares would rise by as much as the two are apart: a fall of -1.
     return (fell > criteria.greater_part and apart > max(criteria.visible_sd, form)
             and fell + 1.0 > criteria.certain_sd * validation.doubt(run, best))
