@@ -201,14 +201,19 @@ def show(name, folder, seconds, scratch):
           f'bar {BAR}. ' + '; '.join(labels) + '.\n', flush=True)
 
 
-def main():
-    """Print the tables of the cases."""
+def command_line():
+    """Return the parser of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[1])
     parser.add_argument('folder')
     parser.add_argument('--case', nargs='+', choices=CASES, default=list(CASES))
     parser.add_argument('--seconds', type=float, default=300.0, help='budget of each search')
     results_page.add_write(parser, 'real_records')
-    args = parser.parse_args()
+    return parser
+
+
+def main():
+    """Print the tables of the cases."""
+    args = command_line().parse_args()
     with tempfile.TemporaryDirectory() as scratch:
         for name in args.case:
             with results_page.printed(args, __file__, name):
