@@ -25,8 +25,9 @@ from pam_sim.files import shown, StrPath, whole_file
 if TYPE_CHECKING:
     import pandas as pd
 
-WRITTEN = tuple(ending for ending, kind in ENDINGS.items() if kind not in ('bag', 'tdms') and (
-    ending not in ('.txt', '.dat', '.asc', '.log')))
+# Of the text files only those whose ending says the separator.
+WRITTEN = tuple(ending for ending, kind in ENDINGS.items()
+                if ending in ('.csv', '.tsv') or kind not in ('delimited', 'bag', 'tdms'))
 
 
 def write_table(frame: 'pd.DataFrame', path: StrPath) -> Path:

@@ -83,6 +83,12 @@ def test_a_workbook_keeps_stamps_and_fifteen_digits(bag, tmp_path):
             np.testing.assert_allclose(second[name].values[field], values, rtol=1e-15)
 
 
+@pytest.mark.parametrize('ending', ['txt', 'log', 'lvm', 'mot', 'sto', 'tdms', 'mcap'])
+def test_what_another_program_alone_writes_is_read_only(bag, tmp_path, ending, capsys):
+    assert main(['export', str(bag), '--out', str(tmp_path / f'table.{ending}')]) == 2
+    assert f"the ending '.{ending}' is unknown; allowed: .csv, .tsv" in capsys.readouterr().err
+
+
 def test_the_same_table_gives_the_same_bag(bag, tmp_path):
     main(['export', str(bag), '--out', str(tmp_path / 'table.csv')])
     for name in ('one', 'two'):
