@@ -399,7 +399,7 @@ def test_a_sensor_of_another_rate_tells_the_same_rate_and_residual(inverse, sens
     x = 0.014 + 0.008 * np.sin(6.0 * read_s)
     rates, left_pa = [], []
     for number, one in enumerate(x):
-        elapsed_s = read_s[number] - read_s[number - 1] if number else math.nan
+        elapsed_s = read_s[number] - read_s[number - 1] if number else PERIOD_S
         static_pa = inverse_pressure_pa(inverse, one)
         muscle_model.observe(par, inverse, controller.rules.path, st, one, elapsed_s, static_pa)
         rates.append(predictor.fast_rate(par, st, one, elapsed_s))

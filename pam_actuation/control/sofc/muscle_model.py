@@ -284,12 +284,10 @@ def observe(par: np.record, inverse: FloatArray, rules: FloatArray, st: np.recor
     """
     Compare one measurement with the model; ``st`` is a ``MODEL``.
 
-    ``elapsed_s`` lies between this contraction and the one before, NaN for a period. A pressure
-    that is not finite leaves the disturbance to fade.
+    ``elapsed_s`` lies between this contraction and the one before. A pressure that is not finite
+    leaves the disturbance to fade.
     """
     period = par.period_s
-    if not math.isfinite(elapsed_s):
-        elapsed_s = period
     if not math.isfinite(pressure_pa):
         st.known = 0.0
         st.innovation_pa = 0.0

@@ -20,8 +20,6 @@ contraction and rate for the moment at which a command of now arrives. Feedback 
 no dead time in its loop (Smith 1957; in the time domain Manitius and Olbrot 1979).
 """
 
-import math
-
 import numpy as np
 from pam_actuation.control.sofc import valve_lag
 from pam_actuation.control.sofc.credit import Ring
@@ -59,11 +57,9 @@ def fast_rate(par: np.record, st: np.record, contraction_m: float, elapsed_s: fl
     """
     Return the filtered rate [m/s] of a measured contraction.
 
-    ``elapsed_s`` lies between this measurement and the one before, NaN for a period. A sensor has
-    a rate of its own: at 250 Hz, three of four ticks at 200 Hz see 4 ms of motion, and one 8 ms.
+    ``elapsed_s`` lies between this measurement and the one before. A sensor has a rate of its own:
+    at 250 Hz, three of four ticks at 200 Hz see 4 ms of motion, and one 8 ms.
     """
-    if not math.isfinite(elapsed_s):
-        elapsed_s = par.period_s
     if elapsed_s > 0.0:
         part = elapsed_s / (par.predicted_rate_filter_s + elapsed_s)
         moved = part * (contraction_m - st.fast_contraction_m)

@@ -211,6 +211,7 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
     """Run one tick; see ``sofc_step``."""
     feedback_rules, feedforward_rules, motion_rules, path_rules = values
     period = par.period_s
+    elapsed_s = inp.elapsed_s if math.isfinite(inp.elapsed_s) else period
     if st.started < 0.5:
         _start(par, inverse, values, kept, st, inp)
     jump, lead_jump = dynamics.jumps(par, st, inp)
@@ -221,7 +222,7 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
         par, st.lead_move, lead_jump, 0.0)
     change = filtered_change(
         st.change_m_per_s, par.change_filter_s, inp.reference_rate_m_per_s + extra_rate,
-        inp.contraction_m - st.contraction_m, inp.elapsed_s, period,
+        inp.contraction_m - st.contraction_m, elapsed_s, period,
         st.history_ticks > 0.0)
     st.change_m_per_s = change
     st.contraction_m = inp.contraction_m
@@ -281,7 +282,7 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
         if surprising_move:
             muscle_model.forget(par, model)
         muscle_model.observe(par, inverse, path_rules, model, inp.contraction_m,
-                             inp.elapsed_s, measured)
+                             elapsed_s, measured)
         muscle_model.go(par, model.lead_path, way)
         path = (muscle_model.rules_pa(par, path_rules, model.lead_path, lead)
                 + muscle_model.numbers_pa(par, model, model.lead_path, lead, base))
@@ -296,7 +297,7 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
     if acts and st.history_ticks >= par.answer_ticks:
         ahead_m, ahead_rate = predictor.predict(
             par, inverse, path_rules, ring, int(st.tick), model, inp.contraction_m,
-            inp.elapsed_s, pressure, st.lag)
+            elapsed_s, pressure, st.lag)
         predicted = predictor.predicted_feedback_pa(
             par, model, lead - ahead_m, lead_rate - ahead_rate, st.lag.lag_s)
         muscle_model.settle(par, model, lead - ahead_m, lead_rate)
