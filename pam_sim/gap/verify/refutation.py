@@ -19,8 +19,9 @@ Where two effects of a set differ on the certify data, the errors of the true on
 Those of the other are larger by the difference of the two. As a name needs to explain 90 % of a
 gap and no more, for no formulation is the muscle's own, a smaller difference says nothing.
 
-A name that the searched data leave behind beyond doubt is held to what the better one leaves, if
-that is less and the certify data are a recording of their own. Two motions then say the same.
+The searched data may leave a name behind beyond doubt. If the certify data are a recording of
+their own, that name is held to what the better one leaves, where this is less. Two motions then
+say the same.
 """
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
