@@ -114,13 +114,14 @@ def on_grid(run):
         for name, (field, *_) in SIGNALS.items()}
 
 
-def black_box_errors(kind, runs, judged):
+def black_box_errors(kind, runs, judged, traces):
     """
     Return {signal: (rms on the fitted runs, on the judged one, label)} of a kind of black box.
 
-    The judged errors are those at the stamps of the readings that `pam gap` is judged at.
+    The judged errors are those at the stamps of the readings that `pam gap` is judged at, which
+    ``traces`` hold.
     """
-    grids = [on_grid(run) for run in (*runs, judged.run)]
+    grids = [on_grid(run) for run in (*runs, judged)]
     sizes = [len(stamps) for stamps, *_ in grids]
     begins = (0, *np.cumsum(sizes)[:-1])
     asked = np.concatenate([held for _, held, _ in grids])
@@ -129,7 +130,7 @@ def black_box_errors(kind, runs, judged):
     for name in SIGNALS:
         measured = np.concatenate([values[name] for *_, values in grids])
         free, _, label = kind(asked, measured, fitted, DELAYS, begins)
-        stamps, trace = grids[-1][0], judged.traces[name]
+        stamps, trace = grids[-1][0], traces[name]
         inside = (trace.stamp_ns >= stamps[0]) & (trace.stamp_ns <= stamps[-1])
         off = np.interp(trace.stamp_ns, stamps, free[begins[-1]:]) - trace.measured
         errors[name] = (black_boxes.rms((free - measured)[fitted]), black_boxes.rms(off[inside]),
@@ -162,13 +163,6 @@ def by_hand(rig, given, runs, judged):
     return {signal: black_boxes.rms(off(found, proof, signal)) for signal in SIGNALS}
 
 
-class Judged:
-    """The run that is judged, with the free runs of `pam gap` on it."""
-
-    def __init__(self, run, traces):
-        self.run, self.traces = run, traces
-
-
 def show(name, folder, seconds, scratch):
     """Print the table of one case."""
     told, mass_kg, fitted, judged = CASES[name]
@@ -191,7 +185,7 @@ def show(name, folder, seconds, scratch):
     labels = []
     for kind in (black_boxes.arx, black_boxes.narx):
         title, errors = kind.__name__.upper(), black_box_errors(
-            kind, runs[:-1], Judged(runs[-1], result.traces))
+            kind, runs[:-1], runs[-1], result.traces)
         rows[title] = [SIGNALS[signal][1] * errors[signal][1] for signal in SIGNALS]
         labels += [f'{title}, {signal}: {label}' for signal, (*_, label) in errors.items()]
     for title, cells in rows.items():

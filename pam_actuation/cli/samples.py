@@ -60,15 +60,16 @@ def add_samples_options(parser: Parser) -> None:
     made.add_argument('--out', type=out_path, default=None, metavar='FILE',
                       help='file of the experiment (default: NAME.yaml of the table)')
     add_overwrite_option(made, 'the file that is there')
+    parser.set_defaults(of_samples={
+        action.option_strings[0]: (action.dest, action.default)
+        for action in made._group_actions if action.dest != 'samples'})
 
 
 def refuse_without_samples(args: argparse.Namespace) -> None:
     """Raise InputError where options say how to follow a table, and no table is given."""
     from pam_sim.errors import InputError
-    given = [f'--{name}' for name, value in (
-        ('map', args.maps), ('range', args.span), ('period', args.period),
-        ('cycles', args.cycles > 1), ('lowpass', args.lowpass), ('rate', args.rate),
-        ('from', args.begin_s), ('to', math.isfinite(args.end_s)), ('out', args.out)) if value]
+    given = [option for option, (name, usual) in args.of_samples.items()
+             if getattr(args, name) != usual]
     if given:
         raise InputError('add --samples FILE, the table that is followed', given[0])
 
@@ -120,7 +121,6 @@ def make(args: argparse.Namespace) -> 'tuple[str, Made]':
 def _mapping(args: argparse.Namespace, tables: 'Collection[Table]') -> 'TableMapping':
     """Return which column is followed, and which is the time."""
     from dataclasses import replace
-    from pam_actuation.experiments.from_table import DOMAIN_OF
     from pam_actuation.tables.mapping import ColumnMap, TableMapping
     from pam_actuation.tables.signals import signal_of
     from pam_actuation.tables.units import si_unit
@@ -140,7 +140,7 @@ def _mapping(args: argparse.Namespace, tables: 'Collection[Table]') -> 'TableMap
     signals = {}
     for text in own:        # the range says what the values become, so a unit says nothing
         name, _, column = text.partition('=')
-        if name in DOMAIN_OF and all(table.name_of(column) is None for table in tables):
+        if all(table.name_of(column) is None for table in tables):
             column = column.partition(':')[0]
         signals[name] = ColumnMap(column, si_unit(signal_of(name, f'--map {text}').quantity),
                                   where=f'--map {text}')

@@ -23,7 +23,7 @@ from pam_actuation.experiments.experiment import Experiment, load_experiment
 from pam_actuation.experiments.primitives.samples import MOST_VALUES
 from pam_actuation.tables.clock import clock_of, time_column
 from pam_actuation.tables.mapping import ColumnMap, TableMapping
-from pam_actuation.tables.table import no_column, Table
+from pam_actuation.tables.table import no_column_in, Table
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.located_yaml import dump_yaml
@@ -150,8 +150,7 @@ def _held(tables: Collection[Table], one: ColumnMap) -> tuple[Table, str]:
         column = table.name_of(one.column)
         if column is not None:
             return table, column
-    known = dict.fromkeys(column for table in tables for column in table.columns)
-    raise InputError(no_column(one.column, list(known)), one.where or '--map')
+    raise InputError(no_column_in(tables, one.column), one.where or '--map')
 
 
 def _rows(table: Table, mapping: TableMapping, column: str, one: ColumnMap, motion: Motion,
@@ -180,7 +179,6 @@ def _moved(t_s: FloatArray, values: FloatArray, motion: Motion, span: Sequence[f
            where: str) -> tuple[FloatArray, FloatArray, list[str]]:
     """Return the motion at equal distances of time, closed, smoothed and in its range, SI."""
     from scipy.interpolate import PchipInterpolator
-    told = []
     if motion.period_s is not None:
         t_s = t_s * (motion.period_s / t_s[-1])
     duration_s = float(t_s[-1])
@@ -190,26 +188,15 @@ def _moved(t_s: FloatArray, values: FloatArray, motion: Motion, span: Sequence[f
     step_s = float(np.clip(np.median(np.diff(t_s)), LEAST_STEP_S, USUAL_STEP_S))
     fine_s = np.linspace(0.0, duration_s, round(duration_s / step_s) + 1)
     path = PchipInterpolator(t_s, values)(fine_s)
-    if motion.cycles > 1:
-        miss, whole = float(path[-1] - path[0]), float(np.ptp(path))
-        if abs(miss) > OPEN_SHARE * whole:
-            raise InputError(
-                f'the motion ends {100.0 * abs(miss) / whole:.0f} % of its range away from where '
-                'it begins, and is to be repeated; choose one whole cycle with --from and --to',
-                where)
-        path = path - miss * fine_s / duration_s
-        if abs(miss) > 1e-3 * whole:
-            told.append(f'the end is moved by {100.0 * abs(miss) / whole:.1f} % of the range, '
-                        'evenly along the cycle, so that the cycle closes')
+    told: list[str] = []
+    repeats = motion.cycles > 1
+    if repeats:
+        path, told = _closed(path, fine_s / duration_s, where)
     rate_hz = (len(fine_s) - 1) / duration_s
     if motion.lowpass_hz is not None:
-        path = _smooth(path, motion.lowpass_hz, rate_hz, motion.cycles > 1)
-    elif len(path) > 2 and 2.0 * MOTION_HZ < rate_hz:
-        below = _smooth(path, MOTION_HZ, rate_hz, motion.cycles > 1)
-        faster = float(np.std(np.diff(path))) / max(float(np.std(np.diff(below))), 1e-12)
-        if faster > NOISY:
-            told.append(f'what is above {MOTION_HZ:g} Hz makes it {faster:.1f} times as fast; '
-                        f'if that is noise of the measurement, add --lowpass {MOTION_HZ:g}')
+        path = _smooth(path, motion.lowpass_hz, rate_hz, repeats)
+    else:
+        told += _noise(path, rate_hz, repeats)
     count = min(int(duration_s / USUAL_STEP_S + 1e-9), MOST_VALUES - 1)
     if duration_s / count > 1.5 * USUAL_STEP_S:
         told.append(f'one value each {1e3 * duration_s / count:.0f} ms, so that the file does '
@@ -222,6 +209,30 @@ def _moved(t_s: FloatArray, values: FloatArray, motion: Motion, span: Sequence[f
             raise InputError('the values do not change, so they have no range', where)
         path = span[0] + (path - low) * ((span[1] - span[0]) / (high - low))
     return at_s, path, told
+
+
+def _closed(path: FloatArray, share: FloatArray, where: str) -> tuple[FloatArray, list[str]]:
+    """Return a cycle that ends where it begins; InputError for one that is far from it."""
+    miss, whole = float(path[-1] - path[0]), float(np.ptp(path))
+    if abs(miss) > OPEN_SHARE * whole:
+        raise InputError(
+            f'the motion ends {100.0 * abs(miss) / whole:.0f} % of its range away from where it '
+            'begins, and is to be repeated; choose one whole cycle with --from and --to', where)
+    told = [f'the end is moved by {100.0 * abs(miss) / whole:.1f} % of the range, evenly along '
+            'the cycle, so that the cycle closes'] if abs(miss) > 1e-3 * whole else []
+    return path - miss * share, told
+
+
+def _noise(path: FloatArray, rate_hz: float, repeats: bool) -> list[str]:
+    """Return a sentence on a path that is much faster than a person moves."""
+    if len(path) <= 2 or 2.0 * MOTION_HZ >= rate_hz:
+        return []
+    below = _smooth(path, MOTION_HZ, rate_hz, repeats)
+    faster = float(np.std(np.diff(path))) / max(float(np.std(np.diff(below))), 1e-12)
+    if faster <= NOISY:
+        return []
+    return [f'what is above {MOTION_HZ:g} Hz makes it {faster:.1f} times as fast; if that is '
+            f'noise of the measurement, add --lowpass {MOTION_HZ:g}']
 
 
 def _smooth(path: FloatArray, cutoff_hz: float, rate_hz: float, repeats: bool) -> FloatArray:

@@ -14,11 +14,10 @@
 """Dates and times of day as people and spreadsheets write them, in nanoseconds from 1970."""
 
 from dataclasses import dataclass
-import re
 from typing import TYPE_CHECKING
 
 import numpy as np
-from pam_sim.annotations import FloatArray, IntArray
+from pam_sim.annotations import BoolArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,10 +31,10 @@ _LEAST_STEP_DAYS, _MOST_STEP_DAYS = 1.0 / (86_400 * 50_000.0), 2.0 / 86_400
 _ORDERS = {'ymd': 'year, month, day', 'dmy': 'day, month, year', 'mdy': 'month, day, year'}
 _LATE_HOUR_NS = DAY_NS // 2         # back by more than this: midnight passed
 # A date in any order, a time of day of two or three parts, and a half of the day.
-_PATTERN = re.compile(
-    r'\s*(?:(?P<first>\d{1,4})(?P<mark>[-/.])(?P<second>\d{1,2})[-/.](?P<third>\d{1,4})[T\s,]+)?'
+_PATTERN = (
+    r'^\s*(?:(?P<first>\d{1,4})(?P<mark>[-/.])(?P<second>\d{1,2})[-/.](?P<third>\d{1,4})[T\s,]+)?'
     r'(?P<hour>\d{1,2}):(?P<minute>\d{2})(?::(?P<second_of>\d{2}))?(?:[.,](?P<part>\d{1,9})\d*)?'
-    r'\s*(?P<half>[AaPp]\.?[Mm]\.?)?\s*')
+    r'\s*(?P<half>[AaPp]\.?[Mm]\.?)?\s*$')
 
 
 @dataclass(frozen=True)
@@ -73,17 +72,17 @@ def dates_of(values: 'pd.Series') -> Dates | int:
     iso = pd.to_datetime(values, errors='coerce', utc=True, format='ISO8601')
     if not iso.isna().any():
         return Dates(iso.dt.as_unit('ns').astype('int64').to_numpy(), 'dates')
-    found = values.astype(str).str.extract(f'^{_PATTERN.pattern}$')
+    found = values.astype(str).str.extract(_PATTERN)
     wrong = np.flatnonzero(found['hour'].isna().to_numpy())
     if len(wrong):
         return int(wrong[0])
-    day_ns, is_wrong = _of_day(found)
+    minutes = bool(found['second_of'].isna().all() and found['part'].notna().all())
+    day_ns, is_wrong = _of_day(found, minutes)
     if is_wrong.any():
         return int(np.flatnonzero(is_wrong)[0])
     has_date = found['first'].notna().to_numpy()
     if not has_date.any():
         back = np.diff(day_ns, prepend=day_ns[:1]) < -_LATE_HOUR_NS
-        minutes = bool(found['second_of'].isna().all() and found['part'].notna().all())
         return Dates(day_ns + DAY_NS * np.cumsum(back),
                      'minutes and seconds' if minutes else 'times of day', True)
     if not has_date.all():
@@ -91,14 +90,18 @@ def dates_of(values: 'pd.Series') -> Dates | int:
     return _dated(found, day_ns)
 
 
-def _of_day(found: 'pd.DataFrame') -> tuple[IntArray, 'np.ndarray']:
-    """Return the time of day [ns] of every row, and which rows hold none."""
+def _of_day(found: 'pd.DataFrame', minutes: bool) -> tuple[IntArray, BoolArray]:
+    """
+    Return the time of day [ns] of every row, and which rows hold none.
+
+    ``minutes``: the two parts are minutes and seconds.
+    """
     numbers = {name: found[name].fillna('0').astype('int64').to_numpy()
                for name in ('hour', 'minute', 'second_of')}
     part_ns = found['part'].fillna('').str.pad(9, 'right', '0').astype('int64').to_numpy()
     hour, minute, second = numbers.values()
-    if found['second_of'].isna().all() and found['part'].notna().all():
-        hour, minute, second = np.zeros_like(hour), hour, minute    # minutes and seconds
+    if minutes:
+        hour, minute, second = np.zeros_like(hour), hour, minute
     half = found['half'].str.lower().str[0]
     is_wrong = (minute > 59) | (second > 59) | (hour > 23) | (
         half.notna().to_numpy() & ((hour > 12) | (hour < 1)))
@@ -129,9 +132,10 @@ def _dated(found: 'pd.DataFrame', day_ns: IntArray) -> Dates | int:
     if not read:
         return wrong
     # Over midnight only the right order goes on by a day.
-    order = min(read, key=lambda one: int(np.ptp(read[one])))
-    if len({(int(one[0]), int(np.ptp(one))) for one in read.values()}) > 1 and len(
-            {int(np.ptp(one)) for one in read.values()}) == 1:
+    lengths_ns = {order: int(np.ptp(stamps)) for order, stamps in read.items()}
+    order = min(lengths_ns, key=lambda one: lengths_ns[one])
+    begins = {int(stamps[0]) for stamps in read.values()}
+    if len(begins) > 1 and len({*lengths_ns.values()}) == 1:
         first = found['mark'].iloc[0].join(parts.iloc[0].tolist())
         return Dates(day_ns, 'times of day', True,
                      f'the date {first} can be read in two ways, so it was left out')

@@ -31,7 +31,7 @@ from pam_actuation.tables.clock import clock_of
 from pam_actuation.tables.mapping import TableMapping
 from pam_actuation.tables.plausible import Doubt, doubts
 from pam_actuation.tables.signals import are_of_joint, BY_NAME, of_muscles
-from pam_actuation.tables.table import no_column, Table
+from pam_actuation.tables.table import no_column_in, Table
 from pam_actuation.topics.contents import Make
 from pam_actuation.topics.table import topic_of
 from pam_sim.annotations import FloatArray, IntArray
@@ -151,8 +151,7 @@ def recording_of(tables: Sequence[Table], mapping: TableMapping, *, length_m: fl
             pieces.setdefault(name, []).append((clock.stamp_ns, values, table.source))
     for name, one in mapping.signals.items():
         if name not in pieces:
-            known = dict.fromkeys(column for table in tables for column in table.columns)
-            raise InputError(no_column(one.column, list(known)), one.where or name)
+            raise InputError(no_column_in(tables, one.column), one.where or name)
         result.signals[name] = _joined(name, pieces[name])
     _check(result, length_m, accept)
     return result

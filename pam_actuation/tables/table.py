@@ -14,7 +14,7 @@
 
 """A table that another program wrote: named columns, and the line where its rows begin."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
 import re
 from typing import TYPE_CHECKING
@@ -138,6 +138,12 @@ class Table:
     def _pointed(self, value: object) -> object:
         """Return a text with a decimal point; anything else as it is."""
         return value.replace(self.decimal, '.') if isinstance(value, str) else value
+
+
+def no_column_in(tables: Iterable[Table], wanted: str) -> str:
+    """Return the sentence that no table has a column, with the names of those there are."""
+    return no_column(wanted, list(dict.fromkeys(
+        column for table in tables for column in table.columns)))
 
 
 def no_column(wanted: str, columns: Collection[str]) -> str:

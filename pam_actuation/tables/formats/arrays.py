@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from pam_actuation.tables.table import Table
 
-_SHORTEST = 2                    # rows: shorter arrays are settings
+SHORTEST = 2                    # rows: shorter arrays are settings
 
 
 def tables_of(source: str, arrays: Iterable[tuple[str, Any]], every: int) -> list[Table]:
@@ -33,7 +33,7 @@ def tables_of(source: str, arrays: Iterable[tuple[str, Any]], every: int) -> lis
     import pandas as pd
     by_length: dict[int, dict[str, Any]] = {}
     for name, column in _columns(arrays):
-        if len(column) >= _SHORTEST:
+        if len(column) >= SHORTEST:
             by_length.setdefault(len(column), {})[name] = pd.Series(column[::every])
     return [Table(source, columns) for _, columns in sorted(by_length.items(), reverse=True)]
 

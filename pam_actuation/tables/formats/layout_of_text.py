@@ -96,22 +96,21 @@ def layout_of(head: bytes, source: str) -> TextLayout:
     said = None
     if lines and re.fullmatch(r'sep=.', lines[0].strip()):
         said = lines[0].strip()[4:]
-    best: tuple[tuple[float, ...], str, str, int] | None = None
-    count = 0
+    best: tuple[tuple[float, ...], str, str, int, int] | None = None
     for separator in (said,) if said else _SEPARATORS:
         for decimal in '.,':
             if decimal == separator and not any('"' in line for line in lines[-_LOOKED_AT:]):
                 continue
-            begin, share, fields, numbers = _first_row(lines, separator, decimal)
+            begin, share, count, numbers = _first_row(lines, separator, decimal)
             # Fields that are numbers before many fields: 0,5;1,5 has two, and no third "5;1".
-            rank = (len(lines) - begin, share, _names(lines[:begin], separator) == fields,
-                    separator != r'\s+', fields, numbers)
-            if fields and (best is None or rank > best[0]):
-                best, count = (rank, separator, decimal, begin), fields
+            rank = (len(lines) - begin, share, _names(lines[:begin], separator) == count,
+                    separator != r'\s+', count, numbers)
+            if count and (best is None or rank > best[0]):
+                best = (rank, separator, decimal, begin, count)
     if best is None:
         raise InputError(
             'holds no rows of numbers with a separator that is ; , | a tab or spaces', source)
-    _, separator, decimal, begin = best
+    _, separator, decimal, begin, count = best
     named, units = _header(lines[:begin], separator, count, begin, source, decimal)
     names = _unique(named or [''] * count)
     called = {own: name for own, name in zip(names, named) if name and own != name}
@@ -177,9 +176,8 @@ def _first_row(lines: list[str], separator: str, decimal: str) -> tuple[int, flo
     number = re.compile(_NUMBER.format(re.escape(decimal)))
     numbers = fitting = of_rows = 0
 
-    def kind(line: str) -> int:
+    def kind(line: str, fields: list[str]) -> int:
         nonlocal numbers, fitting, of_rows
-        fields = split(line, separator)
         numeric = sum(bool(number.fullmatch(one)) for one in fields)
         dates = sum(bool(_DATE.fullmatch(one)) for one in fields)
         empty = sum(one.lower() in _EMPTY for one in fields)
@@ -193,10 +191,11 @@ def _first_row(lines: list[str], separator: str, decimal: str) -> tuple[int, flo
         fitting, of_rows = fitting + known, of_rows + len(fields)
         return len(fields)
 
-    looked_at = [kind(line) for line in lines[:_LOOKED_AT]]
+    split_lines = [split(line, separator) for line in lines[:_LOOKED_AT]]
+    looked_at = [kind(line, fields) for line, fields in zip(lines, split_lines)]
     # Settings above a table, such as "Rate;200", begin with a word, and its rows with a number.
     rows = [place for place, count in enumerate(looked_at) if count]
-    numbered = [place for place in rows if not _begins_with_word(split(lines[place], separator))]
+    numbered = [place for place in rows if not _begins_with_word(split_lines[place])]
     if 2 * len(numbered) > len(rows):
         looked_at[:numbered[0]] = [0] * numbered[0]
     counts = Counter(count for count in looked_at if count)

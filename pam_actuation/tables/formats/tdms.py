@@ -19,10 +19,10 @@ from typing import Any
 
 import numpy as np
 from pam_actuation.tables.formats import needs
+from pam_actuation.tables.formats.arrays import SHORTEST
 from pam_actuation.tables.table import Table
 from pam_sim.errors import InputError
 
-_SHORTEST = 2                       # rows: shorter channels are settings
 TIME = 'time_s'                     # column made of the increment of waveforms
 _UNIT_KEYS = ('unit_string', 'NI_UnitDescription', 'Unit', 'unit')
 
@@ -44,7 +44,7 @@ def read(path: str, every: int, wanted: Collection[str] | None,
             for channel in group.channels():
                 step_s = float(channel.properties.get('wf_increment', 0.0) or 0.0)
                 start_s = float(channel.properties.get('wf_start_offset', 0.0) or 0.0)
-                if len(channel) >= _SHORTEST:
+                if len(channel) >= SHORTEST:
                     found.setdefault((group.name, len(channel), step_s, start_s), []).append(
                         channel)
         tables = [_table(path, channels, every, step_s, start_s)
