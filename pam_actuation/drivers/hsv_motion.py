@@ -56,7 +56,9 @@ def corrected_by_contraction(state: np.record, par: np.record, resting_m3: float
         state.volume_change_m3 = 0.0
         state.rest_m3 = measured_m3 - resting_m3
         return True
-    state.volume_m3 = max(state.volume_m3 + par.correct_by_contraction * error, par.volume_m3)
+    # Corrected is the model of then; what its rate changes has moved the volume since.
+    gain = par.correct_by_contraction + age * par.correct_rate_by_contraction
+    state.volume_m3 = max(state.volume_m3 + gain * error, par.volume_m3)
     state.volume_change_m3 += par.correct_rate_by_contraction * error
     limit = par.volume_at_600kpa_m3 - par.volume_m3
     rest = state.rest_m3 + par.correct_rest_by_contraction * error

@@ -39,25 +39,27 @@ def nominal():
     return pam_sim.load_rig('dmsp_5_300_realistic', valve='hsv')
 
 
-def follow(nominal, changes, rig=None, seen=lambda t_s, x_m: x_m, seconds=10.0):
+def follow(nominal, changes, rig=None, seen=lambda t_s, x_m: x_m, seconds=10.0, age_ms=0):
     """
     Follow two sines; return (law, error of the prediction, tracking error) [Pa, rms].
 
-    Both from the middle on. The command is followed 45 ms later.
+    Both from the middle on. The command is followed 45 ms later. ``age_ms``: of the contraction.
     """
     plant, law = (rig or nominal).plant(1), HsvLaw(driver_config(nominal, changes).hsv)
     noise = np.random.default_rng(5)
-    truth, told, wanted = [], [], []
+    truth, told, wanted, moved_m = [], [], [], [plant.contraction_m] * 10
     for k in range(round(100 * seconds)):
         t_s = 0.01 * k
         wanted.append(P_ATM_PA + 380e3 + 60e3 * math.sin(5.0 * t_s) + 25e3 * math.sin(2.3 * t_s))
         duty = law.step(wanted[-1], plant.pressure_pa + NOISE_PA * noise.standard_normal(),
-                        contraction_m=seen(t_s, plant.contraction_m
-                                           + NOISE_M * noise.standard_normal()))
+                        contraction_m=seen(t_s, moved_m[-1 - age_ms]
+                                           + NOISE_M * noise.standard_normal()),
+                        contraction_age_s=1e-3 * age_ms)
         told.append(law.predicted_pa)
         for _ in range(10):
             truth.append(plant.pressure_pa)
             plant.step(duty)
+            moved_m.append(plant.contraction_m)
     half = len(told) // 2
     at = 10 * np.arange(half, len(told) - 5)
     truth = np.array(truth)
@@ -136,3 +138,9 @@ def test_the_driver_takes_a_contraction_only_where_it_counts(nominal):
         told.act(now)
     assert used[:2] == [0.001, pytest.approx(0.002009)]
     assert all(math.isnan(x_m) for x_m in used[2:])
+
+
+def test_a_contraction_nearly_a_period_old_tells_as_much_as_a_new_one(nominal):
+    """What an old reading says of the rate has moved the volume meanwhile."""
+    new, old = (follow(nominal, {**PULSES, **MOTION}, age_ms=age_ms)[1] for age_ms in (0, 9))
+    assert old < 1.15 * new
