@@ -83,7 +83,7 @@ class CompiledController:
     def step(self, x_m: float, ref_m: float, ref_vel_m_per_s: float, ref_lead_m: float,
              ref_lead_vel_m_per_s: float, learn: bool = True, elapsed_s: float = math.nan,
              pressure_pa: float = math.nan, force_n: float = math.nan,
-             held_back: float = 0.0) -> float:
+             held_back: float = 0.0, age_s: float = 0.0, pressure_age_s: float = 0.0) -> float:
         """
         Run one tick.
 
@@ -106,6 +106,8 @@ class CompiledController:
             0 while the driver follows the command. While it vents or limits it, one of the
             codes of ``following``: integral and rules stay as they are then, since the error
             is not theirs.
+        age_s, pressure_age_s : float
+            Time from the measurement of contraction and pressure to now, 0 or more.
 
         Returns
         -------
@@ -118,7 +120,8 @@ class CompiledController:
             reference_rate_m_per_s=ref_vel_m_per_s, lead_reference_m=ref_lead_m,
             lead_rate_m_per_s=ref_lead_vel_m_per_s,
             learning=1.0 if learn and not self.freeze_learning else 0.0, elapsed_s=elapsed_s,
-            pressure_pa=pressure_pa, force_n=force_n, held_back=held_back)
+            pressure_pa=pressure_pa, force_n=force_n, held_back=held_back,
+            age_s=age_s, pressure_age_s=pressure_age_s)
         return self._step(*self._arguments)
 
     def step_on_inputs(self) -> float:

@@ -36,6 +36,8 @@ INPUT = record(
     'pressure_pa',                    # absolute, measured; NaN = not known
     'force_n',                        # measured; NaN = not known
     'held_back',                      # 0 = the driver follows the command; else see ``following``
+    'age_s',                          # of the measurement: from its stamp to now
+    'pressure_age_s',
 )
 _write: Callable[..., None] = struct.Struct(f'{size_of(INPUT)}d').pack_into
 
@@ -44,7 +46,8 @@ def write_inputs(
         inputs: FloatArray, contraction_m: float, reference_m: float,
         reference_rate_m_per_s: float, lead_reference_m: float, lead_rate_m_per_s: float,
         learning: float, elapsed_s: float, pressure_pa: float, force_n: float,
-        held_back: float) -> None:
+        held_back: float, age_s: float = 0.0, pressure_age_s: float = 0.0) -> None:
     """Write all fields of ``INPUT`` at once, much faster than one by one."""
     _write(inputs, 0, contraction_m, reference_m, reference_rate_m_per_s, lead_reference_m,
-           lead_rate_m_per_s, learning, elapsed_s, pressure_pa, force_n, held_back)
+           lead_rate_m_per_s, learning, elapsed_s, pressure_pa, force_n, held_back,
+           age_s, pressure_age_s)

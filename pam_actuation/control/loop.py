@@ -312,6 +312,9 @@ class ControllerLoop:
             inputs.pressures_pa, inputs.forces_n = (muscle.pressure_pa,), (muscle.force_n,)
             inputs.stamps_ns = (
                 position_ns, muscle.pressure_ns, muscle.force_ns, *setpoint.stamps(now_ns))
+            inputs.ages_s = tuple([
+                max(now_ns - stamp_ns, 0) * 1e-9 if stamp_ns >= 0 else 0.0
+                for stamp_ns in (measured_ns, muscle.pressure_ns)])
             return inputs
         inputs.stamps_ns = (position_ns,)
         inputs.pressures_pa = [muscle.pressure_pa for muscle in muscles]

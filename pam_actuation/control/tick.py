@@ -67,6 +67,8 @@ RUNNING = (OK, REFERENCE_HELD)      # reasons with which the controller runs
 
 _NS = 1_000_000_000
 HELD_BACK = 'held_back'     # not 0 while the driver does not follow the command
+# From the stamps of what a muscle's law tracks and of the pressure to the tick.
+AGES = ('measurement_age_s', 'pressure_age_s')
 # Of which topics ``controller_state`` tells the stamps.
 STAMPED: tuple[str, ...] = (
     'contraction', 'pressure', 'force', 'reference', 'reference_trajectory')
@@ -83,7 +85,8 @@ def input_names(tracked: Tracked) -> tuple[str, ...]:
         *(f'{name}_stamp_{part}' for name in stamped for part in ('sec', 'nanosec')),
         position, *reference_names(tracked.unit), 'elapsed_s',
         *(f'{muscle}pressure_pa' for muscle in muscles),
-        *(f'{muscle}force_n' for muscle in muscles), HELD_BACK)
+        *(f'{muscle}force_n' for muscle in muscles), HELD_BACK,
+        *(() if tracked == JOINT else AGES))
 
 
 def reference_names(unit: str) -> tuple[str, str, str, str]:
@@ -111,6 +114,7 @@ class TickInputs:
     tracks. Pressures and forces are one of each muscle. ``proves`` tells which muscle of a joint
     is asked for a little pressure while all are vented. ``co_contraction_pa`` is the one asked
     for by message, absolute, NaN before the first. Other fields: see ``step`` of the controller.
+    ``ages_s``: of what the law of a muscle tracks, and of the pressure.
     ``restarted``: the loop stood still, so that the motion known from before means nothing.
     """
 
@@ -127,6 +131,7 @@ class TickInputs:
     pressures_pa: Sequence[float] = ()
     forces_n: Sequence[float] = ()
     held_back: float = 0.0
+    ages_s: tuple[float, ...] = (0.0, 0.0)
     proves: Sequence[bool] = ()
     effort: Effort = Effort()
     co_contraction_pa: float = math.nan
@@ -190,7 +195,7 @@ class MuscleLaw:
         return float(self.controller.step(
             inputs.position, inputs.reference, inputs.reference_rate,
             inputs.lead_reference, inputs.lead_reference_rate, inputs.learning,
-            inputs.elapsed_s, pressure_pa, force_n, inputs.held_back)),
+            inputs.elapsed_s, pressure_pa, force_n, inputs.held_back, *inputs.ages_s)),
 
     def internals(self, inputs: TickInputs) -> tuple[float, ...]:
         """Return what the controller tells of its tick."""
@@ -217,6 +222,7 @@ class TickCore:
         self._rises_slowly = rises_slowly
         self._period_s = 1.0 / law.controller.rate_hz
         self.vented_pa = (P_ATM_PA,) * len(law.places)
+        self._tells_ages = law.tracked != JOINT
         self._nothing = (math.nan,) * len(law.places)
         self._no_stamps_ns = (-1,) * len(law.stamped)
         self.ticks = 0
@@ -255,6 +261,7 @@ class TickCore:
             inputs.position, inputs.reference, inputs.reference_rate,
             inputs.lead_reference, inputs.lead_reference_rate, inputs.elapsed_s,
             *(inputs.pressures_pa or self._nothing), *(inputs.forces_n or self._nothing),
-            inputs.held_back, *law.internals(inputs))
+            inputs.held_back, *(inputs.ages_s if self._tells_ages else ()),
+            *law.internals(inputs))
         self.ticks += 1
         return commands_pa, values

@@ -30,8 +30,8 @@ import numpy as np
 from pam_actuation.control.config import load_controller
 from pam_actuation.control.modes.tracked import TRACKED, Tracked, tracked_by
 from pam_actuation.control.tick import (
-    HELD_BACK, input_names, join_stamp, MuscleLaw, reference_names, RUNNING, STAMPED, TickCore,
-    TickInputs)
+    AGES, HELD_BACK, input_names, join_stamp, MuscleLaw, reference_names, RUNNING, STAMPED,
+    TickCore, TickInputs)
 from pam_actuation.slow_rise import SlowRise
 from pam_sim import load_rig
 from pam_sim.annotations import FloatArray, IntArray
@@ -224,7 +224,9 @@ def _columns(states: 'Series', tracked: Tracked, path: str) -> dict[str, FloatAr
         raise InputError('the recorded controller and this one track different quantities', path)
     columns = dict(states.values)
     # Recordings from before it existed: every command was taken to be followed.
-    columns.setdefault(HELD_BACK, np.zeros(len(states.stamp_ns)))
+    # Those from before the ages of the measurements: all counted as new.
+    for name in (HELD_BACK, *AGES):
+        columns.setdefault(name, np.zeros(len(states.stamp_ns)))
     missing = [name for name in input_names(tracked) if name not in columns]
     if missing:
         raise InputError(
@@ -282,4 +284,5 @@ def _inputs(columns: dict[str, FloatArray], row: int, lookups: dict[str, dict[in
         int(columns['input_reason'][row]), bool(columns['learning'][row]),
         bool(columns['restarted'][row]), stamps, measured['contraction'], reference, rate,
         lead_reference, lead_rate, float(columns['elapsed_s'][row]), (measured['pressure'],),
-        (measured['force'],), float(columns[HELD_BACK][row]))
+        (measured['force'],), float(columns[HELD_BACK][row]),
+        tuple([float(columns[name][row]) for name in AGES]))

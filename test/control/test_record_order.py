@@ -92,12 +92,13 @@ def test_the_arguments_of_a_step_are_its_inputs():
             self._step, self._arguments = (lambda: 0.0), ()
 
     controller = Recorded()
-    controller.step(1.0, 2.0, 3.0, 4.0, 5.0, True, 6.0, 7.0, 8.0, 9.0)
+    controller.step(1.0, 2.0, 3.0, 4.0, 5.0, True, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0)
     seen = fields(controller.input_array, INPUT)
     assert {name: seen[name] for name in INPUT.names} == {
         'contraction_m': 1.0, 'reference_m': 2.0, 'reference_rate_m_per_s': 3.0,
         'lead_reference_m': 4.0, 'lead_rate_m_per_s': 5.0, 'learning': 1.0, 'elapsed_s': 6.0,
-        'pressure_pa': 7.0, 'force_n': 8.0, 'held_back': 9.0}
+        'pressure_pa': 7.0, 'force_n': 8.0, 'held_back': 9.0, 'age_s': 10.0,
+        'pressure_age_s': 11.0}
 
 
 @pytest.mark.parametrize('law', LAWS)

@@ -54,6 +54,8 @@ FORCE_INPUT = record(
     'pressure_pa',
     'force_n',                        # measured
     'held_back',
+    'age_s',
+    'pressure_age_s',
 )
 PARAMETERS = record(
     'stiffness_n_per_m',              # so many newtons count as one metre
@@ -146,6 +148,8 @@ def _law_inputs(par: np.record, surface: FloatArray, st: np.record, raw: np.reco
     inp.elapsed_s = raw.elapsed_s
     inp.pressure_pa = raw.pressure_pa
     inp.held_back = raw.held_back
+    inp.age_s = raw.age_s
+    inp.pressure_age_s = raw.pressure_age_s
     inp.force_n = raw.force_n
     if raw.reference_n < 2.0 * par.slack_force_n:
         inp.force_n = math.nan
@@ -218,7 +222,7 @@ class ForceController(WrappedLaw):
     def step(self, x_m: float, ref_n: float, ref_rate_n_per_s: float, ref_lead_n: float,
              ref_lead_rate_n_per_s: float, learn: bool = True, elapsed_s: float = math.nan,
              pressure_pa: float = math.nan, force_n: float = math.nan,
-             held_back: float = 0.0) -> float:
+             held_back: float = 0.0, age_s: float = 0.0, pressure_age_s: float = 0.0) -> float:
         """
         Run one tick; arguments as of the law, references in N and N/s.
 
@@ -238,6 +242,8 @@ class ForceController(WrappedLaw):
             Measured force [N].
         held_back : float
             0 while the driver follows the command, else a code of ``following``.
+        age_s, pressure_age_s : float
+            Time from the measurement of force and of pressure to now, 0 or more.
 
         Returns
         -------
@@ -256,6 +262,8 @@ class ForceController(WrappedLaw):
         raw.pressure_pa[...] = pressure_pa
         raw.force_n[...] = force_n
         raw.held_back[...] = held_back
+        raw.age_s[...] = age_s
+        raw.pressure_age_s[...] = pressure_age_s
         self._convert(self.law.input_array)
         self._error_n = ref_n - force_n
         return self.law.step_on_inputs()

@@ -15,6 +15,7 @@
 """The self-organizing fuzzy controller as a class: owner of the arrays of ``sofc_step``."""
 
 from collections.abc import Callable
+import math
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,7 @@ from pam_actuation.control.sofc.rule_text import NUMBERS
 from pam_actuation.control.sofc.settings import (
     OF_MODEL, parameter_array, PARAMETERS, PATH_SCALING, SCALING, SETTINGS)
 from pam_actuation.control.sofc.step import sofc_step
+from pam_actuation.control.sofc.valve_lag import LONGEST_AGE_S
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.parameters import check_parameters
@@ -104,7 +106,9 @@ class SelfOrganizingFuzzyController(CompiledController):
             self.rules.assign(rules)
         self.parameters = parameter_array(self.settings)
         par = fields(self.parameters, PARAMETERS)
-        rows = ring_rows(int(par.delay_ticks), int(par.spread_ticks), int(par.answer_ticks) + 1)
+        rows = ring_rows(
+            int(par.delay_ticks), int(par.spread_ticks),
+            int(par.answer_ticks) + 1 + math.ceil(LONGEST_AGE_S * self.rate_hz))
         self._ring = np.zeros(rows * size_of(ENTRY))
         tables = self.rules.stacked()
         self._kept = tuple(table[3] for table in tables)

@@ -296,16 +296,16 @@ def observe(par: np.record, inverse: FloatArray, rules: FloatArray, st: np.recor
         return
     if st.known < 0.5:
         _begin(st, contraction_m, pressure_pa)
-    part = period / (par.model_filter_s + period)
     former_m, former_rate = st.contraction_m, st.rate_m_per_s
     once_m, x, rate = st.contraction_once_m, former_m, former_rate
+    once_pa, p = st.pressure_once_pa, st.pressure_pa
     if elapsed_s > 0.0:
         share = elapsed_s / (par.model_filter_s + elapsed_s)
         once_m = _low_pass(once_m, contraction_m, share)
         x = _low_pass(former_m, once_m, share)
         rate = (x - former_m) / elapsed_s
-    once_pa = _low_pass(st.pressure_once_pa, pressure_pa, part)
-    p = _low_pass(st.pressure_pa, once_pa, part)
+        once_pa = _low_pass(once_pa, pressure_pa, share)
+        p = _low_pass(p, once_pa, share)
     acceleration = (rate - former_rate) / (elapsed_s if elapsed_s > 0.0 else period)
     st.contraction_once_m, st.contraction_m = once_m, x
     st.pressure_once_pa, st.pressure_pa = once_pa, p

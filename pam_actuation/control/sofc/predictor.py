@@ -70,8 +70,8 @@ def fast_rate(par: np.record, st: np.record, contraction_m: float, elapsed_s: fl
 
 @compiled
 def predict(par: np.record, inverse: FloatArray, rules: FloatArray, ring: Ring, tick: int,
-            st: np.record, contraction_m: float, elapsed_s: float, pressure_pa: float,
-            valve: np.record) -> tuple[float, float]:
+            st: np.record, contraction_m: float, elapsed_s: float, age_s: float,
+            pressure_pa: float, valve: np.record) -> tuple[float, float]:
     """
     Return contraction [m] and rate [m/s] for the moment at which a command of now arrives.
 
@@ -83,7 +83,7 @@ def predict(par: np.record, inverse: FloatArray, rules: FloatArray, ring: Ring, 
     for q in range(int(par.path_sets)):
         st.predicted_path[q] = st.path[q]
     inertia = inertia_pa_s2_per_m(par, st, contraction_m)
-    whole, rest = valve_lag.ticks_of(par, valve)
+    whole, rest = valve_lag.ticks_of(par, valve, age_s)
     for ago in range(whole, -1 if rest > 0.0 else 0, -1):
         # At last the rest of a tick, with the newest command.
         step = period if ago > 0 else rest * period

@@ -78,6 +78,7 @@ STATE = record(
     'acceleration_m_per_s2',          # of the lead reference
     'quasi_static_pa',                # pressure without the lag of the valve
     'expected_pa',                    # pressure to be measured
+    'arriving_pa_per_s',              # its rate of change
     ('lag', LAG),                     # of the valve
     'integral_pa',
     'integral_mean_pa',

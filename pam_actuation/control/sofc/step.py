@@ -270,8 +270,8 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
     base = inverse_pressure_pa(inverse, lead)
     model = st.model
     # A pressure that does not follow the command may be that of a sensor that is off.
-    measured = math.nan if lags else inp.pressure_pa
-    pressure = measured if math.isfinite(measured) else st.expected_pa
+    measured = math.nan if lags else valve_lag.pressure_then(st, inp)
+    pressure = measured if math.isfinite(measured) else valve_lag.expected_then(st, inp)
     path = 0.0
     damping = par.rate_feedforward_pa_s_per_m
     inertia = par.acceleration_feedforward_pa_s2_per_m
@@ -297,7 +297,7 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
     if acts and st.history_ticks >= par.answer_ticks:
         ahead_m, ahead_rate = predictor.predict(
             par, inverse, path_rules, ring, int(st.tick), model, inp.contraction_m,
-            elapsed_s, pressure, st.lag)
+            elapsed_s, inp.age_s, pressure, st.lag)
         predicted = predictor.predicted_feedback_pa(
             par, model, lead - ahead_m, lead_rate - ahead_rate, st.lag.lag_s)
         muscle_model.settle(par, model, lead - ahead_m, lead_rate)

@@ -34,6 +34,7 @@ from pam_actuation.control.sofc.credit import Ring
 from pam_sim.compiled import compiled
 from pam_sim.records import record
 
+LONGEST_AGE_S = 0.1       # of a measurement; the ring buffer of the commands is made for it
 _MEAN_TIME_S = 2.0        # the slow mean of what the pressure differs
 _PRIOR_PA2_PER_S2 = 5e11  # what the setting counts: a second of slow motion
 _REST_S = 1.0             # after a valve or driver that did not follow nothing is learned
@@ -72,11 +73,14 @@ def _both(par: np.record, st: np.record, sensitivity: float, delayed: float, inf
 
 
 @compiled
-def ticks_of(par: np.record, st: np.record) -> tuple[int, float]:
-    """Return the dead time in ticks: whole ones and the rest; ``st`` is a ``LAG``."""
-    if not par.dead_time_s > 0.0:
-        return int(par.answer_ticks), 0.0
-    ticks = st.dead_s / par.period_s
+def ticks_of(par: np.record, st: np.record, age_s: float) -> tuple[int, float]:
+    """
+    Return how many ticks ago the command was sent that arrived ``age_s`` ago.
+
+    Whole ticks and the rest; ``age_s`` is that of a measurement, ``st`` a ``LAG``.
+    """
+    ticks = min(age_s, LONGEST_AGE_S) / par.period_s
+    ticks += st.dead_s / par.period_s if par.dead_time_s > 0.0 else par.answer_ticks
     whole = int(ticks)
     return whole, ticks - whole
 
@@ -128,6 +132,20 @@ def _find(par: np.record, st: np.record, arrived_pa: float, arrived_pa_per_s: fl
 
 
 @compiled
+def pressure_then(st: np.record, inp: np.record) -> float:
+    """Return the measured pressure [Pa] at the time of the measured contraction."""
+    measured: float = inp.pressure_pa
+    return measured + (inp.pressure_age_s - inp.age_s) * st.arriving_pa_per_s
+
+
+@compiled
+def expected_then(st: np.record, inp: np.record) -> float:
+    """Return the expected pressure [Pa] at the time of the measured contraction."""
+    expected: float = st.expected_pa
+    return expected - inp.age_s * st.arriving_pa_per_s
+
+
+@compiled
 def falls_behind(par: np.record, ring: Ring, st: np.record, inp: np.record) -> bool:
     """
     Tell whether the measured pressure is far from what the commands should have made of it.
@@ -140,7 +158,7 @@ def falls_behind(par: np.record, ring: Ring, st: np.record, inp: np.record) -> b
         st.lag.rest_s = _REST_S
         return False
     tick = int(st.tick)
-    whole, rest = ticks_of(par, st.lag)
+    whole, rest = ticks_of(par, st.lag, 0.0)
     arrived = command_of(ring, tick, whole, rest)
     arrives = 0.0                     # rate of change of that command
     if par.dead_time_s > 0.0:
@@ -152,6 +170,8 @@ def falls_behind(par: np.record, ring: Ring, st: np.record, inp: np.record) -> b
         expected = arrived
     expected += par.period_s / (st.lag.lag_s + par.period_s) * (arrived - expected)
     st.expected_pa = expected
+    st.arriving_pa_per_s = (arrived - expected) / st.lag.lag_s if st.lag.lag_s > 0.0 else 0.0
+    measured += inp.pressure_age_s * st.arriving_pa_per_s
     gap = abs(expected - measured)
     if gap > par.valve_gap_pa or inp.held_back != 0.0:
         st.lag.rest_s = _REST_S
