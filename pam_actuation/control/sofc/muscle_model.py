@@ -38,6 +38,7 @@ import math
 import numpy as np
 from pam_actuation.control.sofc.dynamics import load_shape
 from pam_actuation.control.sofc.membership import locate
+from pam_actuation.control.sofc.motion_estimate import begin, MOTION
 from pam_actuation.control.sofc.rule_table import infer_path
 from pam_actuation.control.sofc.rule_text import MOST_SETS, NUMBERS
 from pam_actuation.control.static_inverse import inverse_pressure_pa
@@ -81,6 +82,7 @@ MODEL = record(
     'held',                           # part of its change that is held back, 0 = none
     'fast_contraction_m',             # for the rate the prediction begins with
     'fast_rate_m_per_s',              # that rate
+    ('motion', MOTION),               # estimated, to begin the prediction with
     'feedback_pa',                    # on the predicted error, filtered
     'squared_error_m2',               # of the reference, mean
     'strength',                       # 0 to 1, of that feedback and of the disturbance
@@ -203,6 +205,18 @@ def inertia_pa_s2_per_m(par: np.record, st: np.record, contraction_m: float) -> 
 
 
 @compiled
+def unbalanced_pa(par: np.record, inverse: FloatArray, rules: FloatArray, st: np.record,
+                  path: FloatArray, contraction_m: float, rate_m_per_s: float,
+                  pressure_pa: float) -> float:
+    """Return by what a pressure exceeds that of a steady motion [Pa]: what accelerates."""
+    static_pa = inverse_pressure_pa(inverse, contraction_m)
+    return float(
+        pressure_pa - static_pa - damping_pa_s_per_m(par, st, rate_m_per_s) * rate_m_per_s
+        - numbers_pa(par, st, path, contraction_m, static_pa)
+        - rules_pa(par, rules, path, contraction_m) - st.disturbance_pa)
+
+
+@compiled
 def find_numbers(par: np.record, inverse: FloatArray, st: np.record, surprised: bool) -> None:
     """
     Correct the numbers of the model by the innovation: recursive least squares.
@@ -249,12 +263,14 @@ def find_numbers(par: np.record, inverse: FloatArray, st: np.record, surprised: 
     moves = min(abs(st.rate_m_per_s) / _MOVES_M_PER_S, 1.0)
     if moves < 0.1:
         return
-    power = par.model_noise_pa * par.model_noise_pa / moves
+    noise = par.model_noise_pa * par.model_noise_pa / moves
+    power = noise
     for i in range(NUMBERS):
         gain[i] = 0.0
         for j in range(NUMBERS):
             gain[i] += cov[i * NUMBERS + j] * phi[j]
         power += gain[i] * phi[i]
+    st.motion.unsure_pa2 = max(power - noise, 0.0)
     for i in range(NUMBERS):
         st.number_pa[i] += gain[i] * st.unexplained_pa / power
         for j in range(NUMBERS):
@@ -269,6 +285,8 @@ def _begin(st: np.record, contraction_m: float, pressure_pa: float) -> None:
     st.contraction_m = contraction_m
     st.fast_contraction_m = contraction_m
     st.fast_rate_m_per_s = 0.0
+    begin(st.motion, contraction_m, 0.0, pressure_pa)
+    st.motion.unsure_pa2 = _UNKNOWN_PA * _UNKNOWN_PA
     st.pressure_once_pa = pressure_pa
     st.pressure_pa = pressure_pa
 

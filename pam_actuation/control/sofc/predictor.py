@@ -20,12 +20,13 @@ contraction and rate for the moment at which a command of now arrives. Feedback 
 no dead time in its loop (Smith 1957; in the time domain Manitius and Olbrot 1979).
 """
 
+import math
+
 import numpy as np
-from pam_actuation.control.sofc import valve_lag
+from pam_actuation.control.sofc import motion_estimate, valve_lag
 from pam_actuation.control.sofc.credit import Ring
 from pam_actuation.control.sofc.muscle_model import (
-    damping_pa_s_per_m, go, inertia_pa_s2_per_m, numbers_pa, rules_pa)
-from pam_actuation.control.static_inverse import inverse_pressure_pa
+    go, inertia_pa_s2_per_m, unbalanced_pa)
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import compiled
 
@@ -69,6 +70,28 @@ def fast_rate(par: np.record, st: np.record, contraction_m: float, elapsed_s: fl
 
 
 @compiled
+def motion(par: np.record, inverse: FloatArray, rules: FloatArray, st: np.record,
+           contraction_m: float, elapsed_s: float, pressure_pa: float) -> tuple[float, float]:
+    """Return contraction [m] and rate [m/s] at the reading; see ``motion_estimate``."""
+    fast = fast_rate(par, st, contraction_m, elapsed_s)
+    if not par.unknown_acceleration_m_per_s2 > 0.0:
+        return contraction_m, fast
+    now = st.motion
+    if elapsed_s > 0.0:
+        inertia = inertia_pa_s2_per_m(par, st, now.contraction_m)
+        # In the middle of the time between the readings.
+        middle_m = now.contraction_m + 0.5 * elapsed_s * now.rate_m_per_s
+        accelerates_pa = unbalanced_pa(
+            par, inverse, rules, st, st.path, middle_m, now.rate_m_per_s,
+            0.5 * (now.pressure_pa + pressure_pa))
+        motion_estimate.correct(
+            now, contraction_m, fast, elapsed_s, accelerates_pa / inertia, pressure_pa,
+            par.unknown_acceleration_m_per_s2, math.sqrt(now.unsure_pa2) / inertia)
+    return (contraction_m + now.trust * (now.contraction_m - contraction_m),
+            fast + now.trust * (now.rate_m_per_s - fast))
+
+
+@compiled
 def predict(par: np.record, inverse: FloatArray, rules: FloatArray, ring: Ring, tick: int,
             st: np.record, contraction_m: float, elapsed_s: float, age_s: float,
             pressure_pa: float, valve: np.record) -> tuple[float, float]:
@@ -79,7 +102,8 @@ def predict(par: np.record, inverse: FloatArray, rules: FloatArray, ring: Ring, 
     ``valve`` is a ``LAG``.
     """
     period = par.period_s
-    x, rate, p = contraction_m, fast_rate(par, st, contraction_m, elapsed_s), pressure_pa
+    x, rate = motion(par, inverse, rules, st, contraction_m, elapsed_s, pressure_pa)
+    p = pressure_pa
     for q in range(int(par.path_sets)):
         st.predicted_path[q] = st.path[q]
     inertia = inertia_pa_s2_per_m(par, st, contraction_m)
@@ -91,12 +115,8 @@ def predict(par: np.record, inverse: FloatArray, rules: FloatArray, ring: Ring, 
                    else valve_lag.command_of(ring, tick, 1, 0.0))
         p += step / (valve.lag_s + step) * (command - p)
         go(par, st.predicted_path, rate * step)
-        static_pa = inverse_pressure_pa(inverse, x)
-        missing = (
-            p - static_pa - damping_pa_s_per_m(par, st, rate) * rate
-            - numbers_pa(par, st, st.predicted_path, x, static_pa)
-            - rules_pa(par, rules, st.predicted_path, x) - st.disturbance_pa)
-        rate += step * missing / inertia
+        accelerates_pa = unbalanced_pa(par, inverse, rules, st, st.predicted_path, x, rate, p)
+        rate += step * accelerates_pa / inertia
         x += step * rate
     return x, rate
 

@@ -189,6 +189,9 @@ SETTINGS = (
     setting('predicted_filter_s', 's', 0.005, 0.0, 0.5, 'low pass on that feedback'),
     setting('predicted_rate_filter_s', 's', 0.015, 0.0, 0.5,
             'low pass on the rate with which the prediction begins'),
+    setting('unknown_acceleration_m_per_s2', 'm/s^2', 0.0, 0.0, 1e3,
+            'what the model does not tell of the acceleration: an estimate with it and with the '
+            'noise of the sensor begins the prediction; 0 = reading and filtered rate do'),
 )
 
 PARAMETERS = parameter_record(
