@@ -14,12 +14,13 @@
 """
 Sines live over DDS, started again and again: what the phase of a start does to tracking.
 
-Run ``python benchmarks/live_starts.py --valve hsv --starts 20``. Each start is one session of new
-processes, so that the phases between plant, controller and driver are drawn anew. It tracks 0.25,
-0.5 and 1 Hz one after the other, +-10 mm about 14 mm. The rules begin as they are after four
-simulations of the same reference, and go on learning. The error is root mean square over the last
-cycles of each sine. It is divided by that of the same classes with exact timing, the median of six
-seeds of sensor noise. Those are simulated without and with the time that messages take.
+Run ``python benchmarks/live_starts.py --valve hsv --starts 20``, with ``--controller NAME`` for
+another preset of that valve. Each start is one session of new processes, so that the phases
+between plant, controller and driver are drawn anew. It tracks 0.25, 0.5 and 1 Hz one after the
+other, +-10 mm about 14 mm. The rules begin as they are after four simulations of the same
+reference, and go on learning. The error is root mean square over the last cycles of each sine. It
+is divided by that of the same classes with exact timing, the median of six seeds of sensor noise.
+Those are simulated without and with the time that messages take.
 With ``--hidden`` the plant is a node of the independent simulator under test/hidden, another rig
 in every start. Rules are taught on the rig of this package then, and the exact timing is that of
 each hidden rig.
@@ -103,18 +104,18 @@ def transport_ns(bag):
     return 0
 
 
-def taught(rig, valve, one):
+def taught(rig, name, one):
     """Return a controller that learned the experiment in simulations with exact timing."""
-    controller = load_controller(f'sofc_{valve}', rig)
+    controller = load_controller(name, rig)
     for lesson in range(LESSONS):
         ClosedLoop(rig, one, seed=lesson).run(controller)
     return controller
 
 
-def exactly(one, rig, rules, folder, way_ns, seeds=SEEDS):
+def exactly(one, rig, name, rules, folder, way_ns, seeds=SEEDS):
     """Return frequency to the error with exact timing [mm], the median of all seeds."""
     errors = [errors_mm(load_run(simulate_experiment(
-        one, rig, load_controller(f'sofc_{rig.valve}', rig, rules_file=rules),
+        one, rig, load_controller(name, rig, rules_file=rules),
         os.path.join(folder, 'exact'), seed=seed, transport_ns=way_ns, overwrite=True)['bag']))
         for seed in seeds]
     return {hz: float(np.median([row[hz] for row in errors])) for hz in SINES}
@@ -124,9 +125,9 @@ def started(args, one, rig, rules, folder):
     """Run all starts; return (errors, timing) of each."""
     rows = []
     for start in range(args.starts):
-        bag = os.path.join(args.keep or folder, f'{args.valve}_{start}')
+        bag = os.path.join(args.keep or folder, f'{args.controller}_{start}')
         if not os.path.exists(bag):
-            controller = load_controller(f'sofc_{args.valve}', rig, rules_file=rules)
+            controller = load_controller(args.controller, rig, rules_file=rules)
             result = run_experiment(one, rig, controller, args.valve, bag, seed=start,
                                     domain_id=args.domain_id, realtime=not args.ordinary,
                                     programs=args.hidden and {
@@ -144,16 +145,17 @@ def show(args):
     rig, one = load_rig(RIG, valve=args.valve), experiment()
     with tempfile.TemporaryDirectory() as folder:
         rules = os.path.join(folder, 'rules.json')
-        taught(rig, args.valve, one).rules.save(rules)
+        taught(rig, args.controller, one).rules.save(rules)
         rows = started(args, one, rig, rules, folder)
         way_ns = int(np.median([row['way_ns'] for _, row in rows]))
         if args.hidden:
             rigs = [hidden_rig(args.valve, HIDDEN_SEED + start) for start in range(args.starts)]
-            exact, with_way = ([exactly(one, other, rules, folder, way, SEEDS[:2])
+            exact, with_way = ([exactly(one, other, args.controller, rules, folder, way, SEEDS[:2])
                                 for other in rigs] for way in (0, way_ns))
         else:
-            exact, with_way = ([exactly(one, rig, rules, folder, way)] * args.starts
-                               for way in (0, way_ns))
+            exact, with_way = (
+                [exactly(one, rig, args.controller, rules, folder, way)] * args.starts
+                for way in (0, way_ns))
     print('| sine | exact timing [mm] | with the way of messages | live, median | worst '
           '| median ratio | worst ratio | with the way | worst |\n'
           '|---|---|---|---|---|---|---|---|---|')
@@ -185,6 +187,8 @@ def command_line():
     """Return the parser of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[1])
     parser.add_argument('--valve', default='hsv', choices=('ppr', 'hsv'))
+    parser.add_argument('--controller', default=None, metavar='NAME',
+                        help='preset; by default sofc_ppr or sofc_hsv')
     parser.add_argument('--starts', type=int, default=20)
     parser.add_argument('--hidden', action='store_true',
                         help='before plants of the independent simulator')
@@ -199,7 +203,10 @@ def command_line():
 def main():
     """Run and compare."""
     args = command_line().parse_args()
-    with results_page.printed(args, __file__, f'{args.valve}{"_hidden" * args.hidden}'):
+    usual = f'sofc_{args.valve}'
+    args.controller = args.controller or usual
+    part = args.valve if args.controller == usual else args.controller
+    with results_page.printed(args, __file__, f'{part}{"_hidden" * args.hidden}'):
         show(args)
 
 
