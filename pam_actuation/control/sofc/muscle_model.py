@@ -36,9 +36,9 @@ feed-forward.
 import math
 
 import numpy as np
+from pam_actuation.control.sofc import motion_estimate
 from pam_actuation.control.sofc.dynamics import load_shape
 from pam_actuation.control.sofc.membership import locate
-from pam_actuation.control.sofc.motion_estimate import begin, MOTION
 from pam_actuation.control.sofc.rule_table import infer_path
 from pam_actuation.control.sofc.rule_text import MOST_SETS, NUMBERS
 from pam_actuation.control.static_inverse import inverse_pressure_pa
@@ -82,7 +82,7 @@ MODEL = record(
     'held',                           # part of its change that is held back, 0 = none
     'fast_contraction_m',             # for the rate the prediction begins with
     'fast_rate_m_per_s',              # that rate
-    ('motion', MOTION),               # estimated, to begin the prediction with
+    ('motion', motion_estimate.MOTION),     # estimated, to begin the prediction with
     'feedback_pa',                    # on the predicted error, filtered
     'squared_error_m2',               # of the reference, mean
     'strength',                       # 0 to 1, of that feedback and of the disturbance
@@ -285,7 +285,7 @@ def _begin(st: np.record, contraction_m: float, pressure_pa: float) -> None:
     st.contraction_m = contraction_m
     st.fast_contraction_m = contraction_m
     st.fast_rate_m_per_s = 0.0
-    begin(st.motion, contraction_m, 0.0, pressure_pa)
+    motion_estimate.begin(st.motion, contraction_m, 0.0, pressure_pa)
     st.motion.unsure_pa2 = _UNKNOWN_PA * _UNKNOWN_PA
     st.pressure_once_pa = pressure_pa
     st.pressure_pa = pressure_pa
