@@ -20,8 +20,9 @@ The driver rises slowly after it vented, a controller after it asked for atmosph
 It begins at atmospheric pressure, whatever is measured: a muscle that is still emptying
 would else be filled by a valve that catches up. It follows the command down at once and up
 at the rate. It ends only when the muscle was under pressure and the command was met for some
-time. Commands of atmospheric pressure do not count, however many there are, so no order of
-commands leads round it.
+time. A command with noise goes up and down in each tick, so one that is nearly met counts.
+Commands of atmospheric pressure do not count, however many there are, so no order of commands
+leads round it.
 
 It waits for the muscle: it is ahead of the measured pressure by what the valve lags at that rate
 and no more. Somebody else may vent, such as a watchdog or a dump valve; a valve that had meanwhile
@@ -42,6 +43,7 @@ UNTIL_FOLLOWED_S = 1.0
 UNDER_PRESSURE_PA = P_ATM_PA + 20_000.0
 LONGEST_STEP_S = 0.02       # a late tick must not make up for the time it missed
 WHILE_WAITING = 0.01        # share of the rate by which it goes further ahead of the muscle
+NEARLY_PA = 10_000.0        # a command is met that far below: it may carry noise
 WAITS_LONG_S = 1.0          # and from when it does so, and that is worth a word
 
 
@@ -54,7 +56,7 @@ class SlowRise:
     active : bool
         Whether the rise is limited now.
     limiting : bool
-        Whether the command of the last tick was above what was allowed.
+        Whether the last command was above what was allowed, by more than ``nearly_pa``.
     waited_s : float
         How long, in all, it has waited for the measured pressure [s].
 
@@ -70,15 +72,19 @@ class SlowRise:
         Time constant of the pressure behind a command, with the age of a reading [s].
     dead_time_s : float
         Time before the pressure answers at all [s].
+    nearly_pa : float
+        A command that is limited by no more than this counts as met [Pa].
 
     """
 
     def __init__(self, rate_pa_per_s: float = RISE_PA_PER_S,
                  until_followed_s: float = UNTIL_FOLLOWED_S, active: bool = True,
-                 lag_s: float = math.inf, dead_time_s: float = 0.0) -> None:
+                 lag_s: float = math.inf, dead_time_s: float = 0.0,
+                 nearly_pa: float = NEARLY_PA) -> None:
         self._rate_pa_per_s = rate_pa_per_s
         self._until_followed_s = until_followed_s
         self._lag_s, self._dead_time_s = lag_s, dead_time_s
+        self._nearly_pa = nearly_pa
         self.begin()
         self.active = active
 
@@ -120,7 +126,7 @@ class SlowRise:
         if min(command_pa, reach_pa) > nearest_pa:
             self.waited_s += elapsed_s
             reach_pa = nearest_pa
-        self.limiting = command_pa > reach_pa
+        self.limiting = command_pa > reach_pa + self._nearly_pa
         self._allowed_pa = min(command_pa, reach_pa)
         if not self.limiting and command_pa > UNDER_PRESSURE_PA:
             self._followed_s += elapsed_s

@@ -69,6 +69,7 @@ from pam_actuation.control.reference_buffer import ReferenceBuffer
 from pam_actuation.control.setpoint import MuscleSetpoint, Setpoint
 from pam_actuation.control.tick import Law, MuscleLaw, TickCore, TickInputs
 from pam_actuation.messages import ControllerState, Message, Pressure
+from pam_actuation.slow_rise import NEARLY_PA
 from pam_sim.errors import InputError
 from pam_sim.joint.rig import JointRig
 
@@ -99,6 +100,8 @@ class ControllerLoop:
         What the controller is of: a joint, or one muscle as without it.
     name : str
         Of the joint, by which it is found in messages to several joints.
+    nearly_pa : float
+        As of ``SlowRise``; recordings of earlier versions have 0.
 
     Attributes
     ----------
@@ -125,12 +128,12 @@ class ControllerLoop:
     """
 
     def __init__(self, controller: 'Controller', rig: 'Rig | JointRig | None' = None,
-                 name: str = 'muscle') -> None:
+                 name: str = 'muscle', nearly_pa: float = NEARLY_PA) -> None:
         self.controller: Any = controller       # of a muscle or a joint, as found below
         self._newest: dict[str, Message] = {}       # by topic
         law, self.measurement, self.setpoint = (
             self._of_joint(rig, name) if isinstance(rig, JointRig) else self._of_muscle())
-        self._core = TickCore(law)
+        self._core = TickCore(law, nearly_pa=nearly_pa)
         self.muscles = tuple(
             MuscleChannel(place, rise) for place, rise in zip(law.places, self._core.rises))
         self.command_topics = tuple(f'{place}pressure_command' for place in law.places)

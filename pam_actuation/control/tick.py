@@ -27,7 +27,7 @@ from typing import Any, NamedTuple, Protocol
 
 from pam_actuation.control.modes.tracked import JOINT, Tracked, tracked_by
 from pam_actuation.control.slack_muscle import PROOF_PA
-from pam_actuation.slow_rise import SlowRise
+from pam_actuation.slow_rise import NEARLY_PA, SlowRise
 from pam_sim.joint.parameters import SIDES
 from pam_sim.units import P_ATM_PA
 
@@ -213,12 +213,14 @@ class TickCore:
     rises_slowly : bool
         Whether the commands rise slowly after the inputs were invalid; False for recordings
         of versions that did not.
+    nearly_pa : float
+        As of ``SlowRise``.
 
     """
 
-    def __init__(self, law: Law, rises_slowly: bool = True) -> None:
+    def __init__(self, law: Law, rises_slowly: bool = True, nearly_pa: float = NEARLY_PA) -> None:
         self.law = law
-        self.rises = tuple(SlowRise(active=False) for _ in law.places)
+        self.rises = tuple(SlowRise(active=False, nearly_pa=nearly_pa) for _ in law.places)
         self._rises_slowly = rises_slowly
         self._period_s = 1.0 / law.controller.rate_hz
         self.vented_pa = (P_ATM_PA,) * len(law.places)

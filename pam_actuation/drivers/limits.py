@@ -17,7 +17,7 @@
 from dataclasses import dataclass
 
 from pam_actuation.drivers.parameter import number
-from pam_actuation.slow_rise import RISE_PA_PER_S, UNTIL_FOLLOWED_S
+from pam_actuation.slow_rise import NEARLY_PA, RISE_PA_PER_S, UNTIL_FOLLOWED_S
 
 
 @dataclass(frozen=True)
@@ -47,6 +47,8 @@ class SafetyLimits:
     resume_until_followed_s: float = number(
         UNTIL_FOLLOWED_S, 0.1, 60.0,
         'time under pressure with the command met that ends the slow rise')
+    resume_nearly_pa: float = number(
+        NEARLY_PA, 0.0, 1e5, 'a command limited by no more than this counts as met')
     frozen_after_s: float = number(0.2, 0.02, 1e9, 'shortest stand-still of a frozen reading')
     frozen_change_pa: float = number(
         100_000.0, 1e3, 1e9, 'change that must have been missed to call it frozen')

@@ -18,9 +18,11 @@ from collections.abc import Mapping
 
 from pam_actuation.drivers.asked import asked_in_recording
 from pam_actuation.drivers.limits import SafetyLimits
+from pam_actuation.slow_rise import NEARLY_PA
 from pam_sim.errors import InputError
 
-_WAIT = 'command_wait_s'
+# Parameters of a driver that a recording tells, and what they were before it told them.
+_BEFORE = {'command_wait_s': '0', 'resume_nearly_pa': '0'}
 
 
 def driver_facts(changes: Mapping[str, object] | None = None) -> dict[str, str]:
@@ -29,15 +31,16 @@ def driver_facts(changes: Mapping[str, object] | None = None) -> dict[str, str]:
 
     ``changes``: their parameters that differ from the defaults, by name.
     """
-    return {_WAIT: str((changes or {}).get(_WAIT, SafetyLimits.command_wait_s))}
+    return {name: str((changes or {}).get(name, getattr(SafetyLimits, name))) for name in _BEFORE}
 
 
 def as_recorded(metadata: Mapping[str, str], where: str) -> dict[str, object]:
     """
     Return the changes with which a driver acts as it did in a recording.
 
-    In recordings that do not say how long commands waited, none did. What the controller of the
-    recording asked of its driver (``drivers/asked.py``) counts too.
+    In recordings that do not say how long commands waited, none did, and one that was nearly met
+    was not met. What the controller of the recording asked of its driver (``drivers/asked.py``)
+    counts too.
 
     Parameters
     ----------
@@ -52,8 +55,16 @@ def as_recorded(metadata: Mapping[str, str], where: str) -> dict[str, object]:
         The recording says something that is no number.
 
     """
-    text = metadata.get(_WAIT, '0')
-    try:
-        return {_WAIT: float(text), **asked_in_recording(metadata)}
-    except ValueError:
-        raise InputError(f'{_WAIT} is {text!r}, a number is needed', where) from None
+    told: dict[str, object] = {}
+    for name, before in _BEFORE.items():
+        text = metadata.get(name, before)
+        try:
+            told[name] = float(text)
+        except ValueError:
+            raise InputError(f'{name} is {text!r}, a number is needed', where) from None
+    return {**told, **asked_in_recording(metadata)}
+
+
+def nearly_in(changes: Mapping[str, object]) -> float:
+    """Return when a command counted as met in a recording [Pa], from its ``as_recorded``."""
+    return float(str(changes.get('resume_nearly_pa', NEARLY_PA)))

@@ -137,7 +137,8 @@ class SafetySupervisor:
         self._standing: Fault | None = None
         self._reach_pa = math.inf         # of a supply that is too low, or was a moment ago
         self._rise = SlowRise(lim.resume_rate_pa_per_s, lim.resume_until_followed_s,
-                              lag_s=lag_s, dead_time_s=dead_time_s)
+                              lag_s=lag_s, dead_time_s=dead_time_s,
+                              nearly_pa=lim.resume_nearly_pa)
         self._now_ns: int | None = None
         self._first_tick_ns = 0
         self._grace_until_ns = 0

@@ -35,7 +35,7 @@ from pam_actuation.bags.writer import BagWriter
 from pam_actuation.control.loop import ControllerLoop
 from pam_actuation.drivers.for_rig import driver_loops
 from pam_actuation.drivers.loop import DriverLoop
-from pam_actuation.drivers.recorded import driver_facts
+from pam_actuation.drivers.recorded import driver_facts, nearly_in
 from pam_actuation.experiments.limits import check_tracked
 from pam_actuation.experiments.reference import ReferenceLoop
 from pam_actuation.loops.bus import Bus, every
@@ -69,8 +69,8 @@ class _Loops:
         self._status_ns: dict[str, int] = {}    # by the place of a driver, when recorded last
         self.bus = bus = Bus(transport_ns, recorder.write)
         self.reached_ns = 0
-        plant, drivers = PlantLoop(rig, seed), driver_loops(
-            rig, {**(controller and controller.driver or {}), **(changes or {})})
+        changes = {**(controller and controller.driver or {}), **(changes or {})}
+        plant, drivers = PlantLoop(rig, seed), driver_loops(rig, changes)
         reference = ReferenceLoop(experiment, valve=rig.valve)
         lead_ns = LEAD_NS if experiment.asks_for_motion else 0
 
@@ -86,7 +86,7 @@ class _Loops:
         add('plant', attach_plant(bus, plant), PUBLISH_RATE_HZ)
         add('reference', reference_tick(bus, reference), reference.rate_hz, 0)
         if experiment.asks_for_motion and controller is not None:
-            control = ControllerLoop(controller, rig, recorder.name)
+            control = ControllerLoop(controller, rig, recorder.name, nearly_in(changes))
             attach(bus, control)
             decide = controller_tick(bus, control)
             add('controller', lambda now_ns: decide(now_ns, learning), controller.rate_hz)

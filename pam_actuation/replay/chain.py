@@ -34,7 +34,7 @@ from pam_actuation.bags.load_joint import MEASURED
 from pam_actuation.control.config import load_controller
 from pam_actuation.control.loop import ControllerLoop
 from pam_actuation.drivers.for_rig import driver_loops
-from pam_actuation.drivers.recorded import as_recorded
+from pam_actuation.drivers.recorded import as_recorded, nearly_in
 from pam_actuation.loops.bus import Bus
 from pam_actuation.loops.wiring import (
     attach, attach_plant, controller_tick, send_followed, signal_tick)
@@ -156,7 +156,7 @@ class RepeatedLoops:
                        for place, driver in self._drivers.items()}
         self._decide: Callable[[int, bool], None] | None = None
         if controller is not None and 'controller' in parts:
-            control = ControllerLoop(controller, rig, name)
+            control = ControllerLoop(controller, rig, name, nearly_in(changes or {}))
             attach(self.bus, control)
             self._decide = controller_tick(self.bus, control)
         self._sensors = tuple(f'{place}{topic}' for place in rig.muscles for topic in SENSORS)

@@ -32,6 +32,7 @@ from pam_actuation.control.modes.tracked import TRACKED, Tracked, tracked_by
 from pam_actuation.control.tick import (
     AGES, HELD_BACK, input_names, join_stamp, MuscleLaw, reference_names, RUNNING, STAMPED,
     TickCore, TickInputs)
+from pam_actuation.drivers.recorded import as_recorded, nearly_in
 from pam_actuation.slow_rise import SlowRise
 from pam_sim import load_rig
 from pam_sim.annotations import FloatArray, IntArray
@@ -136,10 +137,11 @@ def replay_controller(run: 'Run', controller: 'Controller | str | os.PathLike[st
     check_complete(columns, order, run.path)
 
     rises_slowly = HELD_BACK in states.values       # versions before did not
-    core = TickCore(MuscleLaw(chosen), rises_slowly)
+    nearly_pa = nearly_in(as_recorded(run.metadata, run.path))
+    core = TickCore(MuscleLaw(chosen), rises_slowly, nearly_pa)
     compared = _compared(core.names if controller is None else (), columns, run.path)
     lookups = {topic: _lookup(run, topic) for topic in _MEASURED}
-    sent = _SentCommands(run, columns, rises_slowly, 1.0 / chosen.rate_hz)
+    sent = _SentCommands(run, columns, rises_slowly, 1.0 / chosen.rate_hz, nearly_pa)
     differing: Counter[str] = Counter()
     recorded, replayed = np.empty(len(order)), np.empty(len(order))
     kept = np.empty((len(order) if keep_states else 0, len(core.names)))
@@ -190,14 +192,14 @@ class _SentCommands:
     """
 
     def __init__(self, run: 'Run', columns: dict[str, FloatArray], rises_slowly: bool,
-                 period_s: float) -> None:
+                 period_s: float, nearly_pa: float) -> None:
         commands = run.topics['pressure_command']
         self.missing = 0
         self._command_at = dict(zip(
             commands.stamp_ns.tolist(), commands.values['pressure_pa'].tolist()))
         self._stamp_ns = run.topics['controller_state'].stamp_ns
         self._columns, self._rises_slowly, self._period_s = columns, rises_slowly, period_s
-        self._rise = SlowRise(active=False)
+        self._rise = SlowRise(active=False, nearly_pa=nearly_pa)
 
     def at(self, row: int, replayed_pa: float) -> float:
         """Return the command of the next tick [Pa]; the replayed one where nothing tells it."""

@@ -27,6 +27,7 @@ from pam_actuation.bags.load_joint import MEASURED
 from pam_actuation.control.joint_law import ADDED_NAMES, CO_CONTRACTION, JointLaw, PROVES
 from pam_actuation.control.tick import (
     Effort, HELD_BACK, join_stamp, reference_names, TickCore, TickInputs)
+from pam_actuation.drivers.recorded import as_recorded, nearly_in
 from pam_actuation.replay.chain import ChainReplay, same_bits
 from pam_actuation.replay.controller import check_complete
 from pam_sim.annotations import FloatArray, IntArray
@@ -105,7 +106,8 @@ def replay_joint_controller(run: 'Run', controller: 'JointController',
     sent_at = {topic: dict(zip(run.topics[topic].stamp_ns.tolist(),
                                run.topics[topic].values['pressure_pa'].tolist()))
                for topic in COMMANDS if topic in run}
-    core = TickCore(JointLaw(controller, joint))
+    nearly_pa = nearly_in(as_recorded(run.metadata, run.path))
+    core = TickCore(JointLaw(controller, joint), nearly_pa=nearly_pa)
     compared = [(name, columns[name], core.names.index(name))
                 for name in core.names if name in columns]
     differing: dict[str, int] = {}

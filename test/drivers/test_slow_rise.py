@@ -25,7 +25,8 @@ from pam_actuation.loops.bus import Bus, every
 from pam_actuation.loops.wiring import attach, attach_plant
 from pam_actuation.messages import Pressure, START_NS
 from pam_actuation.plant_loop import PlantLoop
-from pam_actuation.slow_rise import RISE_PA_PER_S, SlowRise, UNDER_PRESSURE_PA, WAITS_LONG_S
+from pam_actuation.slow_rise import (
+    NEARLY_PA, RISE_PA_PER_S, SlowRise, UNDER_PRESSURE_PA, UNTIL_FOLLOWED_S, WAITS_LONG_S)
 from pam_sim import load_rig
 from pam_sim.units import P_ATM_PA
 import pytest
@@ -197,3 +198,18 @@ def test_a_long_wait_for_the_muscle_is_told():
     bench.command = P_ATM_PA + 300e3
     assert 'waits' not in bench.last(300).message
     assert 'waits for the measured pressure, which stays behind' in bench.last(2000).message
+
+
+def test_a_command_with_noise_is_met_although_every_rise_of_it_is_limited():
+    rise, strict = SlowRise(), SlowRise(nearly_pa=0.0)
+    noise = np.random.default_rng(1).uniform(-0.4, 0.4, 2000) * NEARLY_PA
+    ends_s = []
+    for one in (rise, strict):
+        limits, ticks = [P_ATM_PA], 0
+        while one.active:
+            limits.append(one.limited(P_ATM_PA + 3e5 + noise[ticks], PERIOD_S))
+            ticks += 1
+        assert rises(limits[:-1]) <= RISE_PA_PER_S * 1.001
+        ends_s.append(ticks * PERIOD_S - 3e5 / RISE_PA_PER_S)
+    assert ends_s[0] == pytest.approx(UNTIL_FOLLOWED_S, abs=0.05)
+    assert ends_s[1] > 1.25 * UNTIL_FOLLOWED_S

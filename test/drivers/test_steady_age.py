@@ -221,7 +221,7 @@ def test_random_ages_cost_no_tracking(tmp_path, at_the_edge):
 
 def test_a_replay_waits_as_the_recorded_driver_did(at_the_edge):
     run = at_the_edge[1]
-    assert run.metadata['command_wait_s'] == driver_facts()['command_wait_s']
+    assert driver_facts().items() <= run.metadata.items()
     assert replay_driver(run).identical
     del run.metadata['command_wait_s']          # as of versions before
     assert not replay_driver(run).identical
