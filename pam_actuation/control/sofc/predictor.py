@@ -98,8 +98,8 @@ def predict(par: np.record, inverse: FloatArray, rules: FloatArray, ring: Ring, 
     """
     Return contraction [m] and rate [m/s] for the moment at which a command of now arrives.
 
-    The model goes on from the measurement with the commands of one dead time before.
-    ``valve`` is a ``LAG``.
+    The model goes on from the measurement, which is ``age_s`` old, with the commands of one dead
+    time before. ``pressure_pa`` is the pressure of that time, ``valve`` a ``LAG``.
     """
     period = par.period_s
     x, rate = motion(par, inverse, rules, st, contraction_m, elapsed_s, pressure_pa)
