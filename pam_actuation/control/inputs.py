@@ -25,6 +25,8 @@ import struct
 from pam_sim.annotations import FloatArray
 from pam_sim.records import record, size_of
 
+MAX_AGE_S = 0.1         # an older measurement is not used
+
 INPUT = record(
     'contraction_m',                  # measured
     'reference_m',                    # wanted at the time of that measurement

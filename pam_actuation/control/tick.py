@@ -85,8 +85,7 @@ def input_names(tracked: Tracked) -> tuple[str, ...]:
         *(f'{name}_stamp_{part}' for name in stamped for part in ('sec', 'nanosec')),
         position, *reference_names(tracked.unit), 'elapsed_s',
         *(f'{muscle}pressure_pa' for muscle in muscles),
-        *(f'{muscle}force_n' for muscle in muscles), HELD_BACK,
-        *(() if tracked == JOINT else AGES))
+        *(f'{muscle}force_n' for muscle in muscles), HELD_BACK)
 
 
 def reference_names(unit: str) -> tuple[str, str, str, str]:
@@ -183,7 +182,7 @@ class MuscleLaw:
     def __init__(self, controller: Any) -> None:
         self.controller = controller
         self.tracked = tracked_by(controller)
-        self.names = tuple(controller.state_names)
+        self.names = (*AGES, *controller.state_names)
 
     def pause(self) -> None:
         """Forget the motion: the next step starts bumplessly."""
@@ -198,9 +197,8 @@ class MuscleLaw:
             inputs.elapsed_s, pressure_pa, force_n, inputs.held_back, *inputs.ages_s)),
 
     def internals(self, inputs: TickInputs) -> tuple[float, ...]:
-        """Return what the controller tells of its tick."""
-        values: tuple[float, ...] = self.controller.state_values()
-        return values
+        """Return the ages of its inputs, and what the controller tells of its tick."""
+        return (*inputs.ages_s, *self.controller.state_values())
 
 
 class TickCore:
@@ -224,7 +222,6 @@ class TickCore:
         self._rises_slowly = rises_slowly
         self._period_s = 1.0 / law.controller.rate_hz
         self.vented_pa = (P_ATM_PA,) * len(law.places)
-        self._tells_ages = law.tracked != JOINT
         self._nothing = (math.nan,) * len(law.places)
         self._no_stamps_ns = (-1,) * len(law.stamped)
         self.ticks = 0
@@ -263,7 +260,6 @@ class TickCore:
             inputs.position, inputs.reference, inputs.reference_rate,
             inputs.lead_reference, inputs.lead_reference_rate, inputs.elapsed_s,
             *(inputs.pressures_pa or self._nothing), *(inputs.forces_n or self._nothing),
-            inputs.held_back, *(inputs.ages_s if self._tells_ages else ()),
-            *law.internals(inputs))
+            inputs.held_back, *law.internals(inputs))
         self.ticks += 1
         return commands_pa, values

@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 from pam_actuation.control.compiled_controller import CompiledController
+from pam_actuation.control.inputs import MAX_AGE_S
 from pam_actuation.control.sofc import muscle_model
 from pam_actuation.control.sofc.credit import ring_rows
 from pam_actuation.control.sofc.learning import REASONS
@@ -31,7 +32,6 @@ from pam_actuation.control.sofc.rule_text import NUMBERS
 from pam_actuation.control.sofc.settings import (
     OF_MODEL, parameter_array, PARAMETERS, PATH_SCALING, SCALING, SETTINGS)
 from pam_actuation.control.sofc.step import sofc_step
-from pam_actuation.control.sofc.valve_lag import LONGEST_AGE_S
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.parameters import check_parameters
@@ -108,7 +108,7 @@ class SelfOrganizingFuzzyController(CompiledController):
         par = fields(self.parameters, PARAMETERS)
         rows = ring_rows(
             int(par.delay_ticks), int(par.spread_ticks),
-            int(par.answer_ticks) + 1 + math.ceil(LONGEST_AGE_S * self.rate_hz))
+            int(par.answer_ticks) + 1 + math.ceil(MAX_AGE_S * self.rate_hz))
         self._ring = np.zeros(rows * size_of(ENTRY))
         tables = self.rules.stacked()
         self._kept = tuple(table[3] for table in tables)

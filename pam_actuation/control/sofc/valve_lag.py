@@ -29,12 +29,12 @@ most the preview. Between two ticks the command is that of a straight line.
 import math
 
 import numpy as np
+from pam_actuation.control.inputs import MAX_AGE_S
 from pam_actuation.control.sofc import credit
 from pam_actuation.control.sofc.credit import Ring
 from pam_sim.compiled import compiled
 from pam_sim.records import record
 
-LONGEST_AGE_S = 0.1       # of a measurement; the ring buffer of the commands is made for it
 _MEAN_TIME_S = 2.0        # the slow mean of what the pressure differs
 _PRIOR_PA2_PER_S2 = 5e11  # what the setting counts: a second of slow motion
 _REST_S = 1.0             # after a valve or driver that did not follow nothing is learned
@@ -79,7 +79,7 @@ def ticks_of(par: np.record, st: np.record, age_s: float) -> tuple[int, float]:
 
     Whole ticks and the rest; ``age_s`` is that of a measurement, ``st`` a ``LAG``.
     """
-    ticks = min(age_s, LONGEST_AGE_S) / par.period_s
+    ticks = min(age_s, MAX_AGE_S) / par.period_s
     ticks += st.dead_s / par.period_s if par.dead_time_s > 0.0 else par.answer_ticks
     whole = int(ticks)
     return whole, ticks - whole
