@@ -18,12 +18,11 @@ Contraction and rate of the muscle, estimated from noisy readings and its model.
 The model tells the acceleration, and a reading corrects contraction and rate. This is the steady
 Kalman filter of both. How much a reading corrects follows from the tracking index (Kalata 1984).
 The index is an acceleration times the square of the time between readings, over the noise of the
-sensor. The acceleration is what the model does not tell.
+sensor. The acceleration is what the model does not tell. It has two parts: a setting, and what
+the numbers of the model are not sure of.
 
-- It has two parts, a setting and what the numbers of the model are not sure of.
-- The noise is found from the innovations, which are readings less what was expected of them.
-  Errors of the model change slowly, so the difference of two innovations is noise. Its median is
-  followed.
+The noise is found from the innovations, which are readings less what was expected of them. Errors
+of the model change slowly, so the difference of two innovations is noise. Its median is followed.
 
 While the model is unsure, the estimate is no better than the reading itself and a filtered rate,
 and a feedback on it has less margin. The prediction therefore begins with a mixture of the two.
