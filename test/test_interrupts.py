@@ -147,3 +147,28 @@ def test_trackers_of_joblib_do_not_warn_of_what_is_tidied_up_already(tmp_path):
         'list(in_processes(2, (joblib.delayed(abs)(k) for k in range(4))))\n'
         'resource_tracker.register("/nowhere/at/all", "folder")\n', tmp_path)
     assert (code, output, errors) == (0, [], '')
+
+
+def test_a_verb_says_that_it_was_stopped_from_its_first_moment_on(tmp_path):
+    """The signal comes as soon as the handler is there, or while the verb says its last words."""
+    for moment in ("""
+class Asked(interrupts.Worker):
+    def __init__(self):
+        super().__init__()
+        ask()
+interrupts.Worker = Asked
+""", """
+from pam_actuation.cli import options
+told = options.complain
+def interrupted(*words):
+    ask()
+    return told(*words)
+options.complain = interrupted
+interrupts.ONE_REQUEST_S = 0.0
+import pam_actuation.cli.models as models
+models.run = lambda args: ask()
+"""):
+        code = BEGIN + moment + (
+            'import sys; sys.argv[1:] = ["models"]\n'
+            'from pam_actuation.cli.main import main; sys.exit(main())')
+        assert run(code, tmp_path) == (130, [], 'pam models: stopped\n'), moment

@@ -121,11 +121,11 @@ def _parsed_and_run(argv: list[str] | None, begin: Callable[[], object]) -> int:
         args = parser.parse_args(argv)
     except SystemExit as ended:     # --help, or an option that is not allowed
         return ended.code if isinstance(ended.code, int) else EXIT_BAD_INPUT
-    begin()
-    tell_when_compiling(lambda: print(
-        f'pam {args.verb}: compiling the equations of this rig, once; up to two minutes',
-        file=sys.stderr, flush=True))
     try:
+        begin()         # from here on Ctrl-C is told below
+        tell_when_compiling(lambda: print(
+            f'pam {args.verb}: compiling the equations of this rig, once; up to two minutes',
+            file=sys.stderr, flush=True))
         with _no_numerical_warnings():
             code = args.call(args)
         sys.stdout.flush()      # a full disk shows here, not when the interpreter ends
@@ -135,7 +135,9 @@ def _parsed_and_run(argv: list[str] | None, begin: Callable[[], object]) -> int:
         return complain(
             ' '.join(str(mistake).split()), EXIT_BAD_INPUT, f'pam {args.verb}', args.json)
     except KeyboardInterrupt as stop:
-        return complain(str(stop) or 'stopped', EXIT_INTERRUPTED, f'pam {args.verb}', args.json)
+        with interrupts.undisturbed():      # a late repetition would take the sentence away
+            return complain(
+                str(stop) or 'stopped', EXIT_INTERRUPTED, f'pam {args.verb}', args.json)
     except BrokenPipeError:
         raise
     except OSError as error:  # the file system refuses where nobody looked before
