@@ -315,13 +315,13 @@ class ControllerLoop:
             inputs.pressures_pa, inputs.forces_n = (muscle.pressure_pa,), (muscle.force_n,)
             inputs.stamps_ns = (
                 position_ns, muscle.pressure_ns, muscle.force_ns, *setpoint.stamps(now_ns))
-            inputs.ages_s = tuple([
-                max(now_ns - stamp_ns, 0) * 1e-9 if stamp_ns >= 0 else 0.0
-                for stamp_ns in (measured_ns, muscle.pressure_ns)])
+            inputs.ages_s = (_age_s(now_ns, measured_ns), _age_s(now_ns, muscle.pressure_ns))
             return inputs
         inputs.stamps_ns = (position_ns,)
         inputs.pressures_pa = [muscle.pressure_pa for muscle in muscles]
         inputs.forces_n = [muscle.force_n for muscle in muscles]
+        ages_s = [_age_s(now_ns, muscle.pressure_ns) for muscle in muscles]
+        inputs.ages_s = (_age_s(now_ns, measured_ns), sum(ages_s) / len(ages_s))
         if setpoint.changed and self._commands_pa is not None:
             inputs.pressures_pa = self._commands_pa     # one law goes on from those of the other
         return inputs
@@ -408,3 +408,8 @@ class ControllerLoop:
             if one != FOLLOWS:
                 does = one if len(self.muscles) == 1 else UNKNOWN
         return does
+
+
+def _age_s(now_ns: int, stamp_ns: int) -> float:
+    """Return the age of a measurement, 0 where there is none or it is ahead."""
+    return max(now_ns - stamp_ns, 0) * 1e-9 if stamp_ns >= 0 else 0.0

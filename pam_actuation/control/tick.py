@@ -67,7 +67,7 @@ RUNNING = (OK, REFERENCE_HELD)      # reasons with which the controller runs
 
 _NS = 1_000_000_000
 HELD_BACK = 'held_back'     # not 0 while the driver does not follow the command
-# From the stamps of what a muscle's law tracks and of the pressure to the tick.
+# From the stamps of what a law tracks and of the pressure to the tick; of two pressures the mean.
 AGES = ('measurement_age_s', 'pressure_age_s')
 # Of which topics ``controller_state`` tells the stamps.
 STAMPED: tuple[str, ...] = (
@@ -113,7 +113,7 @@ class TickInputs:
     tracks. Pressures and forces are one of each muscle. ``proves`` tells which muscle of a joint
     is asked for a little pressure while all are vented. ``co_contraction_pa`` is the one asked
     for by message, absolute, NaN before the first. Other fields: see ``step`` of the controller.
-    ``ages_s``: of what the law of a muscle tracks, and of the pressure.
+    ``ages_s``: of what the law tracks, and of the pressure; of several pressures their mean.
     ``restarted``: the loop stood still, so that the motion known from before means nothing.
     """
 

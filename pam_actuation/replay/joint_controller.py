@@ -26,7 +26,7 @@ import numpy as np
 from pam_actuation.bags.load_joint import MEASURED
 from pam_actuation.control.joint_law import ADDED_NAMES, CO_CONTRACTION, JointLaw, PROVES
 from pam_actuation.control.tick import (
-    Effort, HELD_BACK, join_stamp, reference_names, TickCore, TickInputs)
+    AGES, Effort, HELD_BACK, join_stamp, reference_names, TickCore, TickInputs)
 from pam_actuation.drivers.recorded import as_recorded, nearly_in
 from pam_actuation.replay.chain import ChainReplay, same_bits
 from pam_actuation.replay.controller import check_complete
@@ -98,7 +98,9 @@ def replay_joint_controller(run: 'Run', controller: 'JointController',
 
     """
     states = run.require('controller_state')
-    columns, path = states.values, str(run.path)
+    columns, path = dict(states.values), str(run.path)
+    for name in AGES:       # from before them: all measurements counted as new
+        columns.setdefault(name, np.zeros(len(states.stamp_ns)))
     order = np.argsort(columns['tick'], kind='stable')
     check_complete(columns, order, path)
     angles = run.require(MEASURED)
@@ -151,10 +153,12 @@ def _inputs(columns: dict[str, FloatArray], row: int, angle_at: dict[int, float]
         numbers('input_reason', 'learning', 'restarted', 'elapsed_s', HELD_BACK,
                 'follows_torque', 'wanted_torque_n_m', CO_CONTRACTION))
     reference, rate, lead_reference, lead_rate = numbers(*reference_names('rad'))
+    age_s, pressure_age_s = numbers(*AGES)
     return TickInputs(
         int(reason), bool(learning), bool(restarted), (angle_ns,), angle_rad, reference, rate,
         lead_reference, lead_rate, elapsed_s,
         pressures_pa=numbers(*(f'{side}_pressure_pa' for side in SIDES)),
         forces_n=numbers(*(f'{side}_force_n' for side in SIDES)), held_back=held_back,
         proves=[bool(proof) for proof in numbers(*PROVES)],
-        effort=Effort(bool(follows), effort_ns, torque_n_m), co_contraction_pa=co_contraction_pa)
+        ages_s=(age_s, pressure_age_s), effort=Effort(bool(follows), effort_ns, torque_n_m),
+        co_contraction_pa=co_contraction_pa)

@@ -55,6 +55,8 @@ JOINT_INPUT = record(
     'extensor_pressure_pa',
     'flexor_force_n',
     'extensor_force_n',
+    'age_s',                          # of the angle: from its stamp to now
+    'pressure_age_s',                 # of the pressures, their mean
 )
 PARAMETERS = record(
     'radius_m',                       # of the flexor's pulley
@@ -112,6 +114,8 @@ def _law_inputs(par: np.record, raw: np.record, inp: np.record) -> None:
     inp.learning = raw.learning
     inp.elapsed_s = raw.elapsed_s
     inp.held_back = raw.held_back
+    inp.age_s = raw.age_s
+    inp.pressure_age_s = raw.pressure_age_s
     inp.pressure_pa = as_one(
         raw.flexor_pressure_pa, raw.extensor_pressure_pa, par.lowest_pa, par.highest_pa)
     # The weaker muscle tells whether a tendon is slack; a force that is not known tells nothing.
@@ -229,6 +233,7 @@ class JointController(WrappedLaw):
         self._parameters, self._state = cells(self._par, PARAMETERS), cells(self._st, STATE)
         self._inputs = cells(self._raw, JOINT_INPUT)
         self._error_rad = math.nan
+        self._inputs.age_s[...] = self._inputs.pressure_age_s[...] = 0.0
         # Compiled before time counts.
         _joint_inputs(self._par, self._raw, np.zeros_like(law.input_array))
         _joint_outputs(self._par, self._st, P_ATM_PA, self._raw, self._commands)
@@ -243,7 +248,8 @@ class JointController(WrappedLaw):
              ref_lead_rad: float, ref_lead_rate_rad_per_s: float, learn: bool = True,
              elapsed_s: float = math.nan, pressures_pa: Sequence[float] = (math.nan, math.nan),
              forces_n: Sequence[float] = (math.nan, math.nan),
-             held_back: float = 0.0) -> tuple[float, float]:
+             held_back: float = 0.0, ages_s: Sequence[float] = (0.0, 0.0)
+             ) -> tuple[float, float]:
         """
         Run one tick.
 
@@ -259,9 +265,11 @@ class JointController(WrappedLaw):
             Time between the measurements of this and the former tick; NaN: one period.
         pressures_pa, forces_n : pair of float
             Measured at flexor and extensor, absolute Pa and N; NaN where not known. Used for
-            the bumpless start and for freezing the learning only.
+            the bumpless start, for freezing the learning, and by a model of the muscles.
         held_back : float
             0 while both drivers follow their commands, else a code of ``following``.
+        ages_s : pair of float
+            Time since the angle was measured, and since the pressures were, their mean.
 
         Returns
         -------
@@ -278,6 +286,7 @@ class JointController(WrappedLaw):
         raw.learning[...] = 1.0 if learn and not self.law.freeze_learning else 0.0
         raw.elapsed_s[...] = elapsed_s
         raw.held_back[...] = held_back
+        raw.age_s[...], raw.pressure_age_s[...] = ages_s
         raw.flexor_pressure_pa[...], raw.extensor_pressure_pa[...] = pressures_pa
         raw.flexor_force_n[...], raw.extensor_force_n[...] = forces_n
         _joint_inputs(self._par, self._raw, self.law.input_array)
