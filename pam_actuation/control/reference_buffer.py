@@ -15,7 +15,7 @@
 """
 The wanted contraction (or force, or joint angle) now and a little ahead, from what was published.
 
-``reference`` alone is extrapolated with its rate; a ``reference_trajectory``
+``reference`` alone is extrapolated (``reference_motion``); a ``reference_trajectory``
 is interpolated (cubic through positions and rates). Rules:
 
 * A trajectory counts while its stamp is at most ``TRAJECTORY_LIFE_S`` old and its end has not
@@ -38,6 +38,7 @@ import math
 from typing import TYPE_CHECKING
 
 from pam_actuation.control.modes.tracked import CONTRACTION, FORCE, JOINT, Tracked
+from pam_actuation.control.reference_motion import ReferenceMotion, Scale
 
 if TYPE_CHECKING:
     from pam_actuation.messages import (
@@ -59,6 +60,8 @@ _FIELDS = {
     JOINT: ('angle_rad', 'rate_rad_per_s')}
 JUMP_PER_S = {CONTRACTION: 0.05, FORCE: math.inf, JOINT: 4.0}
 
+SCALES = {CONTRACTION: Scale(1e-3, 1e-3), FORCE: Scale(5.0, 2.0), JOINT: Scale(0.04, 0.05)}
+
 NONE, FRESH, HELD, LOST = range(4)      # what ``state`` can be
 
 
@@ -70,7 +73,7 @@ class ReferenceBuffer:
     ----------
     tracked : Tracked
         What the messages ask for. Those that ask for a force carry no rate of it; between
-        points of a trajectory it is that of the line through them, without a trajectory 0.
+        points of a trajectory it is that of the line through them.
     allowed : tuple of float
         Lowest and highest value; a message that asks for more is refused, not followed half way.
 
@@ -91,12 +94,15 @@ class ReferenceBuffer:
         self.refusal = ''
         self._field, self._rate_field = _FIELDS[tracked]
         self._jump_per_s = JUMP_PER_S[tracked]
+        self._motion = ReferenceMotion(SCALES[tracked])
         self.clear()
 
     def clear(self) -> None:
         """Forget everything."""
         self.reference: SetPoint | None = None
         self._accepted: SetPoint | None = None
+        self._followed: SetPoint | None = None      # the newest of the motion
+        self._motion.forget()
         self.trajectory: Trajectory | None = None
         self._times_ns: tuple[int, ...] = ()
         self._values: tuple[float, ...] = ()
@@ -204,15 +210,16 @@ class ReferenceBuffer:
         reference = self.reference
         if reference is None or self._is_whole_movement():
             return self._values[-1], 0.0
-        rate = getattr(reference, self._rate_field) if self._rate_field else 0.0
-        if not math.isfinite(rate):
-            rate = 0.0
+        if reference is not self._followed:
+            rate = getattr(reference, self._rate_field) if self._rate_field else math.nan
+            self._motion.take(reference.stamp_ns, self._value(reference), rate)
+            self._followed = reference
         age_s = (now_ns - reference.stamp_ns) * 1e-9
         ahead_s = (time_ns - now_ns) * 1e-9
         trusted_s = min(age_s, TRUST_S)
         fade = min(max((LOST_S - age_s) / (LOST_S - TRUST_S), 0.0), 1.0)
-        position = self._value(reference) + rate * (trusted_s + ahead_s * fade)
-        return position, rate * fade
+        position, rate = self._motion.at(reference.stamp_ns + round(trusted_s * 1e9))
+        return position + rate * ahead_s * fade, rate * fade
 
     def _interpolate(self, time_ns: int) -> tuple[float, float]:
         """Return position and rate of the trajectory, straight beyond its ends."""
