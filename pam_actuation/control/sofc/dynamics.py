@@ -31,7 +31,7 @@ contains the jerk.
 import math
 
 import numpy as np
-from pam_actuation.control.sofc import credit
+from pam_actuation.control.sofc import credit, reference_bend
 from pam_actuation.control.sofc.credit import Ring
 from pam_actuation.control.static_inverse import grid_of, GRID_SIZE, inverse_pressure_pa
 from pam_sim.annotations import FloatArray
@@ -165,10 +165,14 @@ def later(par: np.record, ring: Ring, st: np.record, inp: np.record, lead_m: flo
     Return the lead reference, its rate, and both derivatives of its move, for the dead time.
 
     The preview is longer than the dead time that was found. A reference that was told ahead is
-    used as much later. Another one goes on with its present rate for the dead time only.
+    used as much later. Another one goes on for the dead time only, with its present rate and as
+    it bends (``reference_bend``).
     """
+    ahead_s: float = st.lag.dead_s if par.dead_time_s > 0.0 else par.lead_s
+    bend = reference_bend.goes_on_m_per_s2(par, ring, st, inp, ahead_s)
+    bent_m, bent_rate = 0.5 * bend * ahead_s * ahead_s, bend * ahead_s
     if not par.dead_time_s > 0.0:
-        return lead_m, rate_m_per_s, move_m_per_s, move_m_per_s2
+        return lead_m + bent_m, rate_m_per_s + bent_rate, move_m_per_s, move_m_per_s2
     tick = int(st.tick)
     entry = ring[credit.row_of(ring, tick, 0)]
     entry.lead_m = lead_m
@@ -188,9 +192,9 @@ def later(par: np.record, ring: Ring, st: np.record, inp: np.record, lead_m: flo
     told_m = between(new.told_m, old.told_m, rest)
     told_rate = between(new.told_rate_m_per_s, old.told_rate_m_per_s, rest)
     straight_m = entry.told_m - early_s * inp.lead_rate_m_per_s
-    return (between(new.lead_m, old.lead_m, rest) + surprise * (straight_m - told_m),
+    return (between(new.lead_m, old.lead_m, rest) + surprise * (straight_m - told_m) + bent_m,
             between(new.lead_rate_m_per_s, old.lead_rate_m_per_s, rest)
-            + surprise * (inp.lead_rate_m_per_s - told_rate),
+            + surprise * (inp.lead_rate_m_per_s - told_rate) + bent_rate,
             between(new.lead_move_m_per_s, old.lead_move_m_per_s, rest),
             between(new.lead_move_m_per_s2, old.lead_move_m_per_s2, rest))
 

@@ -31,7 +31,7 @@ ACTIVE_RULES = (
 # What a tick was told of the reference one preview ahead: as it was given, less its jumps; then
 # what is used of it, and of that the move made of a jump.
 TOLD = ('told_m', 'told_rate_m_per_s', 'lead_m', 'lead_rate_m_per_s', 'lead_move_m_per_s',
-        'lead_move_m_per_s2')
+        'lead_move_m_per_s2', 'bend_m_per_s2')
 # One tick in the credit memory.
 ENTRY = record(
     *ACTIVE_RULES,
@@ -91,6 +91,9 @@ STATE = record(
     'told_m2_per_s2',                 # mean square of what previews told beyond the present rate
     'untold_m2_per_s2',               # the same of what came and was not told
     'announced',                      # 0 to 1, share of the first
+    'bend_m_per_s2',                  # acceleration of the reference, filtered
+    'bend_m2_per_s2',                 # mean square of what it made expect of the rate
+    'bent_m2_per_s2',                 # the same times what became of the rate
     'surprising',                     # 1 where that jump is one as if nobody had announced it
     'rules_share',                    # of feed-forward and motion rules that acts
     'rules_pa',                       # of both, in full, as pressure of the integral

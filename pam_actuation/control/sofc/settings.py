@@ -98,6 +98,9 @@ SETTINGS = (
             'pressure per rate of the reference: damping over force per pressure'),
     setting('acceleration_feedforward_pa_s2_per_m', 'Pa s2/m', 0.0, 0.0, 1e7,
             'pressure per acceleration of the reference: mass over force per pressure'),
+    setting('reference_bend_s', 's', 0.0, 0.0, 0.5,
+            'low pass on the acceleration with which a reference that nobody announced goes on; '
+            '0 = it goes on straight'),
     setting('acceleration_filter_s', 's', 0.01, 0.0, 0.5, 'low pass on that acceleration'),
     setting('jump_time_s', 's', 0.0, 0.0, 5.0,
             'a jump of the reference is made a smooth move of this duration'),
