@@ -141,8 +141,10 @@ def generate_launch_description():
     real = NotEqualsSubstitution(hardware, SIMULATED)
     awaited = {'await_subscriber': valve['await_subscriber']}
     drivers = [
-        _node('valve_driver', valve, {'rig': _text(LaunchConfiguration('joint'), '/', side)},
-              file, side=side) for side in SIDES]
+        _node('valve_driver', valve, {
+            'rig': _text(LaunchConfiguration('joint'), '/', side),
+            'controller': _text(LaunchConfiguration('controller_file'))}, file, side=side)
+        for side in SIDES]
     watchdogs = [_node('valve_watchdog', valve, side=side, condition=simulated)
                  for side in SIDES]
     sensors = [_node('hardware_sensors', awaited, file, side=side, condition=IfCondition(real))

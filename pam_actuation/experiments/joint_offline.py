@@ -55,7 +55,8 @@ class JointLoops:
     def __init__(self, joint: 'JointRig', control: 'ControllerLoop', seed: int = 0,
                  on_sent: Callable[[str, Message, int], object] | None = None) -> None:
         self.control = control
-        self.plant, drivers = PlantLoop(joint, seed), driver_loops(joint)
+        self.plant = PlantLoop(joint, seed)
+        drivers = driver_loops(joint, control.controller.driver)
         self.drivers = list(drivers.values())
         self.period_ns = round(_NS / control.rate_hz)
         self.now_ns = START_NS

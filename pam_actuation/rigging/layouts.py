@@ -171,9 +171,12 @@ def knee(namespace: str = '/knee', joint: str = 'joint_dmsp_5_300_realistic', va
         nodes.append(NodeSpec('joint_controller', namespace, {
             **of_joint, **({'accept_other_rig': True} if accept_other_rig else {}),
             'controller': controller}))
+    asking = {'controller': controller} if controller not in ('', NO_CONTROLLER) and asked_by(
+        controller) else {}
     for side in SIDES:
         below = f'{namespace}/{side}'
-        nodes += [NodeSpec('valve_driver', below, {**common, 'rig': f'{joint}/{side}'}, file),
+        nodes += [NodeSpec('valve_driver', below,
+                           {**common, **asking, 'rig': f'{joint}/{side}'}, file),
                   NodeSpec('valve_watchdog', below, common) if simulated
                   else NodeSpec('hardware_sensors', below, named, file)]
     nodes += _reference(namespace, experiment, common)

@@ -70,6 +70,7 @@ class JointLoop:
         Standard deviation and step of the measured angle.
     drivers : pair of DriverConfig, optional
         What the drivers of flexor and extensor know; by default the data sheets of the joint.
+        Numbers a controller asks for come on top.
     preview_s : float
         How far ahead the controller is told the reference; without limit by default.
 
@@ -190,7 +191,7 @@ class JointLoop:
         mode, law = controller.compiled_arguments()
         mode_rollouts.joint_rollout(
             plant, tuple(driver.hsv for driver in self._drivers),
-            tuple(driver.fresh() for driver in self._drivers), self._timing,
+            tuple(driver.fresh(controller.driver) for driver in self._drivers), self._timing,
             self._reference.rows(controller.lead_s), self._noise,
             self._quantum, self._torque,
             learning_mask(controller, learn, self.ticks, self.rate_hz), mode, law,

@@ -125,8 +125,11 @@ def predict(par: np.record, inverse: FloatArray, rules: FloatArray, ring: Ring, 
 def predicted_feedback_pa(par: np.record, st: np.record, error_m: float, change_m_per_s: float,
                           lag_s: float) -> float:
     """Return the feedback on the predicted error and its change [Pa], ahead of the valve's lag."""
+    near_m = error_m
+    if par.predicted_reach_m > 0.0:
+        near_m = min(max(error_m, -par.predicted_reach_m), par.predicted_reach_m)
     raw = st.strength * (
-        par.predicted_proportional_pa_per_m * error_m
+        par.predicted_proportional_pa_per_m * near_m
         + par.predicted_derivative_pa_s_per_m * change_m_per_s)
     step = par.period_s / (par.predicted_filter_s + par.period_s) * (raw - st.feedback_pa)
     st.feedback_pa += step

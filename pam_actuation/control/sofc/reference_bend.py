@@ -16,10 +16,10 @@
 How a reference goes on that nobody announced.
 
 A command acts one dead time later, 30 to 60 ms. A wanted motion of 1 Hz bends by 0.2 mm meanwhile.
-So the reference goes on with its present acceleration, as far as that came true of late: the rate
-of now against the one that was expected one dead time ago (least squares). A smooth motion has 0.9
-to 1. One with noise has less than 0.6 and goes on straight, as its acceleration is mostly noise.
-The corner of a ramp bends in one tick alone, and is no acceleration.
+So the reference goes on with its present acceleration, as far as that came true of late. The rate
+of now is compared with the one that was expected one dead time ago, by least squares. A smooth
+motion has 0.9 to 1. One with noise has less than 0.6 and goes on straight, as its acceleration is
+mostly noise. The corner of a ramp bends in one tick alone, and is no acceleration.
 """
 
 import numpy as np

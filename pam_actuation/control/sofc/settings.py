@@ -184,6 +184,8 @@ SETTINGS = (
     setting('predicted_proportional_pa_per_m', 'Pa/m', 0.0, 0.0, 5e7,
             'feedback on the error predicted for when the command arrives'),
     setting('predicted_derivative_pa_s_per_m', 'Pa s/m', 0.0, 0.0, 5e6, 'the same, on its change'),
+    setting('predicted_reach_m', 'm', 0.0, 0.0, 0.3,
+            'a predicted error beyond counts as this; its change counts in full; 0 = no bound'),
     setting('half_strength_m', 'm', 0.0, 0.0, 0.1,
             'mean error at which that feedback and the disturbance act half; 0 = always in full'),
     setting('strength_time_s', 's', 0.5, 0.01, 100.0, 'time over which that mean is taken'),
