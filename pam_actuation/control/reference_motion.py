@@ -28,7 +28,8 @@ wanted position is at its tick, and how fast it changes there:
   where the rates that are told have nothing to do with the motion, such as zeros.
 * One that stands still between the messages is among them and counts at first: a slider moves in
   small steps.
-* A position that jumps says nothing of the rate.
+* A position that jumps says nothing of the rate. Two jumps alike, one after the other, are a fast
+  motion.
 * An acceleration holds for ``HELD_INTERVALS`` of the time between messages. Then the rate stays.
 """
 
@@ -43,6 +44,7 @@ _MEMORY_S = 1.0             # of the messages that tell what counts
 _FORETOLD_S = 0.1           # how far ahead positions are foretold, about what a valve takes
 _BETTER = 0.8               # of its mean square error, for another filter to count
 _WRONG, _WRONG_JUMPS = 0.25, 0.05       # the same for told rates, whose error is also this large
+_ALIKE = 0.5                # part by which the steps of two such jumps differ at most
 _STRAIGHT, _BENT = (0.0, 0.5, 0.7, 0.85), (0.0, 0.5, 0.7, 0.8, 0.88, 0.93)     # what each keeps
 
 
@@ -83,6 +85,7 @@ class _Filter(_Motion):
     def __init__(self, kept: float, bends: bool, position: float) -> None:
         super().__init__(position)
         lost = 1.0 - kept
+        self._seen, self._jumped = position, 0.0        # the newest position, its step if a jump
         self._gains = (1.0 - kept * kept, lost * lost, 0.0)
         if bends:
             self._gains = (1.0 - kept ** 3, 1.5 * lost * lost * (1.0 + kept), lost ** 3)
@@ -92,10 +95,14 @@ class _Filter(_Motion):
         expected = self.position + interval_s * (
             self.rate + 0.5 * interval_s * self.acceleration)
         self.rate += interval_s * self.acceleration
-        missed = position - expected
+        missed, step = position - expected, position - self._seen
+        self._seen = position
         if abs(missed) > scale.jump:
-            self.position, self.acceleration = position, 0.0
+            if abs(step - self._jumped) <= _ALIKE * abs(step):
+                self.rate = step / interval_s
+            self.position, self.acceleration, self._jumped = position, 0.0, step
             return
+        self._jumped = 0.0
         of_position, of_rate, of_acceleration = self._gains
         self.position = expected + of_position * missed
         self.rate += of_rate * missed / interval_s

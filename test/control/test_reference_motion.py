@@ -19,7 +19,7 @@ import math
 import numpy as np
 from pam_actuation.control.config import load_controller
 from pam_actuation.control.loop import ControllerLoop
-from pam_actuation.control.modes.tracked import CONTRACTION
+from pam_actuation.control.modes.tracked import CONTRACTION, JOINT
 from pam_actuation.control.reference_buffer import ReferenceBuffer, SCALES
 from pam_actuation.control.reference_motion import LONGEST_S, ReferenceMotion
 from pam_actuation.messages import Contraction, Pressure, Reference
@@ -98,6 +98,14 @@ def test_a_jump_says_nothing_of_the_rate():
         motion.take(2000 * MS, position + 0.005, rate_of(rate))
         assert motion.at(2000 * MS)[0] == pytest.approx(position + 0.005, abs=1e-9)
         assert motion.at(2000 * MS)[1] == pytest.approx(before, abs=2e-3)
+
+
+def test_a_fast_motion_with_few_messages_is_no_row_of_jumps():
+    """An angle at 3 rad/s and 20 Hz, seen from its midst: steps of 0.15 rad, jumps are 0.04."""
+    motion = ReferenceMotion(SCALES[JOINT])
+    for k in range(10):
+        motion.take(k * 50 * MS, 0.15 * k)
+    assert motion.at(450 * MS)[1] == pytest.approx(3.0)
 
 
 def test_a_bend_nobody_foresaw_makes_no_kick():
