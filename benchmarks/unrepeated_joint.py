@@ -19,7 +19,9 @@ Run ``python benchmarks/unrepeated_joint.py``, with ``--joint knee`` or ``--valv
 of it, ``--quick`` for one motion and two joints. In closed loop with sensor noise; the errors are
 those of the joint. Rules and models are untaught. No seed of motion, noise or joints was used for
 a search. ``pid`` is a PID with the static inverse of the joint. Its gains were searched for this
-kind of motion, on the joint and three random ones about it. It is told nothing ahead.
+kind of motion, on the joint and three random ones about it. It is told nothing ahead. With
+``--hidden`` random motion and steps are those of small joints of the independent simulator under
+test/hidden, with other equations. Friction, valves and limb are off by up to 30 %.
 
 - ``random``: a sum of 40 sines of random phase from 0.02 to 1 Hz, at most 17 degrees to either
   side. It is told as it comes, or 0.3 s ahead. Root mean square error of the first 30 s and from
@@ -37,6 +39,7 @@ import argparse
 from dataclasses import dataclass
 import math
 
+from hidden_joint import HiddenJointLoop
 import numpy as np
 from pam_actuation.control.config import load_controller
 from pam_actuation.control.loop import ControllerLoop
@@ -51,6 +54,7 @@ import results_page
 
 SEEDS = range(501, 506)
 JOINTS, JOINT_SEED = 12, 700
+HIDDEN_JOINTS, HIDDEN_SEED = 5, 911
 DURATION_S, BEGIN_S = 100.0, 5.0
 STEPS, STEP_HOLD_S, STEPS_FROM_S, STEP_RAD = 4, 5.0, 66.0, 0.3
 SETTLED_RAD = math.radians(0.5)
@@ -135,16 +139,23 @@ def run(name, joint, nominal, experiment, seed, preview_s=0.0):
         return _pid_run(joint, nominal, experiment, seed)
     drivers = [driver_config(rig) for rig in (nominal.flexor, nominal.extensor)]
     return JointLoop(joint, experiment, seed=seed, preview_s=preview_s, drivers=drivers).run(
-        load_controller(name, nominal))
+        loaded(name, nominal))
+
+
+def loaded(name, nominal):
+    """Return the controller of a preset, or ``pid``, for a joint."""
+    if name != PID:
+        return load_controller(name, nominal)
+    size = 'knee' if nominal.name.startswith('knee') else 'joint'
+    settings = ', '.join(f'{key}: {value}' for key, value in PIDS[size, nominal.valve].items())
+    return load_controller(
+        f'controller: pid\nmode: joint\njoint: {{co_contraction_gauge_pa: 300000}}\n'
+        f'settings: {{use_static_inverse: 1, {settings}}}\n', nominal)
 
 
 def _pid_run(joint, nominal, experiment, seed):
     """Return the run of the PID, tick by tick, as the compiled closed loop holds no PID."""
-    size = 'knee' if nominal.name.startswith('knee') else 'joint'
-    settings = ', '.join(f'{key}: {value}' for key, value in PIDS[size, nominal.valve].items())
-    text = (f'controller: pid\nmode: joint\njoint: {{co_contraction_gauge_pa: 300000}}\n'
-            f'settings: {{use_static_inverse: 1, {settings}}}\n')
-    loops = JointLoops(joint, ControllerLoop(load_controller(text, nominal), joint), seed)
+    loops = JointLoops(joint, ControllerLoop(loaded(PID, nominal), joint), seed)
     ticks = round(experiment.duration_s * loops.control.rate_hz)
     errors = np.empty(ticks)
     for k in range(ticks):
@@ -225,6 +236,30 @@ def show_joints(case, nominal, controllers, count):
               f'| {np.quantile(settled_s, 0.9):.2f} | {overshoot.max():.1f} |', flush=True)
 
 
+def show_hidden(valve, controllers, count):
+    """Print errors and steps on small joints of the independent simulator."""
+    case = CASES['joint']
+    nominal = load_joint(case.preset, valve=valve)
+    print('| controller | not announced: first 30 s | worst | from 60 s | worst '
+          '| 0.3 s ahead: first 30 s | from 60 s | step settles: median [s] '
+          '| largest overshoot [%] |')
+    print('|---|' + '---|' * 8)
+    for name in controllers:
+        def tracked(experiment, k, preview_s=0.0):
+            loop = HiddenJointLoop(
+                valve, HIDDEN_SEED + k, experiment, seed=k, preview_s=preview_s)
+            return loop.run(loaded(name, nominal))
+        told, ahead = (np.transpose([errors_deg(tracked(
+            case.random_motion(HIDDEN_SEED + k), k, preview_s)) for k in range(count)])
+            for preview_s in (0.0, 0.3))
+        settled_s, overshoot = np.transpose([
+            figure for k in range(count)
+            for figure in step_figures(tracked(case.steps_after_motion(HIDDEN_SEED + k), k))])
+        print(f'| {name} | {told[0].mean():.2f} | {told[0].max():.2f} | {told[1].mean():.2f} '
+              f'| {told[1].max():.2f} | {ahead[0].mean():.2f} | {ahead[1].mean():.2f} '
+              f'| {np.median(settled_s):.2f} | {overshoot.max():.1f} |', flush=True)
+
+
 def show_gait(case, nominal, controllers):
     """Print the error of a gait whose cadence changes."""
     experiment, (low_rad, high_rad) = case.gait(), case.gait_rad
@@ -261,6 +296,8 @@ def command_line():
     parser.add_argument('--joint', default='knee,joint', help='knee, joint, by commas')
     parser.add_argument('--valve', default='ppr,hsv', help='valves, by commas')
     parser.add_argument('--controller', default='', help='presets, by commas')
+    parser.add_argument('--hidden', action='store_true',
+                        help='on small joints of the independent simulator')
     parser.add_argument('--quick', action='store_true', help='one motion, two joints')
     results_page.add_write(parser, 'unrepeated_joint')
     return parser
@@ -270,7 +307,15 @@ def main():
     """Print the tables."""
     args = command_line().parse_args()
     seeds, count = (SEEDS[:1], 2) if args.quick else (SEEDS, JOINTS)
-    with results_page.printed(args, __file__):
+    with results_page.printed(args, __file__, 'hidden' * args.hidden):
+        if args.hidden:
+            for valve in args.valve.split(','):
+                names = args.controller.split(',') if args.controller else controllers_of(
+                    'joint', valve)
+                print(f'\n## {HIDDEN_JOINTS} hidden joints, {valve}: random motion [deg], mean, '
+                      'and steps, not announced\n')
+                show_hidden(valve, names, 2 if args.quick else HIDDEN_JOINTS)
+            return
         for kind in args.joint.split(','):
             case = CASES[kind]
             for valve in args.valve.split(','):
