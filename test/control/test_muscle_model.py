@@ -326,7 +326,7 @@ def test_numbers_of_the_model_come_back_from_a_file_and_replay_to_the_bit(tmp_pa
     again = load_controller('sofc_model_ppr', rig, rules_file=rules)
     assert np.abs(again.rules.numbers).max() > 1e3
     assert numbers_in_words(again.rules) == numbers_in_words(first.rules)
-    assert re.search(r'offset [+-]\d+\.\d\d ± \d.*after a path of 0\.095 mm',
+    assert re.search(r'offset [+-]\d+\.\d\d ± \d.*after a path of 0\.05 mm',
                      numbers_in_words(again.rules))
     simulate_experiment(experiment, rig, again, tmp_path / 'bag', seed=2)
     assert replay_controller(load_run(tmp_path / 'bag')).identical
