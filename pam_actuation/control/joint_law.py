@@ -26,7 +26,7 @@ from pam_actuation.control.following import FOLLOWS
 from pam_actuation.control.joint_torque import JointTorque
 from pam_actuation.control.modes.joint import JointController
 from pam_actuation.control.modes.tracked import JOINT
-from pam_actuation.control.tick import AGES, split_stamps, STAMPED_OF_JOINT, TickInputs
+from pam_actuation.control.tick import split_stamps, STAMPED_OF_JOINT, TickInputs
 from pam_sim.joint.parameters import SIDES
 from pam_sim.units import P_ATM_PA
 
@@ -63,7 +63,7 @@ class JointLaw:
         self.torque = JointTorque(joint, controller)
         self.places = tuple(joint.muscles)
         self._none_proves = (False,) * len(self.places)
-        self.names = (*AGES, *controller.state_names, *_EFFORT_NAMES, *JointTorque.STATE_NAMES,
+        self.names = (*controller.state_names, *_EFFORT_NAMES, *JointTorque.STATE_NAMES,
                       *ADDED_NAMES)
 
     def pause(self) -> None:
@@ -99,6 +99,6 @@ class JointLaw:
     def internals(self, inputs: TickInputs) -> tuple[float, ...]:
         """Return what both laws report of their tick, and the wanted torque."""
         effort = inputs.effort
-        return (*inputs.ages_s, *self.controller.state_values(), float(effort.follows),
+        return (*self.controller.state_values(), float(effort.follows),
                 *split_stamps([effort.stamp_ns]), effort.torque_n_m, *self.torque.state_values(),
                 inputs.co_contraction_pa, *map(float, inputs.proves or self._none_proves))

@@ -310,18 +310,17 @@ class ControllerLoop:
             inputs.elapsed_s = (measured_ns - self._used_ns) * 1e-9
         self._used_ns = measured_ns
         position_ns, inputs.position = self._position(now_ns)
+        ages_s = [_age_s(now_ns, muscle.pressure_ns) for muscle in muscles]
+        inputs.ages_s = (_age_s(now_ns, measured_ns), sum(ages_s) / len(ages_s))
         if len(muscles) == 1:
             (muscle,) = muscles
             inputs.pressures_pa, inputs.forces_n = (muscle.pressure_pa,), (muscle.force_n,)
             inputs.stamps_ns = (
                 position_ns, muscle.pressure_ns, muscle.force_ns, *setpoint.stamps(now_ns))
-            inputs.ages_s = (_age_s(now_ns, measured_ns), _age_s(now_ns, muscle.pressure_ns))
             return inputs
         inputs.stamps_ns = (position_ns,)
         inputs.pressures_pa = [muscle.pressure_pa for muscle in muscles]
         inputs.forces_n = [muscle.force_n for muscle in muscles]
-        ages_s = [_age_s(now_ns, muscle.pressure_ns) for muscle in muscles]
-        inputs.ages_s = (_age_s(now_ns, measured_ns), sum(ages_s) / len(ages_s))
         if setpoint.changed and self._commands_pa is not None:
             inputs.pressures_pa = self._commands_pa     # one law goes on from those of the other
         return inputs

@@ -182,7 +182,7 @@ class MuscleLaw:
     def __init__(self, controller: Any) -> None:
         self.controller = controller
         self.tracked = tracked_by(controller)
-        self.names = (*AGES, *controller.state_names)
+        self.names = tuple(controller.state_names)
 
     def pause(self) -> None:
         """Forget the motion: the next step starts bumplessly."""
@@ -197,8 +197,9 @@ class MuscleLaw:
             inputs.elapsed_s, pressure_pa, force_n, inputs.held_back, *inputs.ages_s)),
 
     def internals(self, inputs: TickInputs) -> tuple[float, ...]:
-        """Return the ages of its inputs, and what the controller tells of its tick."""
-        return (*inputs.ages_s, *self.controller.state_values())
+        """Return what the controller tells of its tick."""
+        values: tuple[float, ...] = self.controller.state_values()
+        return values
 
 
 class TickCore:
@@ -225,7 +226,7 @@ class TickCore:
         self._nothing = (math.nan,) * len(law.places)
         self._no_stamps_ns = (-1,) * len(law.stamped)
         self.ticks = 0
-        self.names = input_names(law.tracked) + law.names
+        self.names = (*input_names(law.tracked), *AGES, *law.names)
 
     def run(self, inputs: TickInputs) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """
@@ -260,6 +261,6 @@ class TickCore:
             inputs.position, inputs.reference, inputs.reference_rate,
             inputs.lead_reference, inputs.lead_reference_rate, inputs.elapsed_s,
             *(inputs.pressures_pa or self._nothing), *(inputs.forces_n or self._nothing),
-            inputs.held_back, *law.internals(inputs))
+            inputs.held_back, *inputs.ages_s, *law.internals(inputs))
         self.ticks += 1
         return commands_pa, values

@@ -219,16 +219,23 @@ def _same(a: float, b: float) -> bool:
     return a == b and np.signbit(a) == np.signbit(b) or (a != a and b != b)
 
 
+def columns_of(states: 'Series') -> dict[str, FloatArray]:
+    """
+    Return the columns of ``controller_state``, with those that older recordings lack.
+
+    Before ``HELD_BACK``, every command was taken to be followed. Before ``AGES``, all measurements
+    counted as new.
+    """
+    nothing = np.zeros(len(states.stamp_ns))
+    return {**dict.fromkeys((HELD_BACK, *AGES), nothing), **states.values}
+
+
 def _columns(states: 'Series', tracked: Tracked, path: str) -> dict[str, FloatArray]:
     """Return the columns of ``controller_state``, refusing foreign ones."""
     if f'reference_{tracked.unit}' not in states.values and any(
             f'reference_{one.unit}' in states.values for one in TRACKED.values()):
         raise InputError('the recorded controller and this one track different quantities', path)
-    columns = dict(states.values)
-    # Recordings from before it existed: every command was taken to be followed.
-    # Those from before the ages of the measurements: all counted as new.
-    for name in (HELD_BACK, *AGES):
-        columns.setdefault(name, np.zeros(len(states.stamp_ns)))
+    columns = columns_of(states)
     missing = [name for name in input_names(tracked) if name not in columns]
     if missing:
         raise InputError(

@@ -29,7 +29,7 @@ from pam_actuation.control.tick import (
     AGES, Effort, HELD_BACK, join_stamp, reference_names, TickCore, TickInputs)
 from pam_actuation.drivers.recorded import as_recorded, nearly_in
 from pam_actuation.replay.chain import ChainReplay, same_bits
-from pam_actuation.replay.controller import check_complete
+from pam_actuation.replay.controller import check_complete, columns_of
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.errors import InputError
 from pam_sim.joint.parameters import SIDES
@@ -98,9 +98,7 @@ def replay_joint_controller(run: 'Run', controller: 'JointController',
 
     """
     states = run.require('controller_state')
-    columns, path = dict(states.values), str(run.path)
-    for name in AGES:       # from before them: all measurements counted as new
-        columns.setdefault(name, np.zeros(len(states.stamp_ns)))
+    columns, path = columns_of(states), str(run.path)
     order = np.argsort(columns['tick'], kind='stable')
     check_complete(columns, order, path)
     angles = run.require(MEASURED)

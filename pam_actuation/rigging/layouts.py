@@ -74,9 +74,7 @@ def rig(namespace: str = '/muscle', rig: str = 'dmsp_5_300_realistic', valve: st
     kind = {'valve_type': valve}
     described = {**kind, 'rig': rig}
     name, raw = played(experiment, rig, valve, controller)
-    driver = {**described, 'accept_valve_command': True} if raw else described
-    if name and asked_by(name):
-        driver = {**driver, 'controller': name}
+    driver = {**described, **_asking(name), **({'accept_valve_command': True} if raw else {})}
     accept = {'accept_other_rig': True} if accept_other_rig else {}
     nodes = [NodeSpec('sofc_controller', namespace, {
         **described, **accept, 'controller': name})] if name else []
@@ -94,6 +92,11 @@ def rig(namespace: str = '/muscle', rig: str = 'dmsp_5_300_realistic', valve: st
     return _recorded(nodes, namespace, {
         **described, **({'seed': 0} if hardware == SIMULATED else {}),
         'output': record, 'experiment': experiment, 'controller': name}, overwrite)
+
+
+def _asking(controller: str) -> dict[str, str]:
+    """Return the parameter of a driver whose controller, '' for none, asks for its numbers."""
+    return {'controller': controller} if controller and asked_by(controller) else {}
 
 
 def _recorded(nodes: list[NodeSpec], namespace: str, parameters: Mapping[str, Any],
@@ -171,8 +174,7 @@ def knee(namespace: str = '/knee', joint: str = 'joint_dmsp_5_300_realistic', va
         nodes.append(NodeSpec('joint_controller', namespace, {
             **of_joint, **({'accept_other_rig': True} if accept_other_rig else {}),
             'controller': controller}))
-    asking = {'controller': controller} if controller not in ('', NO_CONTROLLER) and asked_by(
-        controller) else {}
+    asking = _asking('' if controller == NO_CONTROLLER else controller)
     for side in SIDES:
         below = f'{namespace}/{side}'
         nodes += [NodeSpec('valve_driver', below,
