@@ -25,7 +25,7 @@ from pathlib import Path
 import sys
 
 import numpy as np
-from pam_actuation.tuning.foreign_plant import _driver, _read
+from pam_actuation.tuning.foreign_plant import driver_function, quantised
 from pam_actuation.tuning.joint_loop import JointLoop
 from pam_actuation.tuning.loop_parts import JOINT_READINGS, WANTED
 from pam_actuation.tuning.loop_setup import learning_mask
@@ -34,7 +34,8 @@ from pam_sim.records import size_of
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / 'test' / 'hidden'))
 
-import truth_live_joint  # noqa: E402, I100
+import truth_joint  # noqa: E402, I100
+import truth_live_joint  # noqa: E402
 import truth_realistic  # noqa: E402
 
 JOINT = 'joint_dmsp_5_300_realistic'
@@ -43,7 +44,7 @@ LIMB_OFF = 0.2
 
 def hidden_joint(valve, seed):
     """Return the hidden joint of a seed at rest."""
-    mass, inertia, damping = truth_live_joint.LIMB
+    mass, inertia, damping = truth_joint.LIMB
     factor = np.random.default_rng([seed, 3]).uniform(1.0 - LIMB_OFF, 1.0 + LIMB_OFF)
     numbers = [truth_realistic.realistic_numbers(valve, 2 * seed + side) for side in range(2)]
     return truth_live_joint.LiveJoint(
@@ -70,12 +71,13 @@ class HiddenJointLoop(JointLoop):
         learns = learning_mask(controller, learn, self.ticks, self.rate_hz).tolist()
         quanta, (steps, every, latency) = self._quantum.tolist(), self._timing
         hsv = self._valve == 'hsv'
-        drives = [_driver(driver.fresh(controller.driver), hsv) for driver in self._drivers]
+        drives = [
+            driver_function(driver.fresh(controller.driver), hsv) for driver in self._drivers]
         signals = [(0.0, 0.0) if hsv else (0.0,)] * 2
         for tick in range(self.ticks):
             true = (plant.angle_rad, *plant.pressures_pa, *plant.forces_n)
             angle, flexor_pa, extensor_pa, flexor_n, extensor_n = (
-                _read(value + noise, quantum)
+                quantised(value + noise, quantum)
                 for value, noise, quantum in zip(true, noises[tick], quanta))
             reference, rate, lead, lead_rate = wanted[tick]
             commands = controller.step(

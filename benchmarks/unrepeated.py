@@ -26,7 +26,8 @@ other equations there. Its friction, valve and dead time are off by up to 30 %.
   60 s on.
 - ``rigs``: the same on random rigs a data sheet does not tell of. The driver knows the nominal
   rig.
-- ``step``: 10 mm up and down, not announced, on random rigs after 60 s of the random motion.
+- ``step``: 10 mm up and down on random rigs, after 60 s of the random motion. Nobody announces
+  the steps.
 - ``gait``: knee flexion whose cadence changes every five strides, from the third stride on.
 """
 
@@ -55,7 +56,7 @@ BARS = (0.7, 0.4, 0.5, 0.25)      # of the best baseline: first 30 s and from 60
 DURATION_S = 100.0
 BEGIN_S = 3.0                     # end of rest and ramp
 IN_TIME_S = {'ppr': 0.6, 'hsv': 0.8}
-SETTLED_M = 1e-4
+SETTLED_M, STEP_M = 1e-4, 0.01
 STEPS, STEP_HOLD_S, STEPS_FROM_S = 4, 5.0, 64.0
 CADENCES_HZ = (0.6, 0.9, 0.7, 1.1, 0.8, 1.0)
 LOW_M, HIGH_M = 0.006, 0.022
@@ -109,16 +110,20 @@ def errors_mm(result):
             1e3 * result.rmse_m(BEGIN_S + 60.0, BEGIN_S + DURATION_S)]
 
 
-def step_figures(result):
-    """Return (settling time [s], overshoot [%]) of every step of a run."""
+def step_figures(result, from_s=STEPS_FROM_S, settled=SETTLED_M, size=STEP_M):
+    """
+    Return (settling time [s], overshoot [%]) of every step of a run, up and down in turn.
+
+    ``settled`` and ``size`` are in the unit of the errors.
+    """
     figures = []
     for k in range(STEPS):
-        start_s = STEPS_FROM_S + k * STEP_HOLD_S
+        start_s = from_s + k * STEP_HOLD_S
         inside = (result.time_s >= start_s) & (result.time_s < start_s + STEP_HOLD_S)
-        error_m = result.error_m[inside] * (1 if k % 2 == 0 else -1)
-        outside = np.flatnonzero(np.abs(error_m) > SETTLED_M)
+        error = result.error[inside] * (1 if k % 2 == 0 else -1)
+        outside = np.flatnonzero(np.abs(error) > settled)
         settled_s = (result.time_s[inside] - start_s)[outside[-1]] if outside.size else 0.0
-        figures.append((settled_s, max(0.0, -1e2 * float(error_m.min()) / 0.01)))
+        figures.append((settled_s, max(0.0, -1e2 * float(error.min()) / size)))
     return figures
 
 

@@ -28,9 +28,10 @@ test/hidden, with other equations. Friction, valves and limb are off by up to 30
   60 s on.
 - ``joints``: the same, not announced, on random joints. Each muscle is drawn by itself, and so are
   mass and inertia of the limb. The drivers know the nominal joint.
-- ``step``: 17 degrees to and fro on these, not announced, after 60 s of the random motion.
-- ``gait``: knee flexion over 23 degrees whose cadence changes every five strides, from the third
-  stride on. The muscles of the knee do not move a shank through more at 1.1 strides a second.
+- ``step``: 17 degrees to and fro on these joints, after 60 s of the random motion. Nobody
+  announces the steps.
+- ``gait``: knee flexion over 23 degrees, from the third stride on. The cadence changes every five
+  strides. The muscles of the knee do not move a shank through more at 1.1 strides a second.
 - ``sine``: 20 degrees to either side at 0.5 Hz, which repeats, told ahead: the first and the last
   of 20 cycles.
 """
@@ -48,15 +49,17 @@ from pam_actuation.experiments import load_experiment
 from pam_actuation.experiments.joint_offline import JointLoops
 from pam_actuation.messages import AngleReference
 from pam_actuation.tuning.joint_loop import JointLoop
+from pam_actuation.tuning.mode_result import ModeResult
 from pam_actuation.tuning.random_rigs import random_rigs
 from pam_sim.joint import load_joint
 import results_page
+import unrepeated
+from unrepeated import CADENCES_HZ, DURATION_S, SEEDS, STEP_HOLD_S, STEPS
 
-SEEDS = range(501, 506)
 JOINTS, JOINT_SEED = 12, 700
 HIDDEN_JOINTS, HIDDEN_SEED = 5, 911
-DURATION_S, BEGIN_S = 100.0, 5.0
-STEPS, STEP_HOLD_S, STEPS_FROM_S, STEP_RAD = 4, 5.0, 66.0, 0.3
+BEGIN_S = 5.0
+STEPS_FROM_S, STEP_RAD = 66.0, 0.3
 SETTLED_RAD = math.radians(0.5)
 PID = 'pid'
 PIDS = {
@@ -72,7 +75,6 @@ PIDS = {
     ('joint', 'hsv'): {
         'lead_s': 0.155, 'proportional_pa_per_m': 9.76e+6, 'integral_pa_per_m_s': 8.46e+7,
         'derivative_pa_s_per_m': 4.73e+4, 'change_filter_s': 0.002}}
-CADENCES_HZ = (0.6, 0.9, 0.7, 1.1, 0.8, 1.0)
 
 
 @dataclass(frozen=True)
@@ -125,14 +127,6 @@ CASES = {
     'joint': Case('joint_dmsp_5_300_realistic', 0.0, 0.0, 0.3)}
 
 
-@dataclass(frozen=True)
-class Run:
-    """Times [s] and errors [rad] of a run."""
-
-    time_s: np.ndarray
-    error: np.ndarray
-
-
 def run(name, joint, nominal, experiment, seed, preview_s=0.0):
     """Return the run of a preset, or of ``pid``, with the drivers of the nominal joint."""
     if name == PID:
@@ -157,13 +151,14 @@ def _pid_run(joint, nominal, experiment, seed):
     """Return the run of the PID, tick by tick, as the compiled closed loop holds no PID."""
     loops = JointLoops(joint, ControllerLoop(loaded(PID, nominal), joint), seed)
     ticks = round(experiment.duration_s * loops.control.rate_hz)
-    errors = np.empty(ticks)
+    wanted_rad, angle_rad = np.empty(ticks), np.empty(ticks)
     for k in range(ticks):
-        wanted_rad, rate = experiment.at(k / loops.control.rate_hz)
-        errors[k] = wanted_rad - loops.plant.plant.angle_rad
-        loops.control.take('joint_reference', AngleReference(loops.now_ns, wanted_rad, rate))
+        wanted_rad[k], rate = experiment.at(k / loops.control.rate_hz)
+        angle_rad[k] = loops.plant.plant.angle_rad
+        loops.control.take(
+            'joint_reference', AngleReference(loops.now_ns, wanted_rad[k].item(), rate))
         loops.tick()
-    return Run(np.arange(ticks) / loops.control.rate_hz, errors)
+    return ModeResult('rad', np.arange(ticks) / loops.control.rate_hz, wanted_rad, angle_rad)
 
 
 def previews_s(name):
@@ -176,29 +171,15 @@ def filled(numbers, count):
     return [f'{number:.2f}' for number in numbers] + ['–'] * (count - len(numbers))
 
 
-def rmse_deg(result, from_s, to_s):
-    """Return the root mean square error [degrees] between two times."""
-    inside = (result.time_s >= from_s) & (result.time_s < to_s)
-    return float(np.degrees(np.sqrt(np.mean(result.error[inside] ** 2))))
-
-
 def errors_deg(result):
     """Return the errors [degrees] of the first 30 s and from 60 s on."""
-    return [rmse_deg(result, BEGIN_S, BEGIN_S + 30.0),
-            rmse_deg(result, BEGIN_S + 60.0, BEGIN_S + DURATION_S)]
+    return np.degrees([result.rmse(BEGIN_S, BEGIN_S + 30.0),
+                       result.rmse(BEGIN_S + 60.0, BEGIN_S + DURATION_S)]).tolist()
 
 
 def step_figures(result):
-    """Return (settling time [s], overshoot [%]) of every step of a result."""
-    figures = []
-    for k in range(STEPS):
-        start_s = STEPS_FROM_S + k * STEP_HOLD_S
-        inside = (result.time_s >= start_s) & (result.time_s < start_s + STEP_HOLD_S)
-        error_rad = result.error[inside] * (1 if k % 2 == 0 else -1)
-        outside = np.flatnonzero(np.abs(error_rad) > SETTLED_RAD)
-        settled_s = (result.time_s[inside] - start_s)[outside[-1]] if outside.size else 0.0
-        figures.append((settled_s, max(0.0, -1e2 * float(error_rad.min()) / STEP_RAD)))
-    return figures
+    """Return (settling time [s], overshoot [%]) of every step of a run."""
+    return unrepeated.step_figures(result, STEPS_FROM_S, SETTLED_RAD, STEP_RAD)
 
 
 def controllers_of(name, valve):
@@ -270,9 +251,8 @@ def show_gait(case, nominal, controllers):
     for name in controllers:
         cells = []
         for preview_s in previews_s(name):
-            error_deg = rmse_deg(run(
-                name, nominal, nominal, experiment, SEEDS[0], preview_s), start_s,
-                experiment.duration_s)
+            error_deg = math.degrees(run(
+                name, nominal, nominal, experiment, SEEDS[0], preview_s).rmse(start_s))
             cells += [error_deg, 1e2 * error_deg / math.degrees(high_rad - low_rad)]
         print(f'| {name} | ' + ' | '.join(filled(cells, 4)) + ' |', flush=True)
 

@@ -122,7 +122,7 @@ class ForeignLoop(ClosedLoop):
         learns = learning_mask(controller, learn, self.ticks, self.rate_hz).tolist()
         pressure_step, contraction_step, force_step = self._quantum.tolist()
         steps, every, latency = self._timing
-        drive = _driver(self._driver.fresh(controller.driver), self.hsv)
+        drive = driver_function(self._driver.fresh(controller.driver), self.hsv)
         signal: tuple[float, ...] = (0.0, 0.0) if self.hsv else (0.0,)
         for tick in range(self.ticks):
             before, supply_pa = signal, plant.supply_pa
@@ -130,12 +130,12 @@ class ForeignLoop(ClosedLoop):
                 supply_pa, plant.supply_pa = supplies[max(tick - 1, 0)], supplies[tick]
             true_pa, true_m, true_n = plant.pressure_pa, plant.contraction_m, plant.force_n
             pressure_noise, contraction_noise, force_noise = noises[tick]
-            measured_pa = _read(true_pa + pressure_noise, pressure_step)
-            measured_m = _read(true_m + contraction_noise, contraction_step)
+            measured_pa = quantised(true_pa + pressure_noise, pressure_step)
+            measured_m = quantised(true_m + contraction_noise, contraction_step)
             reference, rate, lead, lead_rate = wanted[tick]
             command_pa = controller.step(
                 measured_m, reference, rate, lead, lead_rate, learns[tick] > 0.0,
-                pressure_pa=measured_pa, force_n=_read(true_n + force_noise, force_step))
+                pressure_pa=measured_pa, force_n=quantised(true_n + force_noise, force_step))
             if tick % every == 0:
                 signal = drive(command_pa, measured_pa, supply_pa, measured_m)
             if latency:
@@ -154,13 +154,13 @@ def _made(plant: Callable[[], ForeignPlant], rig: 'Rig', experiment: 'Experiment
     return ForeignLoop(plant, rig, experiment, supply_pa, **more)
 
 
-def _read(value: float, step_size: float) -> float:
+def quantised(value: float, step_size: float) -> float:
     """Quantise a reading, 0 = no quantisation."""
     return round(value / step_size) * step_size if step_size > 0.0 else value
 
 
-def _driver(law: tuple[FloatArray, FloatArray, FloatArray],
-            hsv: bool) -> Callable[[float, float, float, float], tuple[float, ...]]:
+def driver_function(law: tuple[FloatArray, FloatArray, FloatArray],
+                    hsv: bool) -> Callable[[float, float, float, float], tuple[float, ...]]:
     """Return the driver law as a function of command, pressure, supply and contraction."""
     state, par, out = law
     if hsv:

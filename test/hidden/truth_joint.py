@@ -27,7 +27,9 @@ import truth_sensors as sensors
 
 SIDES = ('flexor', 'extensor')
 RADIUS, AT_ZERO = 0.012, 0.015
-LIMB_MASS, CENTRE, INERTIA, DAMPING, STOP = 0.30, 0.10, 0.004, 0.005, 1.0
+CENTRE, STOP = 0.10, 1.0
+LIMB = (0.30, 0.004, 0.005)      # mass [kg], moment of inertia [kg m^2], damping [N m s]
+WAYS = (1.0, -1.0)
 # Of the controller: Pa per rad, Pa per rad and Pa per rad s.
 AHEAD, PROPORTIONAL, INTEGRAL = 150e3, 15e3, 60e3
 CONTROL_STEPS, DUTY_STEPS = 50, 100
@@ -99,7 +101,6 @@ def simulate(numbers, valve, wanted, stiffening, end_s):
     for j in range(2):
         start_muscle(y[j], anchors[j], AT_ZERO, valve, numbers[j])
     angle, speed, summed = 0.0, 0.0, 0.0
-    ways = (1.0, -1.0)
     for k in range(steps + 1):
         t = k * rig.STEP_S
         if k % CONTROL_STEPS == 0:
@@ -108,7 +109,7 @@ def simulate(numbers, valve, wanted, stiffening, end_s):
             summed += error * CONTROL_STEPS * rig.STEP_S
             push = AHEAD * wanted[place] + PROPORTIONAL * error + INTEGRAL * summed
             for j in range(2):
-                aims[j] = min(max(stiffening[place] + ways[j] * push, 0.0), 6e5)
+                aims[j] = min(max(stiffening[place] + WAYS[j] * push, 0.0), 6e5)
         if k % every == 0:
             row = sent[k // every]
             row[0] = t
@@ -133,32 +134,41 @@ def simulate(numbers, valve, wanted, stiffening, end_s):
                         pulls[j], n)
         if k % rig.EVERY == 0:
             angles[k // rig.EVERY] = angle
-        turn = _turn(pulls, angle, speed)
-        # Midpoint: half a step, the rates there, the whole step with them.
-        half_angle, half_speed = angle + 0.5 * rig.STEP_S * speed, speed + 0.5 * rig.STEP_S * turn
-        for j in range(2):
-            middle[j] = y[j] + 0.5 * rig.STEP_S * d[j]
-            _place(middle[j], ways[j], half_angle, half_speed)
-            pulls[j] = pull_of(middle[j], inputs[j, 0], inputs[j, 1], t + 0.5 * rig.STEP_S,
-                               anchors[j], valve, numbers[j], d[j])
-        angle += rig.STEP_S * half_speed
-        speed += rig.STEP_S * _turn(pulls, half_angle, half_speed)
-        if abs(angle) > STOP:
-            angle, speed = min(max(angle, -STOP), STOP), 0.0
-        for j in range(2):
-            y[j] += rig.STEP_S * d[j]
-            _place(y[j], ways[j], angle, speed)
-            for i in range(6):
-                anchors[j, i] = min(max(anchors[j, i], y[j, rig.Y_X] - rig.SLIP_M[i]),
-                                    y[j, rig.Y_X] + rig.SLIP_M[i])
+        angle, speed = advance(
+            y, middle, d, inputs, t, anchors, valve, numbers, pulls, angle, speed, LIMB)
     return rows, angles, sent
 
 
 @rig.jit
-def _turn(pulls, angle, speed):
+def advance(y, middle, d, inputs, t, anchors, valve, numbers, pulls, angle, speed, limb):
+    """Take one step from rates that are in ``d`` and ``pulls``; return angle and speed."""
+    turn = _turn(pulls, angle, speed, limb)
+    # Midpoint: half a step, the rates there, the whole step with them.
+    half_angle, half_speed = angle + 0.5 * rig.STEP_S * speed, speed + 0.5 * rig.STEP_S * turn
+    for j in range(2):
+        middle[j] = y[j] + 0.5 * rig.STEP_S * d[j]
+        _place(middle[j], WAYS[j], half_angle, half_speed)
+        pulls[j] = pull_of(middle[j], inputs[j, 0], inputs[j, 1], t + 0.5 * rig.STEP_S,
+                           anchors[j], valve, numbers[j], d[j])
+    angle += rig.STEP_S * half_speed
+    speed += rig.STEP_S * _turn(pulls, half_angle, half_speed, limb)
+    if abs(angle) > STOP:
+        angle, speed = min(max(angle, -STOP), STOP), 0.0
+    for j in range(2):
+        y[j] += rig.STEP_S * d[j]
+        _place(y[j], WAYS[j], angle, speed)
+        for i in range(6):
+            anchors[j, i] = min(max(anchors[j, i], y[j, rig.Y_X] - rig.SLIP_M[i]),
+                                y[j, rig.Y_X] + rig.SLIP_M[i])
+    return angle, speed
+
+
+@rig.jit
+def _turn(pulls, angle, speed, limb):
     """Return the acceleration of the joint [rad/s^2]."""
-    return (RADIUS * (pulls[0] - pulls[1]) - DAMPING * speed
-            - LIMB_MASS * rig.GRAVITY * CENTRE * np.sin(angle)) / INERTIA
+    mass, inertia, damping = limb
+    return (RADIUS * (pulls[0] - pulls[1]) - damping * speed
+            - mass * rig.GRAVITY * CENTRE * np.sin(angle)) / inertia
 
 
 @rig.jit

@@ -19,25 +19,12 @@ import truth_joint
 import truth_numbers
 import truth_rig as rig
 
-# Of the limb: mass [kg], moment of inertia [kg m^2], damping [N m s].
-LIMB = (truth_joint.LIMB_MASS, truth_joint.INERTIA, truth_joint.DAMPING)
-_WAYS = (1.0, -1.0)
-
-
-@rig.jit
-def turn_of(pulls, angle, speed, limb):
-    """Return the acceleration of the joint [rad/s^2]."""
-    mass, inertia, damping = limb
-    return (truth_joint.RADIUS * (pulls[0] - pulls[1]) - damping * speed
-            - mass * rig.GRAVITY * truth_joint.CENTRE * np.sin(angle)) / inertia
-
 
 @rig.jit
 def hold(numbers, valve, y, work, anchors, plays, raw, motion, limb, pulls, start, steps):
     """Advance held inputs of both muscles by steps of the rig; angle and speed are ``motion``."""
     middle, d = work[0], work[1]
     angle, speed = motion[0], motion[1]
-    half = 0.5 * rig.STEP_S
     inputs = np.zeros((2, 2))
     for k in range(steps):
         t = (start + k) * rig.STEP_S
@@ -46,25 +33,8 @@ def hold(numbers, valve, y, work, anchors, plays, raw, motion, limb, pulls, star
                 raw[j, 0], raw[j, 1], t, plays[j], valve, numbers[j])
             pulls[j] = truth_joint.pull_of(
                 y[j], inputs[j, 0], inputs[j, 1], t, anchors[j], valve, numbers[j], d[j])
-        turn = turn_of(pulls, angle, speed, limb)
-        # Midpoint: half a step, the rates there, the whole step with them.
-        half_angle, half_speed = angle + half * speed, speed + half * turn
-        for j in range(2):
-            middle[j] = y[j] + half * d[j]
-            truth_joint._place(middle[j], _WAYS[j], half_angle, half_speed)
-            pulls[j] = truth_joint.pull_of(
-                middle[j], inputs[j, 0], inputs[j, 1], t + half, anchors[j], valve, numbers[j],
-                d[j])
-        angle += rig.STEP_S * half_speed
-        speed += rig.STEP_S * turn_of(pulls, half_angle, half_speed, limb)
-        if abs(angle) > truth_joint.STOP:
-            angle, speed = min(max(angle, -truth_joint.STOP), truth_joint.STOP), 0.0
-        for j in range(2):
-            y[j] += rig.STEP_S * d[j]
-            truth_joint._place(y[j], _WAYS[j], angle, speed)
-            for i in range(6):
-                anchors[j, i] = min(max(anchors[j, i], y[j, rig.Y_X] - rig.SLIP_M[i]),
-                                    y[j, rig.Y_X] + rig.SLIP_M[i])
+        angle, speed = truth_joint.advance(
+            y, middle, d, inputs, t, anchors, valve, numbers, pulls, angle, speed, limb)
     motion[0], motion[1] = angle, speed
 
 
@@ -78,7 +48,7 @@ class LiveJoint:
         Numbers of flexor and extensor that are not neutral.
     valve : {'ppr', 'hsv'}
     limb : tuple
-        As ``LIMB``.
+        As ``truth_joint.LIMB``.
 
     Attributes
     ----------
@@ -89,7 +59,7 @@ class LiveJoint:
 
     dt_s = 1e-3
 
-    def __init__(self, numbers, valve='ppr', limb=LIMB):
+    def __init__(self, numbers, valve='ppr', limb=truth_joint.LIMB):
         self._n = np.array([truth_numbers.numbers(**one) for one in numbers])
         self._valve, self._limb = rig.PPR if valve == 'ppr' else rig.HSV, limb
         self._y, self._work = np.zeros((2, rig.SIZE)), np.zeros((2, 2, rig.SIZE))
