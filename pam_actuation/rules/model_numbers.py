@@ -17,8 +17,9 @@
 import math
 from typing import TYPE_CHECKING
 
-from pam_actuation.control.sofc.muscle_model import SCALES
-from pam_actuation.control.sofc.rule_table import path_widths_m
+from pam_actuation.control.sofc.muscle_model import (
+    ACCELERATION, CREEP, number_of, RATE, SCALES)
+from pam_actuation.control.sofc.path_memory import path_widths_m
 
 if TYPE_CHECKING:
     from pam_actuation.control.sofc.rule_table import RuleBase
@@ -41,19 +42,20 @@ def numbers_in_words(rules: 'RuleBase') -> str:
     """
     if not rules.covariance.any():
         return ''
-    scaling = rules.scaling
-    sets = rules.path.shape[0]
-    widths_m = path_widths_m(sets, scaling.get('path_shortest_m', 1.0),
-                             scaling.get('path_longest_m', 1.0))
+    # A model may have numbers and no rules of the path.
+    scaling = {'path_sets': 0, 'path_shortest_m': 1.0, 'path_longest_m': 1.0, **rules.scaling}
+    first_fading = scaling['path_sets'] - scaling.get('path_fading_sets', 0)
     span_m, rate_m_per_s, acceleration_m_per_s2 = SCALES
-    names = ['offset', f'per {span_m * 1e3:g} mm of contraction',
-             *(f'after a path of {width_m * 1e3:.2g} mm' for width_m in widths_m)]
-    last = len(rules.numbers) - 1
-    places = [*range(len(names)), last - 2, last - 1]
-    names += [f'per {rate_m_per_s * 1e3:g} mm/s', f'per {acceleration_m_per_s2:g} m/s^2']
-    if rules.covariance[last, last] > 0.0 and rules.numbers[last] != 0.0:
-        places, names = [*places, last], [*names, f'creep after {span_m * 1e3:g} mm']
+    names = {0: 'offset', 1: f'per {span_m * 1e3:g} mm of contraction'}
+    for q, width_m in enumerate(path_widths_m(scaling)[1:], 1):
+        way = f'{width_m * 1e3:.2g} mm'
+        names[number_of(q)] = (
+            f'after a path of {way}' if q < first_fading else f'after a path, fading over {way}')
+    names |= {RATE: f'per {rate_m_per_s * 1e3:g} mm/s',
+              ACCELERATION: f'per {acceleration_m_per_s2:g} m/s^2'}
+    if rules.covariance[CREEP, CREEP] > 0.0 and rules.numbers[CREEP] != 0.0:
+        names[CREEP] = f'creep after {span_m * 1e3:g} mm'
     said = [f'{name} {1e-3 * rules.numbers[k]:+.2f} ± '
             f'{1e-3 * math.sqrt(max(rules.covariance[k, k], 0.0)):.2f}'
-            for name, k in zip(names, places)]
+            for k, name in names.items()]
     return f'The model of the muscle adds, in kPa: {", ".join(said)}.'

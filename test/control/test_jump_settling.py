@@ -16,7 +16,7 @@
 
 import numpy as np
 from pam_actuation.control.config import load_controller
-from pam_actuation.control.sofc import muscle_model
+from pam_actuation.control.sofc import path_memory
 from pam_actuation.control.sofc.controller import SelfOrganizingFuzzyController
 from pam_actuation.control.sofc.muscle_model import MODEL
 from pam_actuation.control.sofc.records import OUTPUT, STATE
@@ -140,10 +140,10 @@ def test_the_path_of_a_reference_at_rest_goes_over_to_that_of_the_muscle(inverse
                   'path_settling_s': 0.05}, rig_name='a/ppr')
     par, st = fields(controller.parameters, PARAMETERS), fields(zeros(MODEL), MODEL)
     st.lead_path[:3], st.predicted_path[:3] = (1.0, 1.0, 1.0), (1.0, 1.0, 0.5)
-    muscle_model.settle(par, st, -1e-4, 1e-3)
+    path_memory.settle(par, st, -1e-4, 1e-3)
     assert np.array_equal(st.lead_path[:3], (1.0, 1.0, 1.0))      # it moves
     for _ in range(400):
-        muscle_model.settle(par, st, -1e-4, 0.0)
+        path_memory.settle(par, st, -1e-4, 0.0)
     assert st.lead_path[:3] == pytest.approx(
         [1.0, 1.0 - 1e-4 / par.path_width_m[1], 0.5 - 1e-4 / par.path_width_m[2]], abs=1e-3)
 

@@ -28,6 +28,7 @@ from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.units import P_ATM_PA
 import pytest
+import yaml
 
 sys.path.append(str(Path(__file__).resolve().parent.parent / 'hidden'))
 
@@ -40,6 +41,16 @@ segments:
   - ramp: {to_m: 0.012, duration_s: 1.0}
   - sine: {center_m: 0.012, amplitude_m: 0.004, frequency_hz: 0.5, cycles: 4}
 """)
+
+RANDOM_MOTION = load_experiment("""
+name: random
+segments:
+  - rest: {duration_s: 1.0}
+  - ramp: {to_m: 0.014, duration_s: 2.0}
+  - multisine: {center_m: 0.014, amplitude_m: 0.008, min_hz: 0.02, max_hz: 1.0, lines: 40,
+                duration_s: 40.0, seed: 77}
+""")
+CONTROLLERS = Path(__file__).resolve().parents[2] / 'config' / 'controllers'
 
 
 def pulled_n(time_s):
@@ -87,6 +98,23 @@ def test_hidden_rigs_are_off_by_up_to_30_per_cent_and_repeat(rig):
     for number in ('loop_400', 'delay', name):
         off = np.array([numbers[number] / middle[number] for numbers in drawn])
         assert 0.7 <= off.min() < 0.8 and 1.2 < off.max() <= 1.3
+
+
+def error_mm(text, **settings):
+    """Return the error [mm] from 25 s on of a preset with other settings."""
+    tree = yaml.safe_load(text)
+    tree['settings'].update(settings)
+    named = load_rig('dmsp_5_300_realistic', valve='ppr')
+    controller = load_controller(yaml.safe_dump(tree), named)
+    loop = ForeignLoop(truth_realistic.HiddenPlant('ppr', 5), named, RANDOM_MOTION, seed=3)
+    return 1e3 * loop.run(controller).rmse_m(25.0)
+
+
+def test_the_friction_of_dahl_is_followed_better_with_sets_that_fade():
+    assert 'dahl_travel' in truth_realistic.realistic_numbers('ppr', 5)
+    text = (CONTROLLERS / 'sofc_model_ppr.yaml').read_text(encoding='utf-8')
+    without = error_mm(text, path_sets=5, path_fading_sets=0)
+    assert error_mm(text) < 0.75 * without < 0.15
 
 
 class Broken:

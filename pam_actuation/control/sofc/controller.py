@@ -30,7 +30,7 @@ from pam_actuation.control.sofc.rule_table import (
     infer_feedback, infer_feedforward, infer_motion, linear_feedback_table, RuleBase)
 from pam_actuation.control.sofc.rule_text import NUMBERS
 from pam_actuation.control.sofc.settings import (
-    OF_MODEL, parameter_array, PARAMETERS, PATH_SCALING, SCALING, SETTINGS)
+    FADING_SCALING, OF_MODEL, parameter_array, PARAMETERS, PATH_SCALING, SCALING, SETTINGS)
 from pam_actuation.control.sofc.step import sofc_step
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
@@ -75,7 +75,7 @@ class SelfOrganizingFuzzyController(CompiledController):
             self.state_names = self.state_names[:-len(MODEL_OUTPUTS)]
             self._told = self._outputs[:len(self.state_names)]
         for name in ('reference_knots', 'motion_position_knots', 'motion_rate_knots',
-                     'path_sets'):
+                     'path_sets', 'path_fading_sets'):
             self.settings[name] = float(round(self.settings[name]))
         if self.settings['reference_upper_m'] <= self.settings['reference_lower_m']:
             raise InputError(
@@ -89,8 +89,14 @@ class SelfOrganizingFuzzyController(CompiledController):
         scaling: dict[str, Any] = {name: self.settings[name] for name in SCALING}
         scaling['rig'] = rig_name
         sets = int(self.settings['path_sets'])
-        if sets:
-            scaling |= {name: self.settings[name] for name in PATH_SCALING}
+        fading = int(self.settings['path_fading_sets'])
+        if fading and fading > sets - 1:
+            raise InputError(
+                f'path_fading_sets is {fading} of {sets} path_sets; allowed are at most '
+                f'{max(sets - 1, 0)}, as the first is that of any path',
+                where('path_fading_sets') if where else 'path_fading_sets')
+        scaling |= {name: self.settings[name]
+                    for name in PATH_SCALING * bool(sets) + FADING_SCALING * bool(fading)}
         self.rules = RuleBase(
             linear_feedback_table(), np.zeros((2, int(self.settings['reference_knots']))),
             scaling, np.zeros((int(self.settings['motion_position_knots']),

@@ -29,6 +29,7 @@ element of Maxwell: a spring that gives way with ``creep_time_s``. *Path rules* 
 function of contraction and of the path before. This is direct inverse learning (Jordan and
 Rumelhart 1992). The degrees of the path are those of play operators of several widths, so the
 rules are the inverse of a Prandtl-Ishlinskii operator whose weights depend on the contraction.
+Some sets may fade instead, as the friction of Dahl does (``path_memory``).
 What is not explained yet is the *disturbance* (observer of Ohnishi). All are added to the
 feed-forward.
 """
@@ -39,6 +40,7 @@ import numpy as np
 from pam_actuation.control.sofc import motion_estimate
 from pam_actuation.control.sofc.dynamics import load_shape
 from pam_actuation.control.sofc.membership import locate
+from pam_actuation.control.sofc.path_memory import go
 from pam_actuation.control.sofc.rule_table import infer_path
 from pam_actuation.control.sofc.rule_text import MOST_SETS, NUMBERS
 from pam_actuation.control.static_inverse import inverse_pressure_pa
@@ -52,9 +54,11 @@ _MOVES_M_PER_S = 2e-3     # from this rate on a residual counts in full: at rest
 _FRICTION_AT_PA = 4e5     # gauge: what the numbers of the path are at
 _FADE = 0.99              # per tick, of a disturbance that is not observed any more
 
-# Numbers of the model that hold everywhere: offset, slope, the sets of the path beyond that of
-# any path, damping, inertia, creep. A file from before the creep lacks the last.
-_RATE, _ACCELERATION, _CREEP = 1 + MOST_SETS, 2 + MOST_SETS, 3 + MOST_SETS
+# Numbers of the model that hold everywhere: offset, slope, the first sets of the path beyond that
+# of any path, damping, inertia, creep, the further sets. Files from before the creep or the
+# further sets lack what comes last.
+_FIRST_SETS = 6
+RATE, ACCELERATION, CREEP = 1 + _FIRST_SETS, 2 + _FIRST_SETS, 3 + _FIRST_SETS
 # What a number of the model is per: contraction, also of the creep, rate, acceleration.
 SCALES = _SPAN_M, _RATE_M_PER_S, _ACCELERATION_M_PER_S2 = 0.01, 0.05, 0.5
 _UNKNOWN_PA = 2e4         # standard deviation of each before the first measurement
@@ -90,28 +94,9 @@ MODEL = record(
 
 
 @compiled
-def go(par: np.record, path: FloatArray, way_m: float) -> None:
-    """Advance the degrees of a path; that of any path is 1, the others are -1 to 1."""
-    path[0] = 1.0
-    for q in range(1, int(par.path_sets)):
-        degree = path[q] + way_m / par.path_width_m[q]
-        path[q] = min(max(degree, -1.0), 1.0)
-
-
-@compiled
-def settle(par: np.record, st: np.record, to_go_m: float, lead_rate_m_per_s: float) -> None:
-    """
-    Let the path of a reference at rest go over to the one on which the muscle will reach it.
-
-    The muscle seldom arrives as the reference did: it went too far, or swings. The way that
-    is left, from where it is predicted to be, is what decides on the pressure.
-    """
-    if not par.path_settling_s > 0.0 or lead_rate_m_per_s != 0.0:
-        return
-    part = par.period_s / (par.path_settling_s + par.period_s)
-    for q in range(1, int(par.path_sets)):
-        degree = st.predicted_path[q] + to_go_m / par.path_width_m[q]
-        st.lead_path[q] = _low_pass(st.lead_path[q], min(max(degree, -1.0), 1.0), part)
+def number_of(q: int) -> int:
+    """Return the place of the number of set ``q`` of the path, 1 to ``MOST_SETS`` - 1."""
+    return q + 1 if q < _FIRST_SETS else q + 4
 
 
 @compiled
@@ -175,8 +160,8 @@ def numbers_pa(par: np.record, st: np.record, path: FloatArray, contraction_m: f
     total: float = st.number_pa[0] + st.number_pa[1] * (contraction_m - middle) / _SPAN_M
     shape = friction_shape(par, contraction_m, static_pa)
     for q in range(1, int(par.path_sets)):
-        total += shape * st.number_pa[1 + q] * path[q]
-    return total + st.number_pa[_CREEP] * _crept(par, st, contraction_m)
+        total += shape * st.number_pa[number_of(q)] * path[q]
+    return total + st.number_pa[CREEP] * _crept(par, st, contraction_m)
 
 
 @compiled
@@ -190,7 +175,7 @@ def _saturation(par: np.record, rate_m_per_s: float) -> float:
 @compiled
 def damping_pa_s_per_m(par: np.record, st: np.record, rate_m_per_s: float) -> float:
     """Return the pressure per rate: the setting and what the model found."""
-    number: float = st.number_pa[_RATE] * _saturation(par, rate_m_per_s)
+    number: float = st.number_pa[RATE] * _saturation(par, rate_m_per_s)
     found: float = par.rate_feedforward_pa_s_per_m + number / _RATE_M_PER_S
     return max(found, 0.0)
 
@@ -199,7 +184,7 @@ def damping_pa_s_per_m(par: np.record, st: np.record, rate_m_per_s: float) -> fl
 def inertia_pa_s2_per_m(par: np.record, st: np.record, contraction_m: float) -> float:
     """Return the pressure per acceleration: the setting and what the model found."""
     setting: float = par.acceleration_feedforward_pa_s2_per_m
-    found = setting + st.number_pa[_ACCELERATION] / _ACCELERATION_M_PER_S2
+    found = setting + st.number_pa[ACCELERATION] / _ACCELERATION_M_PER_S2
     middle: float = min(max(found, setting / par.inertia_range), par.inertia_range * setting)
     return middle * (1.0 + par.inertia_growth * (load_shape(par, contraction_m) - 1.0))
 
@@ -214,6 +199,17 @@ def unbalanced_pa(par: np.record, inverse: FloatArray, rules: FloatArray, st: np
         pressure_pa - static_pa - damping_pa_s_per_m(par, st, rate_m_per_s) * rate_m_per_s
         - numbers_pa(par, st, path, contraction_m, static_pa)
         - rules_pa(par, rules, path, contraction_m) - st.disturbance_pa)
+
+
+@compiled
+def _unknown_pa2(par: np.record, i: int) -> float:
+    """Return the variance [Pa^2] of a number before the first measurement."""
+    unknown: float = _UNKNOWN_PA
+    if i == CREEP:
+        unknown = par.creep_pa
+    elif 2 <= i < RATE or i > CREEP:
+        unknown = par.path_pa
+    return unknown * unknown
 
 
 @compiled
@@ -233,10 +229,10 @@ def find_numbers(par: np.record, inverse: FloatArray, st: np.record, surprised: 
     now[1] = (st.contraction_m - middle) / _SPAN_M
     shape = friction_shape(par, st.contraction_m, inverse_pressure_pa(inverse, st.contraction_m))
     for q in range(1, MOST_SETS):
-        now[1 + q] = shape * st.path[q] if q < par.path_sets else 0.0
-    now[_RATE] = st.rate_m_per_s * _saturation(par, st.rate_m_per_s) / _RATE_M_PER_S
-    now[_ACCELERATION] = st.acceleration_m_per_s2 / _ACCELERATION_M_PER_S2
-    now[_CREEP] = _crept(par, st, st.contraction_m)
+        now[number_of(q)] = shape * st.path[q] if q < par.path_sets else 0.0
+    now[RATE] = st.rate_m_per_s * _saturation(par, st.rate_m_per_s) / _RATE_M_PER_S
+    now[ACCELERATION] = st.acceleration_m_per_s2 / _ACCELERATION_M_PER_S2
+    now[CREEP] = _crept(par, st, st.contraction_m)
     if par.number_filter_s > 0.0:
         part = par.period_s / (par.number_filter_s + par.period_s)
         for i in range(NUMBERS):
@@ -254,8 +250,7 @@ def find_numbers(par: np.record, inverse: FloatArray, st: np.record, surprised: 
                 cov[j * NUMBERS + i] = 0.0
     for i in range(NUMBERS):
         at = i * NUMBERS + i
-        unknown = par.creep_pa if i == _CREEP else _UNKNOWN_PA
-        first = unknown * unknown
+        first = _unknown_pa2(par, i)
         if cov[at] == 0.0:
             cov[at] = first
         elif cov[at] < first:

@@ -30,8 +30,8 @@ import numpy as np
 from pam_actuation.control.sofc.membership import SET_COUNT
 from pam_actuation.control.sofc.rule_table import RuleBase, TRACKED_SCALING, TRACKED_UNITS
 from pam_actuation.control.sofc.rule_text import (
-    ARRAYS, digest_of, MODEL_NUMBERS, NUMBERS, OPTIONAL, SCHEMA)
-from pam_actuation.control.sofc.settings import PATH_SCALING, SCALING, SETTINGS
+    ARRAYS, digest_of, MODEL_NUMBERS, NUMBERS, OLDER_NUMBERS, OPTIONAL, SCHEMA)
+from pam_actuation.control.sofc.settings import FADING_SCALING, PATH_SCALING, SCALING, SETTINGS
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.files import refuse_pipe
@@ -135,7 +135,9 @@ def _checked_scaling(scaling: dict[str, float], where: str) -> dict[str, float]:
     """Return the scaling of a file; InputError unless it says what the numbers mean."""
     if not isinstance(scaling, dict):
         raise InputError('scaling is not a mapping', where)
-    expected = ('rig', *SCALING, *PATH_SCALING * any(name in scaling for name in PATH_SCALING))
+    expected = ('rig', *SCALING, *(
+        name for group in (PATH_SCALING, FADING_SCALING)
+        if any(one in scaling for one in group) for name in group))
     missing = [name for name in expected if name not in scaling]
     if missing:
         raise InputError(f'scaling lacks {", ".join(missing)}', where)
@@ -144,10 +146,15 @@ def _checked_scaling(scaling: dict[str, float], where: str) -> dict[str, float]:
     _check_tracked({name: scaling[name] for name in TRACKED_SCALING if name in scaling}, where)
     numbers = {name: value for name, value in scaling.items()
                if name != 'rig' and name not in TRACKED_SCALING}
-    foreign = [_short(name) for name in numbers if name not in (*SCALING, *PATH_SCALING)]
+    foreign = [_short(name) for name in numbers
+               if name not in (*SCALING, *PATH_SCALING, *FADING_SCALING)]
     if foreign:
         raise InputError(f'scaling has the unknown entries {", ".join(foreign[:5])}', where)
     check_parameters(SETTINGS, numbers, 'setting', where)
+    fading, sets = scaling.get('path_fading_sets', 0), scaling.get('path_sets', 0)
+    if fading and fading >= sets:
+        raise InputError(f'path_fading_sets is {fading:g} of {sets:g} path_sets, which must be '
+                         'more', where)
     if scaling['reference_upper_m'] <= scaling['reference_lower_m']:
         raise InputError('reference_upper_m is not larger than reference_lower_m', where)
     return dict(scaling)
@@ -208,8 +215,9 @@ def _checked_numbers(mapping: dict[str, Any], where: str) -> dict[str, FloatArra
             found[name] = np.array(mapping[name], dtype=float)
         except (TypeError, ValueError):
             raise InputError(f'{name} is not a table of numbers', where) from None
-        if found[name].shape == tuple(length - 1 for length in shape):
-            found[name] = np.pad(found[name], (0, 1))     # from before the creep was a number
+        length = len(found[name]) if found[name].ndim else 0
+        if length in OLDER_NUMBERS and found[name].shape == (length,) * len(shape):
+            found[name] = np.pad(found[name], (0, NUMBERS - length))
         if found[name].shape != shape or not np.all(np.isfinite(found[name])):
             raise InputError(
                 f'{name} has shape {list(found[name].shape)} or values that are not finite; it '

@@ -25,8 +25,8 @@ import math
 import numpy as np
 from pam_actuation.control.sofc import motion_estimate, valve_lag
 from pam_actuation.control.sofc.credit import Ring
-from pam_actuation.control.sofc.muscle_model import (
-    go, inertia_pa_s2_per_m, unbalanced_pa)
+from pam_actuation.control.sofc.muscle_model import inertia_pa_s2_per_m, unbalanced_pa
+from pam_actuation.control.sofc.path_memory import go
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import compiled
 

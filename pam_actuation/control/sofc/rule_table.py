@@ -38,7 +38,9 @@ from typing import Any, TypeAlias
 import numpy as np
 from pam_actuation.control.sofc.membership import (
     SET_COUNT, SET_WORDS, signed_logarithmic_knots)
+from pam_actuation.control.sofc.path_memory import path_widths_m
 from pam_actuation.control.sofc.rule_text import NAMES, save_rules
+from pam_actuation.control.sofc.words import FADING
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import compiled
 from pam_sim.short_repr import short_repr
@@ -87,11 +89,6 @@ def infer_motion(table: FloatArray, m: int, wm: float, n: int, wn: float) -> flo
     """Return the output of the motion rules [Pa] at position knots m and rate knots n."""
     return ((1.0 - wm) * ((1.0 - wn) * table[m, n] + wn * table[m, n + 1])
             + wm * ((1.0 - wn) * table[m + 1, n] + wn * table[m + 1, n + 1]))
-
-
-def path_widths_m(sets: int, shortest_m: float, longest_m: float) -> FloatArray:
-    """Return the paths [m] that the sets beyond that of any path tell apart, evenly in ratio."""
-    return np.geomspace(shortest_m, longest_m, max(sets - 1, 0))
 
 
 @compiled
@@ -249,10 +246,12 @@ class RuleBase:
 
     def _path_antecedent(self, unit: str, per_m: float) -> Antecedent:
         """Return the sets of the path."""
-        widths = per_m * path_widths_m(
-            self.path.shape[0], self.scaling.get('path_shortest_m', 1.0),
-            self.scaling.get('path_longest_m', 1.0))
-        return Antecedent('path', unit, np.concatenate([[0.0], widths]))
+        given = {'path_shortest_m': 1.0, 'path_longest_m': 1.0, **self.scaling,
+                 'path_sets': self.path.shape[0]}
+        fading = int(given.get('path_fading_sets', 0))
+        plays = self.path.shape[0] - 1 - fading
+        words = ('any', *['play'] * plays, *[FADING] * fading) if fading else ()
+        return Antecedent('path', unit, per_m * path_widths_m(given), words)
 
     def arrays(self, suffix: str = '') -> Tables:
         """Return the arrays of all tables: values, or with '_initial', '_fired' those."""

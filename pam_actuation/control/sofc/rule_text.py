@@ -34,8 +34,9 @@ NAMES = ('feedback', 'feedforward', 'motion', 'path')
 OPTIONAL = ('path',)      # tables that may be empty; files then lack them
 SUFFIXES = ('', '_initial', '_fired')
 ARRAYS = tuple(name + suffix for suffix in SUFFIXES for name in NAMES)
-MOST_SETS = 6             # of the path, that of any path included
+MOST_SETS = 9             # of the path, that of any path included
 NUMBERS = 4 + MOST_SETS   # of a model of the muscle: those of every place and motion
+OLDER_NUMBERS = 9, 10     # of files from before the creep, and before the further sets
 MODEL_NUMBERS = ('numbers', 'covariance')     # and how well they are known
 
 

@@ -23,7 +23,7 @@ from collections.abc import Mapping
 
 import numpy as np
 from pam_actuation.control.settings import parameter_record, setting
-from pam_actuation.control.sofc.rule_table import path_widths_m
+from pam_actuation.control.sofc.path_memory import path_widths_m
 from pam_actuation.control.sofc.rule_text import MOST_SETS
 from pam_sim.annotations import FloatArray
 from pam_sim.records import values_of
@@ -148,6 +148,13 @@ SETTINGS = (
             'path rules: sets of the path, the first for any path; 0 = none'),
     setting('path_shortest_m', 'm', 1.4e-4, 1e-6, 0.1, 'shortest path they tell apart'),
     setting('path_longest_m', 'm', 2.5e-3, 1e-6, 0.1, 'longest path they tell apart'),
+    setting('path_fading_sets', '-', 0.0, 0.0, float(MOST_SETS - 2),
+            'of the sets of the path, the last so many fade with the way gone'),
+    setting('path_fading_shortest_m', 'm', 2e-4, 1e-6, 0.1, 'shortest way over which one fades'),
+    setting('path_fading_longest_m', 'm', 2e-3, 1e-6, 0.1, 'longest way over which one fades'),
+    setting('path_pa', 'Pa', 2e4, 0.0, 1e6,
+            'how large the friction number of a set is expected to be: its standard deviation '
+            'before anything is measured'),
     setting('path_learning', '-', 0.02, 0.0, 1.0,
             'share of the residual the path rules mend per tick of a motion'),
     setting('path_learning_floor', '-', 0.0, 0.0, 1.0, 'least part of that left'),
@@ -222,6 +229,8 @@ SCALING = (
     'motion_rate_fine_m_per_s')
 # The same, where there are path rules.
 PATH_SCALING = ('path_sets', 'path_shortest_m', 'path_longest_m')
+# The same, where some of them fade.
+FADING_SCALING = ('path_fading_sets', 'path_fading_shortest_m', 'path_fading_longest_m')
 
 
 def parameter_array(values: Mapping[str, float]) -> FloatArray:
@@ -229,9 +238,8 @@ def parameter_array(values: Mapping[str, float]) -> FloatArray:
     period_s = 1.0 / values['rate_hz']
     delay = round(values['credit_delay_s'] / period_s)
     widths_m = np.zeros(MOST_SETS)
-    sets = min(int(values['path_sets']), MOST_SETS)
-    widths_m[1:max(sets, 1)] = path_widths_m(
-        sets, values['path_shortest_m'], values['path_longest_m'])
+    given_m = path_widths_m(values)[:MOST_SETS]
+    widths_m[:given_m.size] = given_m
     return values_of(PARAMETERS, {
         **values, 'path_width_m': widths_m,
         'has_model': float(any(values[name] for name in OF_MODEL)),

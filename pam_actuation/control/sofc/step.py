@@ -28,7 +28,7 @@ from pam_actuation.control.inputs import INPUT
 from pam_actuation.control.law_parts import (
     faded_offset, filtered_change, first_command_pa, held_offset, integral_growth, limited)
 from pam_actuation.control.sofc import (
-    credit, dynamics, guard, learning, muscle_model, predictor, valve_lag)
+    credit, dynamics, guard, learning, muscle_model, path_memory, predictor, valve_lag)
 from pam_actuation.control.sofc.credit import Ring
 from pam_actuation.control.sofc.membership import (
     gaussian_degree, locate, locate_signed_logarithmic, SET_COUNT)
@@ -283,7 +283,7 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
             muscle_model.forget(par, model)
         muscle_model.observe(par, inverse, path_rules, model, inp.contraction_m,
                              elapsed_s, measured)
-        muscle_model.go(par, model.lead_path, way)
+        path_memory.go(par, model.lead_path, way)
         path = (muscle_model.rules_pa(par, path_rules, model.lead_path, lead)
                 + muscle_model.numbers_pa(par, model, model.lead_path, lead, base))
         damping = muscle_model.damping_pa_s_per_m(par, model, lead_rate)
@@ -300,7 +300,7 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
             elapsed_s, inp.age_s, pressure, st.lag)
         predicted = predictor.predicted_feedback_pa(
             par, model, lead - ahead_m, lead_rate - ahead_rate, st.lag.lag_s)
-        muscle_model.settle(par, model, lead - ahead_m, lead_rate)
+        path_memory.settle(par, model, lead - ahead_m, lead_rate)
     feedback = par.feedback_gain_pa * infer_feedback(feedback_rules, share, i, wi, j, wj)
     whole_feedforward = infer_feedforward(feedforward_rules, share, k, wk)
     whole_motion = infer_motion(motion_rules, m, wm, n, wn)

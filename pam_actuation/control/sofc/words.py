@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 NOTHING_KPA, LITTLE_KPA, MUCH_KPA = 0.05, 2.0, 10.0
 _ACTS_PA = 1.0            # a rule whose output is smaller does nothing
-DIRECTION, PATH = 'direction', 'path'
+DIRECTION, PATH, FADING = 'direction', 'path', 'fading'
 # SI unit -> factor and unit for people.
 SHOWN = {'Pa': (1e-3, 'kPa'), 'm': (1e3, 'mm'), 'm/s': (1e3, 'mm/s'),
          'rad': (180.0 / math.pi, 'deg'), 'rad/s': (180.0 / math.pi, 'deg/s')}
@@ -134,7 +134,10 @@ def _path(antecedent: 'Antecedent', index: int) -> str:
         return 'after any path'
     value, unit = shown(float(antecedent.knots[index]), antecedent.unit)
     up, down = WAYS.get(f'{antecedent.unit}/s', ('rising', 'falling'))
-    return f'after {up} by {number(value)} {unit} (after {down} the opposite)'
+    way = f'{number(value)} {unit}'
+    if antecedent.words and antecedent.words[index] == FADING:
+        return f'after {up}, fading over {way} (after {down} the opposite)'
+    return f'after {up} by {way} (after {down} the opposite)'
 
 
 def _action(size_kpa: float) -> str:
