@@ -261,7 +261,7 @@ def show_random_rigs(valve, controllers, hidden, count, frequency_hz=0.5):
             ends = []
             for learn in (True, False):
                 controller = one.build(nominal)
-                controller.rules.assign(teacher.rules)
+                controller.take_rules(teacher.rules)
                 result = loop.run(controller, learn)
                 ends.append(rms_mm(cycles_m(result)[-1]))
             figures.append((*ends, 1e-3 * (result.pressure_pa.max() - 101_325.0)))

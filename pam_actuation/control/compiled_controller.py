@@ -145,6 +145,18 @@ class CompiledController:
         """Return in words whether the last tick learned, or why not."""
         raise NotImplementedError
 
+    def take_rules(self, rules: 'RuleBase', where: str = 'rules') -> None:
+        """
+        Begin with the rules of a file.
+
+        Raises
+        ------
+        InputError
+            This law has none, or these do not fit.
+
+        """
+        raise InputError(f'a {self.kind} controller has no rules', where)
+
     def replace_rules(self, rules: 'RuleBase', where: str = 'rules') -> None:
         """
         Exchange the rules without a step in the command.

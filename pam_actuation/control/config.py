@@ -152,7 +152,7 @@ def load_controller(name_or_path_or_text: str | os.PathLike[str],
     if rules_file is not None:
         if controller.rules is None:
             raise InputError(f'a {controller.kind} controller has no rules', str(rules_file))
-        controller.rules.assign(load_rules(rules_file, controller.rules))
+        controller.take_rules(load_rules(rules_file, controller.rules))
     return controller
 
 
@@ -222,7 +222,7 @@ def _give_rules(controller: SelfOrganizingFuzzyController, tree: Located, folder
         raise tree.error('give either `rules` or `initial_rules`, not both', 'rules')
     if 'rules' in tree:
         path = os.path.join(folder, os.path.expanduser(tree.require('rules', str)))
-        controller.rules.assign(load_rules(path, controller.rules))
+        controller.take_rules(load_rules(path, controller.rules))
     elif 'initial_rules' in tree:
         mapping = tree.require('initial_rules', dict).plain()
         controller.rules.assign(

@@ -338,6 +338,31 @@ def test_numbers_of_the_model_come_back_from_a_file_and_replay_to_the_bit(tmp_pa
     assert not first.rules.numbers.any() and not first.rules.covariance.any()
 
 
+def test_numbers_of_a_file_are_doubted_and_found_anew_on_another_rig(tmp_path):
+    rig = load_rig('dmsp_5_300_realistic')
+    sine = load_experiment("""
+name: sine
+segments:
+  - ramp: {to_m: 0.012, duration_s: 2.0}
+  - sine: {center_m: 0.012, amplitude_m: 0.006, frequency_hz: 0.5, cycles: 12}
+""")
+    taught = load_controller('sofc_model_ppr', rig)
+    ClosedLoop(rig, sine, seed=4).run(taught)
+    taught.rules.save(tmp_path / 'rules.json')
+    sure = load_rules(tmp_path / 'rules.json').covariance
+    read = load_controller('sofc_model_ppr', rig, rules_file=tmp_path / 'rules.json')
+    live = load_controller('sofc_model_ppr', rig)
+    live.replace_rules(load_rules(tmp_path / 'rules.json'))
+    doubt = np.sqrt(np.diag(read.rules.covariance - sure))
+    assert np.array_equal(live.rules.covariance, read.rules.covariance)
+    assert doubt[[0, 2, muscle_model.CREEP]] == pytest.approx([1e4, 4e3, 500.0])
+    other = rig.with_(parameters={'mass_kg': 5.5})
+    exact = load_controller('sofc_model_ppr', rig)
+    exact.rules.assign(load_rules(tmp_path / 'rules.json', exact.rules))
+    error_m = [ClosedLoop(other, sine, seed=4).run(one).rmse_m(12.0) for one in (read, exact)]
+    assert error_m[0] < 0.5 * error_m[1]
+
+
 def test_a_file_without_numbers_leaves_those_and_a_wrong_one_is_refused():
     controller = load_controller('sofc_model_ppr', load_rig('dmsp_5_300_realistic'))
     old = controller.rules.copy()

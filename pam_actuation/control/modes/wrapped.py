@@ -104,6 +104,10 @@ class WrappedLaw:
     def freeze_learning(self, value: bool) -> None:
         self.law.freeze_learning = value
 
+    def take_rules(self, rules: RuleBase, where: str = 'rules') -> None:
+        """Begin with the rules of a file; as of the law."""
+        self.law.take_rules(rules, where)
+
     def replace_rules(self, rules: RuleBase, where: str = 'rules') -> None:
         """Exchange the rules without a step in the command; as of the law."""
         self.law.replace_rules(rules, where)

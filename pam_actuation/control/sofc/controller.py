@@ -146,6 +146,25 @@ class SelfOrganizingFuzzyController(CompiledController):
         model.number_pa[:] = 0.0
         model.covariance_pa2[:] = 0.0
 
+    def take_rules(self, rules: RuleBase, where: str = 'rules') -> None:
+        """
+        Begin with the rules of a file, which were learned elsewhere.
+
+        The numbers of its model are taken for less sure than they were there. A recording's
+        own rules are given to the constructor or to ``rules.assign`` instead, and stay exact.
+
+        Raises
+        ------
+        InputError
+            The rules do not fit this controller; the old ones stay.
+
+        """
+        check_fit(rules, self.rules, where)
+        self.rules.assign(rules)
+        if np.any(rules.covariance) and self.rules.covariance.size:
+            muscle_model.doubt_numbers(
+                fields(self.parameters, PARAMETERS), self.rules.covariance)
+
     def replace_rules(self, rules: RuleBase, where: str = 'rules') -> None:
         """
         Exchange the rules without a step in the command.
@@ -159,9 +178,8 @@ class SelfOrganizingFuzzyController(CompiledController):
             The rules do not fit this controller; the old ones stay.
 
         """
-        check_fit(rules, self.rules, where)
         before = self._rule_output_pa()
-        self.rules.assign(rules)
+        self.take_rules(rules, where)
         self._keep_output(before)
 
     def reset_rules(self) -> None:

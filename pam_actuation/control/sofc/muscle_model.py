@@ -61,6 +61,7 @@ _FIRST_SETS = 6
 RATE, ACCELERATION, CREEP = 1 + _FIRST_SETS, 2 + _FIRST_SETS, 3 + _FIRST_SETS
 # What a number of the model is per: contraction, also of the creep, rate, acceleration.
 SCALES = _SPAN_M, _RATE_M_PER_S, _ACCELERATION_M_PER_S2 = 0.01, 0.05, 0.5
+_FILE_DOUBT = 0.5         # standard deviation added to a number of a file, in that of the start
 _UNKNOWN_PA = 2e4         # standard deviation of each before the first measurement
 
 MODEL = record(
@@ -210,6 +211,19 @@ def _unknown_pa2(par: np.record, i: int) -> float:
     elif 2 <= i < RATE or i > CREEP:
         unknown = par.path_pa
     return unknown * unknown
+
+
+def doubt_numbers(par: np.record, covariance_pa2: FloatArray) -> None:
+    """
+    Make the numbers of a rule file less sure, in place; ``covariance_pa2`` is (N, N).
+
+    They may come from a model or from another day. A number that is taken for sure is not found
+    anew within minutes: with numbers taught on one rig, another one of the 200 of ``tracking.py``
+    had 40 times the error that it has untaught.
+    """
+    for i in range(NUMBERS):
+        if covariance_pa2[i, i] > 0.0:
+            covariance_pa2[i, i] += _FILE_DOUBT * _FILE_DOUBT * _unknown_pa2(par, i)
 
 
 @compiled
