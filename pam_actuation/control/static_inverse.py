@@ -19,6 +19,8 @@ The table is one vector, for compiled code and for an exact file. It holds a ``G
 pressure [absolute Pa] of every node.
 """
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike
 from pam_sim.annotations import FloatArray
@@ -32,6 +34,8 @@ GRID = record(
     'step_m',                         # from node to node
 )
 GRID_SIZE = size_of(GRID)
+_LEAST_NODES, _LEAST_UPPER_M = 141, 0.035
+_HIGHEST_GAUGE_PA = 1e6
 
 
 @compiled
@@ -68,19 +72,17 @@ def inverse_to_mapping(table: FloatArray) -> dict[str, object]:
             'pressure_pa': table[GRID_SIZE:].tolist()}
 
 
-def tabulate_static_inverse(
-        rig: Rig, upper_m: float = 0.035, nodes: int = 141) -> FloatArray:
+def tabulate_static_inverse(rig: Rig) -> FloatArray:
     """
     Tabulate the pressure that holds each contraction of a rig at its nominal load.
+
+    In steps of 0.25 mm from 0 to 35 mm, and further as far as the muscle comes with 1 MPa gauge,
+    the highest command a controller may have.
 
     Parameters
     ----------
     rig : pam_sim.rig.Rig
         Gives ``static_pressure_pa(contraction_m)``.
-    upper_m : float
-        Largest contraction tabulated [m]; the smallest is 0.
-    nodes : int
-        Number of equidistant nodes.
 
     Returns
     -------
@@ -89,10 +91,15 @@ def tabulate_static_inverse(
         that can be held.
 
     """
-    contraction_m = np.linspace(0.0, upper_m, nodes)
-    pressure_pa = np.array(rig.static_pressure_pa(contraction_m), dtype=float)
-    for i in range(nodes):
+    # A ratio of whole numbers: the nodes are those of the tables in older recordings.
+    step_m = _LEAST_UPPER_M / (_LEAST_NODES - 1)
+    nodes = max(_LEAST_NODES, 1 + math.floor(rig.muscle.stroke_m / step_m))
+    pressure_pa = np.array(rig.static_pressure_pa(step_m * np.arange(nodes)), dtype=float)
+    held = np.flatnonzero(pressure_pa <= P_ATM_PA + _HIGHEST_GAUGE_PA)
+    last = int(held[-1]) if held.size else 0
+    pressure_pa = pressure_pa[:max(_LEAST_NODES, last + 1)]
+    for i in range(pressure_pa.size):
         if not np.isfinite(pressure_pa[i]):
             pressure_pa[i] = pressure_pa[i - 1] if i else P_ATM_PA
     pressure_pa = np.maximum(pressure_pa, P_ATM_PA)
-    return static_inverse(0.0, upper_m / (nodes - 1), pressure_pa)
+    return static_inverse(0.0, step_m, pressure_pa)
