@@ -26,6 +26,8 @@ from pam_actuation.cli.options import (  # noqa: F401, the codes are for the ver
     EXIT_FINDING as EXIT_FINDING, HIGHEST_SEED, Parser, source)
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from pam_actuation.bags.load import RecordedRun
     from pam_actuation.experiments.experiment import Experiment
     from pam_sim.rig import Rig
@@ -193,11 +195,17 @@ def tell_remarks(args: SimpleNamespace | argparse.Namespace, experiment: 'Experi
                  rig: 'Rig | None' = None,
                  controller: Any = None) -> list[str]:
     """Return what a person should read before an experiment runs; say it on stderr."""
-    remarks = list(experiment.remarks(valve, rig, controller))
+    from pam_actuation.experiments.limits import unknown_remarks
+    remarks = [*experiment.remarks(valve, rig, controller), *unknown_remarks(rig)]
+    say_remarks(args, remarks)
+    return remarks
+
+
+def say_remarks(args: SimpleNamespace | argparse.Namespace, remarks: 'Iterable[str]') -> None:
+    """Say what a person should read on stderr, unless programs read along."""
     if not args.json:
         for text in remarks:
             print(f'remark: {text}', file=sys.stderr, flush=True)
-    return remarks
 
 
 def default_controller(args: argparse.Namespace, valve: str) -> Any:

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 
 from pam_actuation.cli.common import (
     add_controller_options, add_overwrite_option, add_seed_option, check_outputs,
-    default_controller, emit, EXIT_DONE, EXIT_FINDING, note_implausible, progress)
+    default_controller, emit, EXIT_DONE, EXIT_FINDING, note_implausible, progress, say_remarks)
 from pam_actuation.cli.options import count, number, out_path, Parser, source
 
 if TYPE_CHECKING:
@@ -91,7 +91,9 @@ def add_arguments(parser: Parser) -> None:
 def run(args: argparse.Namespace) -> int | None:
     """Tune; exit code 1 where the held-out check did not improve or the model is wrong."""
     from pam_actuation.bags.load_joint import load_recording
+    from pam_actuation.experiments.limits import unknown_remarks
     from pam_actuation.report.tuning_page import tuning_report
+    from pam_actuation.tuning.own_range import with_own_range
     from pam_actuation.tuning.random_rigs import random_rigs
     from pam_actuation.tuning.recording import check_recordings
     from pam_actuation.tuning.tune import HELD_OUT_SEED, tune
@@ -104,6 +106,8 @@ def run(args: argparse.Namespace) -> int | None:
     _check_kind(runs, rig)
     controller = _controller(args, runs, rig)
     experiments, check = _experiments(args, runs, rig)
+    controller, ranges = with_own_range(controller, rig, [*experiments, *check])
+    say_remarks(args, [*unknown_remarks(rig), *ranges])
     rigs = [rig, *random_rigs(rig, args.randomise, args.seed)]
     others = [rig, *random_rigs(rig, args.randomise, args.seed + HELD_OUT_SEED)]
     with progress(args, args.rollouts, ' rollouts', 'tuning') as bar:

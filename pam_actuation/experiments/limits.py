@@ -14,6 +14,7 @@
 
 """What a rig can do of an experiment, asked before the first message is sent."""
 
+import math
 from types import SimpleNamespace
 from typing import Any, TYPE_CHECKING
 
@@ -23,7 +24,9 @@ from pam_actuation.drivers.for_rig import driver_config
 from pam_sim.errors import InputError
 from pam_sim.joint.rig import JointRig
 from pam_sim.load import LOADS
+from pam_sim.muscle.coefficients import PREFIX as OF_LAW
 from pam_sim.units import gauge_kpa, P_ATM_PA
+from pam_sim.valve.ppr import set_point_of
 
 if TYPE_CHECKING:
     from pam_actuation.control.compiled_controller import CompiledController
@@ -89,9 +92,11 @@ def check_tracked(
 
 def highest_gauge_pa(rig: 'Rig',
                      controller: 'CompiledController | SimpleNamespace | None' = None) -> float:
-    """Return the highest pressure [Pa gauge] that driver, supply and controller allow."""
+    """Return the highest pressure [Pa gauge] that driver, valve, supply and controller allow."""
     config = driver_config(rig)
     limits = [config.safety.max_pressure_gauge_pa]
+    if rig.valve == 'ppr':
+        limits.append(set_point_of(math.inf, rig.parameters, 0.0))
     if rig.valve == 'hsv':
         limits.append(config.hsv.supply_pa - P_ATM_PA)
     if controller is not None and 'max_pressure_gauge_pa' in controller.settings:
@@ -115,6 +120,25 @@ def reach_remarks(experiment: 'Experiment', rig: 'JointRig | Rig | None',
     return (f'the reference asks for up to {1e3 * worst_m:.1f} mm; at {1e-3 * gauge_pa:.0f} kPa '
             f'gauge this rig holds {1e3 * reach_m:.1f} mm at most, less with friction; it is '
             f'{time}, where the error says nothing of the controller',)
+
+
+def unknown_remarks(rig: 'JointRig | Rig | None') -> tuple[str, ...]:
+    """
+    Return a sentence if numbers of a model are unknown and nobody has found them yet.
+
+    `pam identify` leaves a number unknown that the data tell only together with others. Such a
+    number has another value than the nominal one.
+    """
+    if rig is None or isinstance(rig, JointRig) or not rig.unknown:
+        return ()
+    nominal = {one.name: one.default for one in rig.number_list}
+    guessed = [name for name in rig.unknown if rig.number(name) == nominal[name]]
+    names = [name for name in guessed if not name.startswith(OF_LAW)]
+    if len(names) < len(guessed):
+        names.append('the force law')
+    return (f'the model has nominal values for what {rig.name} states as unknown '
+            f'({", ".join(names)}); `pam identify BAG --rig FILE` finds them and writes a rig '
+            'to go on with',) if names else ()
 
 
 def jump_remarks(experiment: 'Experiment') -> tuple[str, ...]:

@@ -14,6 +14,7 @@
 
 """What a rig cannot follow is said before an experiment runs, and in the bag."""
 
+import math
 from types import SimpleNamespace
 
 from pam_actuation.bags.info import bag_info
@@ -21,6 +22,7 @@ from pam_actuation.cli.common import tell_remarks
 from pam_actuation.cli.main import main
 from pam_actuation.control.config import load_controller
 from pam_actuation.experiments import load_experiment
+from pam_actuation.experiments.limits import unknown_remarks
 from pam_actuation.resources import list_config
 from pam_sim import load_rig
 from pam_sim.joint import load_joint
@@ -97,3 +99,30 @@ def test_it_is_said_before_and_kept_in_the_bag(tmp_path, rig, capsys):
     said = capsys.readouterr()
     assert all(f'remark: {text}' in said.err for text in wanted)
     assert set(bag_info(tmp_path / 'bag').notes) >= {f'{text}.' for text in wanted}
+
+
+def test_nominal_values_of_unknown_numbers_are_said_until_they_are_found(rig):
+    unknown = {'spring_n_per_m': math.inf, 'law.a1_n_per_pa': math.inf}
+    said, = unknown_remarks(rig.with_(tolerance=unknown))
+    assert '(spring_n_per_m, the force law)' in said and 'pam identify' in said
+    found = rig.with_(tolerance=unknown, parameters={'spring_n_per_m': 210.0})
+    said, = unknown_remarks(found)
+    assert '(the force law)' in said
+    assert unknown_remarks(rig) == unknown_remarks(None) == ()
+
+
+def test_tuning_says_it_and_gets_the_range_of_the_rig(tmp_path, capsys):
+    (tmp_path / 'lab.yaml').write_text(
+        'muscle: {like: dmsp_5_300}\nload: hanging_mass\nvalve: ppr\n'
+        'parameters: {K_m: 50000.0, ppr_highest_v: 10.0}\ntolerance: {mass_kg: unknown}\n')
+    (tmp_path / 'short.yaml').write_text(
+        'name: short\nsegments:\n  - ramp: {to_m: 0.01, duration_s: 1.0}\n'
+        '  - sine: {center_m: 0.01, amplitude_m: 0.002, frequency_hz: 1.0, cycles: 2}\n')
+    main(['tune', '--model', str(tmp_path / 'lab.yaml'), '--rollouts', '10', '--experiment',
+          str(tmp_path / 'short.yaml'), '--check', str(tmp_path / 'short.yaml'), '--jobs', '1',
+          '--out', str(tmp_path / 'tuned.yaml')])
+    told = capsys.readouterr().err
+    assert 'remark: the model has nominal values' in told and '(mass_kg)' in told
+    assert 'remark: max_pressure_gauge_pa is 500 kPa instead of 600' in told
+    tuned = load_controller(str(tmp_path / 'tuned.yaml'), accept_other_rig=True)
+    assert tuned.settings['max_pressure_gauge_pa'] == 5e5
