@@ -15,6 +15,7 @@
 """``pam up``: bring a whole rig up in order and keep it up, without ``ros2 launch``."""
 
 import argparse
+import sys
 from typing import TYPE_CHECKING
 
 from pam_actuation.cli.common import (
@@ -51,7 +52,8 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument('--experiment', type=source, default=None, metavar='NAME',
                         help='what is played (default: references come from elsewhere)')
     parser.add_argument('--hardware', type=source, default='sim', metavar='NAME',
-                        help='sim, another name in config/hardware, or a file')
+                        help='sim; topics: sensors and valve are a program of your own; another '
+                             'name in config/hardware, or a file')
     parser.add_argument('--angle', choices=('sensors', 'topic'), default='sensors',
                         help='who publishes the angle of a real joint: hardware_sensors, or a '
                              'program of your own (default: %(default)s)')
@@ -73,7 +75,9 @@ def add_arguments(parser: Parser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """
-    Bring up, watch, take down; exit code 1 if a node ended or did not end in order.
+    Bring up, watch, take down.
+
+    Exit code 1 if a node found a fault, ended, or did not end in order.
 
     Once all are active Ctrl-C is the ordinary end, exit code 0; before, it is an interruption.
     """
@@ -97,7 +101,7 @@ def run(args: argparse.Namespace) -> int:
     _tell_remarks(args)
     if args.policy is not None:
         return _write_policy(args, nodes)
-    failure, problems, is_up = '', [], False
+    failure, problems, faults, is_up = '', [], [], False
     with termination_as_interrupt(), viewed(args, environment=True) as domain_id, Supervisor(
             nodes, domain_id, args.realtime_priority) as supervisor:
         try:
@@ -106,20 +110,22 @@ def run(args: argparse.Namespace) -> int:
             if not args.json:
                 print(f'{len(supervisor.processes)} nodes are active, Ctrl-C vents and ends:\n  '
                       + '\n  '.join(supervisor.processes) + _played(args), flush=True)
-            supervisor.watch(args.seconds)
+            supervisor.watch(args.seconds, tell=lambda text: print(text, file=sys.stderr))
         except SessionFailed as error:
             failure = str(error)
         except KeyboardInterrupt:
             pass
         with undisturbed():
             problems = supervisor.finish()
+            faults = list(dict.fromkeys(supervisor.faults))
             codes = {name: process.exit_code for name, process in supervisor.processes.items()}
     if not is_up and not failure:
         raise KeyboardInterrupt('stopped while the nodes started')
-    findings = list(dict.fromkeys(filter(None, [failure, *problems])))
+    findings = list(dict.fromkeys(filter(None, [failure, *faults, *problems])))
     text = '\n'.join(f'finding: {one}' for one in findings) or 'vented, all nodes ended in order'
-    emit(args, {'failure': failure, 'problems': problems, 'exit_codes': codes}, text)
-    return EXIT_FINDING if failure or problems else EXIT_DONE
+    emit(args, {'failure': failure, 'faults': faults, 'problems': problems,
+                'exit_codes': codes}, text)
+    return EXIT_FINDING if findings else EXIT_DONE
 
 
 def _model(args: argparse.Namespace) -> 'JointRig | Rig':

@@ -20,6 +20,8 @@ import os
 import time
 from typing import Self, TYPE_CHECKING
 
+from pam_actuation.drivers.safety import EMERGENCY_STOP
+from pam_actuation.messages import LEVEL_ERROR
 from pam_actuation.namespaces import node_name_of
 from pam_actuation.rigging.node_group import NodeGroup
 from pam_actuation.rigging.transitions import SessionFailed
@@ -27,6 +29,8 @@ from pam_actuation.rigging.transitions import SessionFailed
 if TYPE_CHECKING:
     from pam_actuation.rigging.node_spec import NodeSpec
     from pam_actuation.rigging.processes import NodeProcess
+
+SETTLED_S = 1.0           # from the last node active to the first command and reading of all
 
 
 class Supervisor:
@@ -51,6 +55,10 @@ class Supervisor:
             node_name_of(node.name, node.namespace): replace(node, parameters={
                 'realtime_priority': realtime_priority, **node.parameters, 'autostart': False})
             for node in nodes}, domain_id=domain_id)
+        self.faults: list[str] = []
+        self._faulty: set[str] = set()
+        self._from_start: set[str] = set()      # not well yet when the nodes became active
+        self._heard = 0
 
     def __enter__(self) -> Self:
         """Return the supervisor."""
@@ -83,9 +91,13 @@ class Supervisor:
         return level, message
 
     def watch(self, seconds: float | None = None,
-              until: Callable[[], bool] = lambda: False) -> None:
+              until: Callable[[], bool] = lambda: False,
+              tell: Callable[[str], None] = lambda text: None) -> None:
         """
         Return when the time is over or ``until`` says so; None: watch until a node ends.
+
+        ``tell`` gets a sentence where a node finds a fault, and where it is well again. The
+        faults stand in ``faults`` as well.
 
         Raises
         ------
@@ -93,14 +105,45 @@ class Supervisor:
             A node ended; the text says which, and how.
 
         """
-        deadline = None if seconds is None else time.monotonic() + seconds
+        begun = time.monotonic()
+        deadline = None if seconds is None else begun + seconds
+        # A driver is not well before the first command; what lasts is told after a second.
+        started = self._group.started
+        self._heard = len(started.changes)
+        self._from_start = {name for name, (level, *_) in started.statuses.items()
+                            if level >= LEVEL_ERROR}
         while deadline is None or time.monotonic() < deadline:
             self._group.started.spin(0.05)
+            self._hear(tell, time.monotonic() > begun + SETTLED_S)
             ended = self._group.ended()
             if ended is not None:
                 raise SessionFailed(self._how_it_ended(ended))
             if until():
                 return
+
+    def _hear(self, tell: Callable[[str], None], settled: bool) -> None:
+        """Tell which nodes found a fault, or lost it; before ``settled`` only what is new."""
+        statuses, changes = self._group.started.statuses, self._group.started.changes
+        told = [(name, level, message) for _, name, level, message in changes[self._heard:]]
+        self._heard = len(changes)
+        if settled:
+            told += [(name, *statuses[name][:2]) for name in self._from_start & statuses.keys()]
+            self._from_start = set()
+        for name, level, message in told:
+            if name in self._from_start and level >= LEVEL_ERROR:
+                continue
+            self._from_start.discard(name)
+            if (level >= LEVEL_ERROR) == (name in self._faulty):
+                continue
+            if level >= LEVEL_ERROR:
+                self._faulty.add(name)
+                tell(f'{name}: {message}')
+                # An emergency stop is somebody's wish.
+                if statuses[name][2].get('state') != EMERGENCY_STOP:
+                    self.faults.append(f'{name}: {message}')
+            else:
+                self._faulty.discard(name)
+                tell(f'{name} is well again: {message}')
 
     def finish(self) -> list[str]:
         """
