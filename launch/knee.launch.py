@@ -38,12 +38,13 @@ from launch.substitutions import AndSubstitution
 from launch.substitutions import EqualsSubstitution
 from launch.substitutions import LaunchConfiguration
 from launch.substitutions import NotEqualsSubstitution
+from launch.substitutions import OrSubstitution
 from launch_ros.actions import LifecycleNode
 from launch_ros.parameter_descriptions import ParameterValue
 from pam_actuation.control.modes.files import joint_preset_for
 from pam_actuation.hardware.files import hardware_file
 from pam_actuation.namespaces import launch_namespace
-from pam_actuation.rigging.layouts import BY_SENSORS, BY_TOPIC, SIMULATED
+from pam_actuation.rigging.layouts import BY_SENSORS, BY_TOPIC, SIMULATED, TOPICS
 from pam_sim.joint import load_joint
 
 PACKAGE = 'pam_actuation'
@@ -68,7 +69,8 @@ def _arguments():
             description='Joint preset, or path of its file.'),
         DeclareLaunchArgument(
             'hardware', default_value='sim',
-            description='sim, another name in config/hardware, or a parameter file of your own.'),
+            description='sim, topics (a program of your own), another name in config/hardware, '
+                        'or a parameter file of your own.'),
         DeclareLaunchArgument(
             'angle', default_value=BY_SENSORS, choices=[BY_SENSORS, BY_TOPIC],
             description='Who publishes the angle of a real joint: hardware_sensors, or you.'),
@@ -137,22 +139,23 @@ def generate_launch_description():
             LaunchConfiguration('accept_other_rig'), value_type=bool),
         'learning': ParameterValue(LaunchConfiguration('learning'), value_type=bool)}
     hardware, file = LaunchConfiguration('hardware'), LaunchConfiguration(HARDWARE_FILE)
-    simulated = IfCondition(EqualsSubstitution(hardware, SIMULATED))
-    real = NotEqualsSubstitution(hardware, SIMULATED)
+    simulated = EqualsSubstitution(hardware, SIMULATED)
+    by_topics = OrSubstitution(simulated, EqualsSubstitution(hardware, TOPICS))
+    real = AndSubstitution(*(NotEqualsSubstitution(hardware, no) for no in (SIMULATED, TOPICS)))
     awaited = {'await_subscriber': valve['await_subscriber']}
     drivers = [
         _node('valve_driver', valve, {
             'rig': _text(LaunchConfiguration('joint'), '/', side),
             'controller': _text(LaunchConfiguration('controller_file'))}, file, side=side)
         for side in SIDES]
-    watchdogs = [_node('valve_watchdog', valve, side=side, condition=simulated)
+    watchdogs = [_node('valve_watchdog', valve, side=side, condition=IfCondition(by_topics))
                  for side in SIDES]
     sensors = [_node('hardware_sensors', awaited, file, side=side, condition=IfCondition(real))
                for side in SIDES]
     angle = _node(
         'hardware_sensors', awaited, {'place': 'joint'}, file, condition=IfCondition(
             AndSubstitution(real, EqualsSubstitution(LaunchConfiguration('angle'), BY_SENSORS))))
-    plant = _node('joint_simulator', valve, joint, seed, condition=simulated)
+    plant = _node('joint_simulator', valve, joint, seed, condition=IfCondition(simulated))
     controller = _node(
         'joint_controller', valve, joint, control, condition=IfCondition(
             NotEqualsSubstitution(LaunchConfiguration('controller'), 'none')))

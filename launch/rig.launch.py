@@ -30,18 +30,19 @@ from launch.actions import OpaqueFunction
 from launch.actions import RegisterEventHandler
 from launch.actions import SetLaunchConfiguration
 from launch.conditions import IfCondition
+from launch.conditions import UnlessCondition
 from launch.event_handlers import OnProcessExit
 from launch.events import Shutdown
 from launch.substitutions import EqualsSubstitution
 from launch.substitutions import IfElseSubstitution
 from launch.substitutions import LaunchConfiguration
-from launch.substitutions import NotEqualsSubstitution
+from launch.substitutions import OrSubstitution
 from launch_ros.actions import LifecycleNode
 from launch_ros.parameter_descriptions import ParameterValue
 from pam_actuation.hardware.files import hardware_file
 from pam_actuation.namespaces import launch_namespace
 from pam_actuation.nodes.pid_controller import PidNode
-from pam_actuation.rigging.layouts import NO_CONTROLLER, played
+from pam_actuation.rigging.layouts import NO_CONTROLLER, played, SIMULATED, TOPICS
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 
@@ -65,7 +66,8 @@ def _arguments():
             description='Rig preset, or path of a model file.'),
         DeclareLaunchArgument(
             'hardware', default_value='sim',
-            description='sim, another name in config/hardware, or a parameter file of your own.'),
+            description='sim, topics (a program of your own), another name in config/hardware, '
+                        'or a parameter file of your own.'),
         DeclareLaunchArgument(
             'controller', default_value='sofc', choices=['sofc', 'pid', NO_CONTROLLER],
             description='Self-organizing fuzzy controller or PID; none: you start your own.'),
@@ -138,18 +140,17 @@ def generate_launch_description():
          'controller': _text(CONTROLLER_NAME)},
         condition=IfCondition(LaunchConfiguration('record')))
     hardware = LaunchConfiguration('hardware')
-    plant = _node(
-        'plant_simulator', valve, seed, {'rig': _text('rig')},
-        condition=IfCondition(EqualsSubstitution(hardware, 'sim')))
-    sensors = _node(
-        'hardware_sensors', LaunchConfiguration(HARDWARE_FILE),
-        condition=IfCondition(NotEqualsSubstitution(hardware, 'sim')))
+    simulated = EqualsSubstitution(hardware, SIMULATED)
+    by_topics = OrSubstitution(simulated, EqualsSubstitution(hardware, TOPICS))
+    plant = _node('plant_simulator', valve, seed, {'rig': _text('rig')},
+                  condition=IfCondition(simulated))
+    sensors = _node('hardware_sensors', LaunchConfiguration(HARDWARE_FILE),
+                    condition=UnlessCondition(by_topics))
     driver = _node(
         'valve_driver', valve, {'rig': _text('rig'), 'controller': _text(CONTROLLER_NAME)},
         {'accept_valve_command': ParameterValue(
             LaunchConfiguration(RAW), value_type=bool)}, LaunchConfiguration(HARDWARE_FILE))
-    watchdog = _node(
-        'valve_watchdog', valve, condition=IfCondition(EqualsSubstitution(hardware, 'sim')))
+    watchdog = _node('valve_watchdog', valve, condition=IfCondition(by_topics))
     reference = _node(
         'reference_generator', valve,
         {'experiment': _text('experiment'), 'await_receiver': True, 'start_delay_s': 3.0,
@@ -186,7 +187,7 @@ def _note_what_is_needed(context):
              CONTROLLER: kind if name else NO_CONTROLLER, CONTROLLER_NAME: name,
              RAW: str(raw).lower(), 'namespace': launch_namespace(given('namespace')),
              # Real sensors have no seed.
-             RECORDED_SEED: given('seed') if given('hardware') == 'sim' else '-1'}
+             RECORDED_SEED: given('seed') if given('hardware') == SIMULATED else '-1'}
     return [SetLaunchConfiguration(key, text) for key, text in noted.items()]
 
 

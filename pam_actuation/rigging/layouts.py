@@ -31,6 +31,7 @@ from pam_sim.joint.parameters import SIDES
 
 NO_CONTROLLER = 'none'      # one of the user's own sends the pressure commands
 SIMULATED = 'sim'           # no hardware
+TOPICS = 'topics'           # sensors and valves are a program of the user's own
 BY_SENSORS, BY_TOPIC = 'sensors', 'topic'       # who publishes the angle of a real joint
 KNEES = ('left_knee', 'right_knee')
 
@@ -50,7 +51,9 @@ def rig(namespace: str = '/muscle', rig: str = 'dmsp_5_300_realistic', valve: st
     valve : {'ppr', 'hsv'}
         Kind of valve.
     hardware : str
-        ``sim``, another name in config/hardware, or a parameter file.
+        ``sim``, ``topics``, another name in config/hardware, or a parameter file. With
+        ``topics`` a program of your own publishes what is measured and follows
+        ``valve_signal``.
     controller : str
         Controller preset or file; '' for the preset of valve and experiment, 'none' for no
         node: one of your own commands the pressure.
@@ -78,9 +81,10 @@ def rig(namespace: str = '/muscle', rig: str = 'dmsp_5_300_realistic', valve: st
     accept = {'accept_other_rig': True} if accept_other_rig else {}
     nodes = [NodeSpec('sofc_controller', namespace, {
         **described, **accept, 'controller': name})] if name else []
-    if hardware == SIMULATED:
-        nodes += [NodeSpec('plant_simulator', namespace, described),
-                  NodeSpec('valve_watchdog', namespace, kind),
+    if hardware in (SIMULATED, TOPICS):
+        if hardware == SIMULATED:
+            nodes.append(NodeSpec('plant_simulator', namespace, described))
+        nodes += [NodeSpec('valve_watchdog', namespace, kind),
                   NodeSpec('valve_driver', namespace, driver)]
     else:
         file = hardware_file(hardware)
@@ -155,7 +159,8 @@ def knee(namespace: str = '/knee', joint: str = 'joint_dmsp_5_300_realistic', va
 
     ``controller`` is a preset or file, '' for the preset of valve and joint, 'none' for no node.
     ``record`` is the folder of the bag; '': no recorder. With ``overwrite`` it replaces the bag
-    that is there. ``hardware`` is ``sim``, another name in config/hardware, or a parameter file.
+    that is there. ``hardware`` is ``sim``, ``topics``, another name in config/hardware, or a
+    parameter file, as of ``rig``.
     ``angle`` tells of hardware whether the angle is read by ``hardware_sensors`` ('sensors') or
     published by a program of your own ('topic').
     """
@@ -163,12 +168,13 @@ def knee(namespace: str = '/knee', joint: str = 'joint_dmsp_5_300_realistic', va
     common = {'valve_type': valve, 'muscle': namespace.rsplit('/', 1)[-1] or 'knee'}
     of_joint = {**common, 'joint': joint}
     simulated = hardware == SIMULATED
-    file = '' if simulated else hardware_file(hardware)
+    by_topics = hardware == TOPICS
+    file = '' if simulated or by_topics else hardware_file(hardware)
     named = {'muscle': common['muscle']}
     nodes = []
     if simulated:
         nodes.append(NodeSpec('joint_simulator', namespace, {**of_joint, 'seed': seed}))
-    elif angle == BY_SENSORS:
+    elif angle == BY_SENSORS and not by_topics:
         nodes.append(NodeSpec('hardware_sensors', namespace, {**named, 'place': 'joint'}, file))
     if controller != NO_CONTROLLER:
         nodes.append(NodeSpec('joint_controller', namespace, {
@@ -179,7 +185,7 @@ def knee(namespace: str = '/knee', joint: str = 'joint_dmsp_5_300_realistic', va
         below = f'{namespace}/{side}'
         nodes += [NodeSpec('valve_driver', below,
                            {**common, **asking, 'rig': f'{joint}/{side}'}, file),
-                  NodeSpec('valve_watchdog', below, common) if simulated
+                  NodeSpec('valve_watchdog', below, common) if simulated or by_topics
                   else NodeSpec('hardware_sensors', below, named, file)]
     nodes += _reference(namespace, experiment, common)
     if not record:

@@ -1,0 +1,86 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Sensors and valve are a program of the user's own; the rig's nodes are the usual ones."""
+
+from pathlib import Path
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from pam_actuation.bags.load import load_run                                # noqa: E402, I100
+from pam_actuation.rigging import layouts                                   # noqa: E402
+from pam_actuation.rigging.domain import DomainLock                         # noqa: E402
+from pam_actuation.rigging.processes import node_environment                # noqa: E402
+
+pytestmark = pytest.mark.ros
+
+EXAMPLE = Path(__file__).resolve().parents[2] / 'examples' / 'own_hardware.py'
+LIFT = """\
+name: lift
+domain: contraction
+segments:
+  - rest: {duration_s: 0.5}
+  - ramp: {to_m: 0.008, duration_s: 1.5}
+  - hold: {duration_s: 60.0}
+"""
+
+
+def names(nodes):
+    return [f'{node.namespace}/{node.name}' for node in nodes]
+
+
+def test_a_watchdog_takes_the_place_of_sensors_and_simulator():
+    assert names(layouts.rig(hardware='topics')) == [
+        '/muscle/sofc_controller', '/muscle/valve_watchdog', '/muscle/valve_driver']
+    knee = names(layouts.knee(hardware='topics'))
+    assert '/knee/flexor/valve_watchdog' in knee and '/knee/joint_controller' in knee
+    assert not any('hardware_sensors' in name or 'simulator' in name for name in knee)
+
+
+def test_the_example_is_moved_and_its_end_is_told_and_vents(tmp_path):
+    lock = DomainLock()
+    environment = {**node_environment(lock.domain_id, tmp_path), 'PYTHONUNBUFFERED': '1'}
+    (tmp_path / 'lift.yaml').write_text(LIFT)
+    own = subprocess.Popen(
+        [sys.executable, EXAMPLE, '--ros-args', '-r', '__ns:=/muscle'], env=environment)
+    rig = None
+    try:
+        rig = subprocess.Popen(
+            [sys.executable, '-m', 'pam_actuation.cli.main', 'up', 'rig', '--hardware', 'topics',
+             '--experiment', str(tmp_path / 'lift.yaml'), '--record', str(tmp_path / 'bag')],
+            env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        assert '5 nodes are active' in rig.stdout.readline()
+        time.sleep(6.0)
+        own.send_signal(signal.SIGKILL)
+        time.sleep(1.5)
+        rig.send_signal(signal.SIGINT)
+        output, told = rig.communicate(timeout=30)
+    finally:
+        for process in filter(None, (own, rig)):
+            process.kill()
+            process.wait()
+        lock.release()
+    assert rig.returncode == 1
+    assert '/muscle/valve_driver: ' in told and 'finding: /muscle/valve_driver: ' in output
+    run = load_run(tmp_path / 'bag')
+    contraction, signals = run.topics['contraction'], run.topics['valve_signal']
+    end_ns = contraction.stamp_ns[-1]
+    held_m = contraction.values['contraction_m'][contraction.stamp_ns > end_ns - 5e8]
+    assert held_m.mean() == pytest.approx(0.008, abs=0.001)
+    assert (signals.values['ppr_voltage'][signals.stamp_ns > end_ns + 3e8] == 0.0).all()
