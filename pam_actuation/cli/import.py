@@ -85,7 +85,7 @@ def run(args: argparse.Namespace) -> int:
     from pam_actuation.bags.place import check_bag_target
     from pam_actuation.cli.common import check_outputs
     from pam_actuation.tables.importer import digest_of, recording_of, write_bag
-    from pam_actuation.tables.preview import unread
+    from pam_actuation.tables.preview import may_be_signals, unread
     from pam_actuation.tables.repeats import without_repeats
     from pam_actuation.tables.resample import hint, resampled
     from pam_sim.files import write_text
@@ -116,7 +116,8 @@ def run(args: argparse.Namespace) -> int:
         bar.update(1.0 - bar.n)
     if args.save_mapping:
         write_text(args.save_mapping, found.mapping.to_yaml())
-    _tell(args, recording, found, counts, out, unread(tables, found))
+    _tell(args, recording, found, counts, out, unread(tables, found),
+          may_be_signals(tables, found))
     return EXIT_FINDING if recording.found else EXIT_DONE
 
 
@@ -166,7 +167,8 @@ def _asked(text: str, answers: tuple[str, ...]) -> str | None:
 
 
 def _show(args: argparse.Namespace, tables: 'list[Table]', found: 'Guess') -> int:
-    from pam_actuation.tables.preview import how_to_begin, preview, questions_text
+    from pam_actuation.tables.preview import (
+        how_to_begin, may_be_signals, preview, questions_text)
     lines = [preview(tables, found, args.missing)]
     if found.questions:
         lines += ['', 'the file does not tell:', questions_text(found)]
@@ -175,6 +177,9 @@ def _show(args: argparse.Namespace, tables: 'list[Table]', found: 'Guess') -> in
     elif not found.questions:
         lines += ['', 'no column is known by its name: say which are signals, such as',
                   f'    {how_to_begin(tables, found)}']
+    if (found.mapping.signals or found.questions) and (more := may_be_signals(tables, found)):
+        lines += ['', 'not read, but by name and unit these may be signals:',
+                  *(f'    {one}' for one in more)]
     emit(args, {
         'files': args.files, 'mapping': found.mapping.to_yaml(),
         'questions': [{'signal': one.signal, 'column': one.column, 'text': one.text,
@@ -184,7 +189,7 @@ def _show(args: argparse.Namespace, tables: 'list[Table]', found: 'Guess') -> in
 
 
 def _tell(args: argparse.Namespace, recording: 'Recording', found: 'Guess',
-          counts: dict[str, int], out: str, left: list[str]) -> None:
+          counts: dict[str, int], out: str, left: list[str], likely: list[str]) -> None:
     remarks = [one.sentence for one in recording.found]
     lines = [f'imported {recording.duration_s:.4g} s from {", ".join(recording.sources)}']
     lines += [f'  {text}' for text in recording.told]
@@ -195,6 +200,8 @@ def _tell(args: argparse.Namespace, recording: 'Recording', found: 'Guess',
     if left:
         lines.append('  not imported: ' + ', '.join(f'"{column}"' for column in left[:_MOST_LEFT])
                      + (f' and {len(left) - _MOST_LEFT} more' if len(left) > _MOST_LEFT else ''))
+    if likely:
+        lines.append(f'  not imported, but it may be a signal: {" or ".join(likely)}')
     if {'pressure', 'contraction'} <= set(found.mapping.signals) and not (
             recording.valve or 'pressure_command' in found.mapping.signals):
         lines.append('  no command of the valve: pam gap and pam identify compare muscle and '

@@ -20,6 +20,7 @@ import re
 
 import numpy as np
 from pam_actuation.tables.mapping import column_of_text, ColumnMap, TableMapping
+from pam_actuation.tables.parts import kind_of_pressure
 from pam_actuation.tables.signals import (
     ANGLES, are_of_joint, BY_NAME, of_words, Signal, TIME_WORDS)
 from pam_actuation.tables.table import Table
@@ -27,6 +28,7 @@ from pam_actuation.tables.units import (
     ABSOLUTE, ANGLE, checked_unit, FACTORS, GAUGE, LENGTH, names_of, PRESSURE, si_unit, Unit,
     unit_of_text, VOLTAGE)
 from pam_actuation.tables.words import unit_in, words_of
+from pam_sim.annotations import BoolArray, FloatArray
 from pam_sim.units import P_ATM_PA
 
 BELOW_ATMOSPHERE = 0.9            # of it: no muscle on a rig is evacuated further
@@ -113,7 +115,7 @@ def guess(tables: Collection[Table], mapping: TableMapping,
         for column in table.columns:
             if column in used or re.fullmatch(TIME_WORDS, words_of(column)):
                 continue
-            signal = _signal_of(_name_of(table, column))
+            signal = _signal_of(_name_of(table, column), unit_of_column(table, column))
             if signal is None or signal.name in mapping.signals or column in seen.get(
                     signal.name, {}):
                 continue
@@ -175,6 +177,11 @@ def ask(found: Guess, answer: Callable[[str, tuple[str, ...]], str | None]) -> G
     return Guess(replace(found.mapping, signals=signals), told)
 
 
+def falls_below_atmosphere(values: FloatArray, unit: Unit) -> BoolArray:
+    """Return where pressures would be below the atmosphere if they were absolute."""
+    return values * unit.factor < BELOW_ATMOSPHERE * P_ATM_PA
+
+
 def _name_of(table: Table, column: str) -> str:
     """Return what a column is called before ``/data`` or ``/z``; '' for one that stands still."""
     name = table.called.get(column, column)
@@ -183,11 +190,16 @@ def _name_of(table: Table, column: str) -> str:
     return _PLACE.sub('', name) if table.columns[column].nunique() > 1 else ''
 
 
-def _signal_of(column: str) -> Signal | None:
-    """Return the signal that the name of a column means."""
+def unit_of_column(table: Table, column: str) -> str:
+    """Return the unit that a table states for a column, as it is written; '' without one."""
+    return table.units.get(column, '') or unit_in(_name_of(table, column))
+
+
+def _signal_of(column: str, unit: str) -> Signal | None:
+    """Return the signal that the name of a column and its unit mean."""
     path, _, name = column.rpartition('/')
     return next((signal for signal in BY_NAME.values() if _is_exported(column, signal)),
-                None) or of_words(words_of(name), path)
+                None) or of_words(words_of(name), path, unit)
 
 
 def _is_exported(column: str, signal: Signal) -> bool:
@@ -201,7 +213,7 @@ def _of_column(table: Table, column: str, signal: Signal, missing: Collection[st
     if _is_exported(column, signal):
         si = si_unit(signal.quantity)
         return ColumnMap(column, si), f'unit {si.name} by name'
-    text = table.units.get(column, '') or unit_in(_name_of(table, column))
+    text = unit_of_column(table, column)
     unit = unit_of_text(text, signal.quantity) if text else None
     if unit is None and text and any(unit_of_text(text, one) for one in FACTORS):
         return None                                     # such as a pressure sensor's volts
@@ -217,10 +229,13 @@ def _of_column(table: Table, column: str, signal: Signal, missing: Collection[st
     if unit.is_complete:
         by = 'message type' if column in table.by_type else 'name'
         return ColumnMap(column, unit), f'unit {unit.name} by {by}'
-    below = finite * unit.factor < BELOW_ATMOSPHERE * P_ATM_PA
-    if column in table.by_type and not below.any():         # as the type of the message says
-        chosen = checked_unit(f'{unit.name}_{ABSOLUTE}', PRESSURE, column)
-        return ColumnMap(column, chosen), f'unit {chosen.name} by message type'
+    below = falls_below_atmosphere(finite, unit)
+    by, kind = 'name', kind_of_pressure(words_of(_name_of(table, column)))
+    if column in table.by_type:                             # as the type of the message says
+        by, kind = 'message type', ABSOLUTE
+    if kind == GAUGE or kind == ABSOLUTE and not below.any():
+        chosen = checked_unit(f'{unit.name}_{kind}', PRESSURE, column)
+        return ColumnMap(column, chosen), f'unit {chosen.name} by {by}'
     if below.any() and float(below.mean()) < FEW_BELOW:
         shown += f', below 1 atmosphere in {int(below.sum())} of {len(finite)} rows only'
     elif below.any():

@@ -182,7 +182,7 @@ def column_of_text(signal: str, text: str, where: str) -> ColumnMap:
     if not words or not words[0].strip():
         raise InputError(
             f'the unit is missing: write {signal}="{column}:UNIT", such as '
-            f'{signal}="{column}:{_usual(quantity)}"', where)
+            f'{signal}="{column}:{usual_unit(quantity)}"', where)
     return _checked(ColumnMap(column, checked_unit(words[0], quantity, where),
                               where=where, **numbers))
 
@@ -265,6 +265,7 @@ def _number(text: str, key: str, where: str) -> float:
                          where) from None
 
 
-def _usual(quantity: str) -> str:
+def usual_unit(quantity: str) -> str:
+    """Return the unit in which most programs write a quantity."""
     return {'pressure': 'kPa_gauge', 'length': 'mm', 'force': 'N', 'voltage': 'V',
             'duty': '1', 'angle': 'deg'}[quantity]

@@ -19,16 +19,19 @@ import re
 
 import numpy as np
 from pam_actuation.tables.clock import time_column
-from pam_actuation.tables.guess import Guess
+from pam_actuation.tables.guess import falls_below_atmosphere, Guess, unit_of_column
+from pam_actuation.tables.mapping import usual_unit
+from pam_actuation.tables.parts import likely_signals
 from pam_actuation.tables.signals import BY_NAME
 from pam_actuation.tables.table import Table
-from pam_actuation.tables.words import unit_in, words_of
+from pam_actuation.tables.units import ABSOLUTE, GAUGE, unit_of_text, VOLTAGE
+from pam_actuation.tables.words import words_of
 from pam_sim.errors import InputError
 
 _MOST_COLUMNS = 60
-# Signal, unit, words of a likely column, gain of a sensor of 4 to 20 mA (10 bar, 100 mm).
-_EXAMPLES = (('pressure', 'kPa_gauge', r'\bp\b|press', 62.5),
-             ('contraction', 'mm', r'\bx\b|dist|pos|len|disp|stroke|contract', 6.25))
+# Words of a likely column, and the gain of a sensor of 4 to 20 mA (10 bar, 100 mm).
+_EXAMPLES = {'pressure': (r'\bp\b|press', 62.5),
+             'contraction': (r'\bx\b|dist|pos|disp|stroke|contract', 6.25)}
 
 
 def preview(tables: Collection[Table], found: Guess, missing: Collection[str] = ()) -> str:
@@ -74,16 +77,71 @@ def question_sentence(found: Guess) -> str:
 
 
 def how_to_begin(tables: Collection[Table], found: Guess) -> str:
-    """Return the words of the command line that begin a mapping, with columns of the file."""
-    columns, said = unread(tables, found), []
-    for signal, unit, words, gain in _EXAMPLES:
-        if not columns:
-            break
-        column = next((one for one in columns if re.search(words, words_of(one))), columns[0])
-        columns.remove(column)
-        more = f':zero=4:gain={gain:g}' if unit_in(column) == 'mA' else ''
-        said.append(f'--map {signal}="{column}:{unit}{more}"')
-    return ' '.join(said)
+    """
+    Return the words of the command line that begin a mapping, with columns of the file.
+
+    A column goes with a signal only where its unit, if the file states one, is one of the signal.
+    """
+    left = {column: table for table in tables for column in unread([table], found)}
+    said: dict[str, str] = {}
+    for fits in (_is_likely, _is_called, _has_the_unit, _has_no_unit):
+        for signal in ('pressure', 'contraction', 'force', 'ppr_voltage'):
+            column = next((one for one, table in left.items() if signal not in said
+                           and fits(table, one, signal)), None)
+            if column is not None:
+                said[signal] = _option(left.pop(column), column, signal)
+    return ' '.join(said[one] for one in BY_NAME if one in said) or '--map SIGNAL="COLUMN:UNIT"'
+
+
+def may_be_signals(tables: Collection[Table], found: Guess) -> list[str]:
+    """Return an option for each column that is not read and may be a signal that is missing."""
+    missing = BY_NAME.keys() - found.mapping.signals.keys() - {
+        one.signal for one in found.questions}
+    return list(dict.fromkeys(
+        _option(table, column, signal) for table in tables for column in unread([table], found)
+        for signal in _likely(table, column) if signal in missing))
+
+
+def _likely(table: Table, column: str) -> list[str]:
+    return likely_signals(words_of(column), unit_of_column(table, column))
+
+
+# Each of these returns whether a column may be a signal, the surest first.
+
+def _is_likely(table: Table, column: str, signal: str) -> bool:
+    return signal in _likely(table, column)
+
+
+def _is_called(table: Table, column: str, signal: str) -> bool:
+    words, _ = _EXAMPLES.get(signal, ('', 0.0))
+    text = unit_of_column(table, column)
+    return bool(words and (text in ('', 'mA') or _has_the_unit(table, column, signal))
+                and re.search(words, words_of(column)))
+
+
+def _has_the_unit(table: Table, column: str, signal: str) -> bool:
+    text, quantity = unit_of_column(table, column), BY_NAME[signal].quantity
+    return quantity != VOLTAGE and bool(text) and unit_of_text(text, quantity) is not None
+
+
+def _has_no_unit(table: Table, column: str, signal: str) -> bool:
+    return signal in _EXAMPLES and unit_of_column(table, column) in ('', 'mA')
+
+
+def _option(table: Table, column: str, signal: str) -> str:
+    """Return how a column is mapped to a signal, in the unit that the file states for it."""
+    text, quantity = unit_of_column(table, column), BY_NAME[signal].quantity
+    unit = unit_of_text(text, quantity) if text else None
+    if unit is None:
+        more = f':zero=4:gain={_EXAMPLES[signal][1]:g}' if text == 'mA' else ''
+        return f'--map {signal}="{column}:{usual_unit(quantity)}{more}"'
+    if unit.is_complete:
+        return f'--map {signal}="{column}:{unit.name}"'
+    lowest, *_ = _facts(table, column, ())
+    is_gauge = bool(lowest) and lowest != 'no number' and falls_below_atmosphere(
+        np.array([float(lowest)]), unit).any()
+    other = '' if is_gauge else f' (or {unit.name}_{ABSOLUTE})'
+    return f'--map {signal}="{column}:{unit.name}_{GAUGE}"{other}'
 
 
 def unread(tables: Collection[Table], found: Guess) -> list[str]:

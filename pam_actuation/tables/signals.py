@@ -23,6 +23,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 import re
 
+from pam_actuation.tables.parts import name_of_parts, quantities_of
 from pam_actuation.tables.units import ANGLE, DUTY, FORCE, LENGTH, PRESSURE, VOLTAGE
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.joint.parameters import SIDES
@@ -121,8 +122,8 @@ ALLOWED = (f'{", ".join(one.name for one in SIGNALS)}; of a joint '
 # Words that other programs have for the sides.
 _SIDE_WORDS = {'flexor': 'flexor', 'flex': 'flexor', 'agonist': 'flexor', 'ago': 'flexor',
                'extensor': 'extensor', 'antagonist': 'extensor', 'antago': 'extensor'}
-TIME_WORDS = (r't|time|t ?(nominal|rel|s)|time ?stamp|stamp|elapsed( time)?|timer|clock|'
-              r'seconds|sec|date ?time|date')
+TIME_WORDS = (r't|(measured )?time|t ?(nominal|rel|s)|time ?stamp|stamp|elapsed( time)?|timer|'
+              r'clock|seconds|sec|date ?time|date')
 
 
 def signal_of(name: str, where: str) -> Signal:
@@ -135,7 +136,7 @@ def signal_of(name: str, where: str) -> Signal:
     return BY_NAME[name]
 
 
-def of_words(words: str, path: str = '') -> Signal | None:
+def of_words(words: str, path: str = '', unit: str = '') -> Signal | None:
     """
     Return the signal that a name means, None where it means none.
 
@@ -145,17 +146,29 @@ def of_words(words: str, path: str = '') -> Signal | None:
         Of the name, in lower case.
     path : str
         What stands before it, such as ``/knee/flexor``.
+    unit : str
+        Unit that is stated, which tells a setpoint in V from one in mm; '' where none is.
 
     """
     sides = {_SIDE_WORDS[word] for word in re.split(r'[\W_]+', f'{path.lower()} {words}')
              if word in _SIDE_WORDS}
     if not sides:
-        return next((one for one in (*SIGNALS, *ANGLES) if one.is_named(words)), None)
+        return _single(words, unit)
     own = ' '.join(word for word in words.split() if word not in _SIDE_WORDS)
-    single = next((one for one in SIGNALS if one.is_named(own)), None)
+    single = _single(own, unit)
     if single is None or len(sides) > 1:
         return None
     return BY_NAME.get(f'{sides.pop()}/{single.name}')
+
+
+def _single(words: str, unit: str) -> Signal | None:
+    """Return the signal that the words mean, by the name as a whole, else by its parts."""
+    whole = next((one for one in (*SIGNALS, *ANGLES) if one.is_named(words)), None)
+    quantities = quantities_of(unit)
+    if whole is not None and (not quantities or whole.quantity in quantities):
+        return whole
+    name = name_of_parts(words, unit)
+    return BY_NAME[name] if name else whole
 
 
 def of_muscles(names: Iterable[str]) -> dict[str, set[str]]:

@@ -47,6 +47,7 @@ def words_of(name: str) -> str:
         parts = re.split(r'[_\s.,/]+', name.strip())
         text = ' '.join(parts[:-len(unit.split('_'))])
     text = re.sub(r'([a-z])([A-Z])', r'\1 \2', text)
+    text = re.sub(r"\b[dDlL]['’]", '', text)                  # as in `pression d'alimentation`
     words = re.split(r'[_\s./-]+', text.lower().strip())
     return ' '.join(in_english(word) for word in words).strip()
 

@@ -17,13 +17,14 @@
 import re
 
 import numpy as np
-from pam_actuation.tables.guess import guess
+from pam_actuation.cli.main import main
+from pam_actuation.tables.guess import Guess, guess
 from pam_actuation.tables.mapping import column_of_text, TableMapping
 from pam_actuation.tables.plausible import doubts
 from pam_actuation.tables.preview import how_to_begin
 from pam_actuation.tables.signals import of_words, signal_of, SIGNALS, TIME_WORDS
 from pam_actuation.tables.table import Table
-from pam_actuation.tables.words import words_of
+from pam_actuation.tables.words import unit_in, words_of
 from pam_sim.errors import InputError
 from pam_sim.units import P_ATM_PA
 import pandas as pd
@@ -50,7 +51,82 @@ def test_columns_in_the_language_of_the_lab(column, signal):
     assert (found and found.name) == signal
 
 
-@pytest.mark.parametrize('column', ['Tijd (s)', 'Zeit_ms', '時間[s]', 'Čas (s)', '시간'])
+@pytest.mark.parametrize('column, signal', [
+    ('Zugkraft [N]', 'force'), ('Seilkraft_N', 'force'), ('Kraftaufnehmer [N]', 'force'),
+    ('Muskeldruck [bar]', 'pressure'), ('Muskelinnendruck_kPa', 'pressure'),
+    ('Muskelsolldruck [bar]', 'pressure_command'), ('Versorgungsdruck [bar]', 'supply_pressure'),
+    ('Sollwert Regler [V]', 'ppr_voltage'), ('Sollspannung [V]', 'ppr_voltage'),
+    ('Stellgröße [V]', 'ppr_voltage'), ('Stellgroesse_V', 'ppr_voltage'),
+    ('Drucksollwert [V]', 'ppr_voltage'), ('Drucksollwert [bar]', 'pressure_command'),
+    ('Sollwert [mm]', 'reference'), ('Hub_mm', 'contraction'), ('Hubweg [mm]', 'contraction'),
+    ('contraction_mm', 'contraction'), ('Störkraft [N]', 'external_force'),
+    ('muscle pull force [N]', 'force'),
+    ('setpoint [V]', 'ppr_voltage'), ('regulator command [V]', 'ppr_voltage'),
+    ('Force de traction [N]', 'force'), ('Tension de commande [V]', 'ppr_voltage'),
+    ("Pression d'alimentation [bar]", 'supply_pressure'), ('Course [mm]', 'contraction'),
+    ('Pressione del muscolo [bar]', 'pressure'), ('Tensione di comando [V]', 'ppr_voltage'),
+    ('Fuerza de tracción [N]', 'force'), ('Señal de mando [V]', 'ppr_voltage'),
+    ('Kniewinkel [°]', 'angle')])
+def test_compound_words_and_units_say_what_a_column_is(column, signal):
+    assert of_words(words_of(column), '', unit_in(column)).name == signal
+
+
+@pytest.mark.parametrize('word', [
+    'contraction', 'traction', 'compression', 'expression', 'composition', 'flange', 'stopsignal',
+    'tension', 'displacement', 'setpoint', 'ballast', 'readposition'])
+def test_an_english_word_is_no_compound(word):
+    assert words_of(f'{word}_mm') in (word, {'traction': 'pull'}.get(word))
+
+
+@pytest.mark.parametrize('column', [
+    'Federkraft [N]', 'spring force [N]', 'Luftdruck [hPa]', 'ambient pressure [bar]',
+    'Sensorspannung [V]', 'Referenzspannung [V]', 'Versorgungsspannung [V]', 'Muskelspannung [mV]',
+    'Regler Istwert [V]', 'Druckregler [bar]', 'Kraft Weg [N]', 'Sollwert', 'Temperatur [°C]',
+    'Muskellänge [mm]', 'github', 'Spannung 1 [V]', 'Stellgröße [%]'])
+def test_what_may_be_of_something_else_is_not_taken_for_a_signal(column):
+    assert of_words(words_of(column), '', unit_in(column)) is None
+
+
+def test_a_table_of_a_german_lab_is_read_by_its_names():
+    columns = {name: pd.Series(values) for name, values in (
+        ('Zeit [s]', 0.01 * STAMP_NS), ('Sollwert Regler [V]', np.repeat([0.0, 6.0, 8.0], 20)),
+        ('Muskeldruck [bar]', 1e-5 * (PRESSURE_PA - P_ATM_PA)),
+        ('Absolutdruck Versorgung [bar]', 6.0 + 0.01 * STAMP_NS),
+        ('Zugkraft [N]', 40.0 + STAMP_NS), ('Federkraft [N]', 9.0 + STAMP_NS))}
+    found = guess([Table('m.csv', columns)], TableMapping())
+    assert not found.questions
+    assert {name: (one.column, one.unit.name) for name, one in found.mapping.signals.items()} == {
+        'ppr_voltage': ('Sollwert Regler [V]', 'V'), 'force': ('Zugkraft [N]', 'N'),
+        'pressure': ('Muskeldruck [bar]', 'bar_gauge'),
+        'supply_pressure': ('Absolutdruck Versorgung [bar]', 'bar_abs')}
+
+
+def test_advice_pairs_a_column_with_a_signal_of_its_unit():
+    columns = {'A [V]': np.arange(9.0), 'B [N]': np.arange(9.0), 'C [mm]': np.arange(9.0),
+               'D [psi]': np.arange(9.0), 'E [MPa]': 0.2 + np.arange(9.0)}
+    tables = [Table('m.csv', {name: pd.Series(values) for name, values in columns.items()})]
+    assert how_to_begin(tables, Guess(TableMapping())) == (
+        '--map pressure="D [psi]:psi_gauge" --map contraction="C [mm]:mm" --map force="B [N]:N"')
+    del tables[0].columns['D [psi]']
+    assert '"E [MPa]:MPa_gauge" (or MPa_abs)' in how_to_begin(tables, Guess(TableMapping()))
+    only = [Table('m.csv', {'A [V]': pd.Series(np.arange(9.0))})]
+    assert how_to_begin(only, Guess(TableMapping())) == '--map SIGNAL="COLUMN:UNIT"'
+
+
+def test_a_column_that_may_be_a_signal_is_told(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    rows = ''.join(f'{0.01 * k:.2f},{k % 9},{40 + k % 7},{k % 5}\n' for k in range(200))
+    (tmp_path / 'a.csv').write_text(f't_s,x_mm,Federkraft [N],rest [m2]\n{rows}')
+    option = '--map force="Federkraft [N]:N"'
+    for more in (['--preview'], ['--out', 'bag']):
+        assert main(['import', 'a.csv', *more]) == 0
+        assert option in capsys.readouterr().out
+    assert main(['import', 'a.csv', '--preview', '--map', 'force=rest [m2]:N']) == 0
+    assert option not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize('column', [
+    'Tijd (s)', 'Messzeit_s', 'Zeitstempel [s]', 'Zeit_ms', '時間[s]', 'Čas (s)', '시간'])
 def test_the_time_in_the_language_of_the_lab(column):
     assert re.fullmatch(TIME_WORDS, words_of(column))
 
