@@ -156,12 +156,15 @@ def _move(bar: Any, done: int, share: float) -> None:
 
 def _asked(text: str, answers: tuple[str, ...]) -> str | None:
     """Ask a person; return the answer, None to leave the column out."""
-    print(f'{text}\n  one of: {", ".join(answers)}; Enter leaves the column out')
+    import re
+    zero = re.compile('zero=[^:]*')
+    more = ', where the zero may be another' if any(map(zero.search, answers)) else ''
+    print(f'{text}\n  one of: {", ".join(answers)}{more}; Enter leaves the column out')
     while True:
         said = input('> ').strip()
         if not said:
             return None
-        if said in answers:
+        if zero.sub('', said) in [zero.sub('', one) for one in answers]:
             return said
         print(f'  {said!r} is not one of them')
 

@@ -19,8 +19,9 @@ from dataclasses import dataclass, field, replace
 import re
 
 import numpy as np
+from pam_actuation.tables.lengths import length_column, LengthColumn
 from pam_actuation.tables.mapping import column_of_text, ColumnMap, TableMapping
-from pam_actuation.tables.parts import kind_of_pressure
+from pam_actuation.tables.parts import is_length_of_muscle, kind_of_pressure
 from pam_actuation.tables.signals import (
     ANGLES, are_of_joint, BY_NAME, of_words, Signal, TIME_WORDS)
 from pam_actuation.tables.table import Table
@@ -49,7 +50,8 @@ class Question:
     text : str
         The question, in one sentence.
     answers : tuple of str
-        Units among which to choose; of several columns ``COLUMN:UNIT``.
+        Units among which to choose, as after the column in ``--map``; of several columns
+        ``COLUMN:UNIT``.
 
     """
 
@@ -133,7 +135,35 @@ def guess(tables: Collection[Table], mapping: TableMapping,
         else:
             signals[name], found.told[name] = chosen
     found.mapping = replace(mapping, signals=signals)
+    if not joint and 'contraction' not in {*signals, *seen}:
+        found.questions += _of_lengths(tables, found.mapping, missing)
     return found
+
+
+def _of_lengths(tables: Collection[Table], mapping: TableMapping, missing: Collection[str]
+                ) -> list[Question]:
+    """Return a question where the length of the muscle stands in place of its contraction."""
+    used = {(id(table), table.name_of(one.column)) for table in tables
+            for one in mapping.signals.values()}
+    lengths: dict[str, LengthColumn] = {}
+    for table in tables:
+        for column in table.columns:
+            words = words_of(_name_of(table, column).rpartition('/')[2])
+            if (id(table), column) in used or not is_length_of_muscle(words) or (
+                    table.begins_with_text(column)):
+                continue
+            one = length_column(
+                column, table.numbers(column, missing), unit_of_column(table, column))
+            if one is not None and (column not in lengths or one.high > lengths[column].high):
+                lengths[column] = one
+    if len(lengths) > 1:
+        names = ' and '.join(f'"{column}"' for column in lengths)
+        text = (f'columns {names} could each be the length of the muscle: which one, and is the '
+                'zero, its length at rest, the largest length seen (a guess to be checked)?')
+        return [Question('contraction', '', text, tuple(
+            f'{column}:{answer}' for column, one in lengths.items() for answer in one.answers))]
+    return [Question('contraction', column, one.question, one.answers)
+            for column, one in lengths.items()]
 
 
 def _chosen(name: str, candidates: dict[str, tuple[ColumnMap, str] | Question]
@@ -165,14 +195,11 @@ def ask(found: Guess, answer: Callable[[str, tuple[str, ...]], str | None]) -> G
     """
     signals, told = dict(found.mapping.signals), dict(found.told)
     for question in found.questions:
-        unit = answer(question.text, question.answers)
-        if unit and not question.column:
-            signals[question.signal] = column_of_text(question.signal, unit, 'the answer')
-            told[question.signal] = 'as answered'
-            continue
-        chosen = unit_of_text(unit, BY_NAME[question.signal].quantity) if unit else None
-        if chosen is not None:
-            signals[question.signal] = ColumnMap(question.column, chosen, where='the answer')
+        said = answer(question.text, question.answers)
+        if said:
+            column = f'{question.column}:' if question.column else ''
+            signals[question.signal] = column_of_text(
+                question.signal, f'{column}{said}', 'the answer')
             told[question.signal] = 'as answered'
     return Guess(replace(found.mapping, signals=signals), told)
 

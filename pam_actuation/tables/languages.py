@@ -73,8 +73,9 @@ _WORDS = {
 }
 # What stands in front in a compound word only, as `soll` in `Solldruck`.
 _FRONTS = {
-    'soll': 'soll', 'actual': 'ist', 'measured': 'mess meet', 'command': 'stell steuer stuur',
-    'control': 'regel', 'supply': 'speise netz speicher tank zuluft', 'external': 'stör',
+    'soll': 'soll', 'actual': 'ist', 'measured': 'mess meet', 'command': 'stell',
+    'control': 'regel steuer stuur', 'supply': 'speise netz speicher tank zuluft',
+    'external': 'stör',
     'cable': 'seil', 'axial': 'axial', 'load': 'last', 'chamber': 'kammer', 'sensor': 'sensor',
     'proportional': 'proportional', 'inner': 'innen', 'line': 'leitung', 'inlet': 'eingang',
 }

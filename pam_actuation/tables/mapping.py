@@ -94,12 +94,21 @@ class ColumnMap:
             entry['missing'] = self.missing
         return entry
 
+    @property
+    def numbers(self) -> tuple[str, ...]:
+        """Return zero, gain and missing as ``zero=200``, those that differ from the usual."""
+        found = [f'zero={self.zero:g}'] if self.zero else []
+        found += [f'gain={self.gain:g}'] if self.gain != 1.0 else []
+        return (*found, *([f'missing={self.missing:g}'] if self.missing is not None else []))
+
+    @property
+    def words(self) -> str:
+        """Return what stands after the column in ``--map``: ``mm:zero=200:gain=-1``."""
+        return ':'.join([self.unit.name, *self.numbers])
+
     def option(self, name: str) -> str:
         """Return the words of the command line that say the same."""
-        more = (f':zero={self.zero:g}' if self.zero else '') + (
-            f':gain={self.gain:g}' if self.gain != 1.0 else '') + (
-            f':missing={self.missing:g}' if self.missing is not None else '')
-        return f'--map {name}="{self.column}:{self.unit.name}{more}"'
+        return f'--map {name}="{self.column}:{self.words}"'
 
 
 @dataclass(frozen=True)

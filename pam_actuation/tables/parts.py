@@ -106,6 +106,8 @@ def _chosen(quantity: str, rest: set[str], wanted: bool) -> str:
     actual, other = bool(rest & _ACTUAL), bool(rest & (_SUPPLY | _EXTERNAL))
     if wanted and (actual or other):
         return ''
+    if quantity != VOLTAGE and rest & {'control', 'ctrl'}:
+        return ''                   # of a pilot, wanted, or what is controlled
     if quantity == VOLTAGE:         # that of a sensor, an electrode or a converter is none
         is_told = bool(rest & (_WANTED | _REGULATOR) - {'reference', 'ref'})
         return 'ppr_voltage' if not rest or is_told and not actual else ''

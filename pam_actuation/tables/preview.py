@@ -20,12 +20,14 @@ import re
 import numpy as np
 from pam_actuation.tables.clock import time_column
 from pam_actuation.tables.guess import falls_below_atmosphere, Guess, unit_of_column
+from pam_actuation.tables.lengths import length_column
 from pam_actuation.tables.mapping import usual_unit
 from pam_actuation.tables.parts import likely_signals
 from pam_actuation.tables.signals import BY_NAME
 from pam_actuation.tables.table import Table
 from pam_actuation.tables.units import ABSOLUTE, GAUGE, unit_of_text, VOLTAGE
 from pam_actuation.tables.words import words_of
+from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 
 _MOST_COLUMNS = 60
@@ -132,14 +134,16 @@ def _option(table: Table, column: str, signal: str) -> str:
     """Return how a column is mapped to a signal, in the unit that the file states for it."""
     text, quantity = unit_of_column(table, column), BY_NAME[signal].quantity
     unit = unit_of_text(text, quantity) if text else None
+    finite = _finite(table, column)
+    length = length_column(column, finite, text) if signal == 'contraction' else None
+    if length is not None:
+        return length.maps[0].option(signal)
     if unit is None:
         more = f':zero=4:gain={_EXAMPLES[signal][1]:g}' if text == 'mA' else ''
         return f'--map {signal}="{column}:{usual_unit(quantity)}{more}"'
     if unit.is_complete:
         return f'--map {signal}="{column}:{unit.name}"'
-    lowest, *_ = _facts(table, column, ())
-    is_gauge = bool(lowest) and lowest != 'no number' and falls_below_atmosphere(
-        np.array([float(lowest)]), unit).any()
+    is_gauge = falls_below_atmosphere(finite, unit).any()
     other = '' if is_gauge else f' (or {unit.name}_{ABSOLUTE})'
     return f'--map {signal}="{column}:{unit.name}_{GAUGE}"{other}'
 
@@ -178,3 +182,12 @@ def _facts(table: Table, name: str, missing: Collection[str]) -> tuple[str, str,
     if not len(finite):
         return 'no number', '', first
     return f'{finite.min():.6g}', f'{finite.max():.6g}', first
+
+
+def _finite(table: Table, name: str) -> FloatArray:
+    """Return the numbers of a column, none for one of texts."""
+    try:
+        values = table.numbers(name)
+    except InputError:
+        return np.empty(0)
+    return values[np.isfinite(values)]

@@ -107,6 +107,12 @@ class Table:
             return f'{self.source}, {self.topic}, message {row + 1}'
         return f'{self.source}, row {row + 1}'
 
+    def begins_with_text(self, name: str) -> bool:
+        """Return whether the first value of a column is no number."""
+        first = self.columns[name].iloc[0] if len(self) else ''
+        return isinstance(first, str) and bool(first.strip()) and (
+            _number(str(self._pointed(first))) is None)
+
     def numbers(self, name: str, missing: Collection[str] = ()) -> FloatArray:
         """
         Return a column as float64, shape (rows,); NaN where it is empty or says ``missing``.

@@ -17,6 +17,7 @@
 import re
 
 import numpy as np
+from pam_actuation.bags.load import load_run
 from pam_actuation.cli.main import main
 from pam_actuation.tables.guess import Guess, guess
 from pam_actuation.tables.mapping import column_of_text, TableMapping
@@ -108,6 +109,8 @@ def test_advice_pairs_a_column_with_a_signal_of_its_unit():
     assert how_to_begin(tables, Guess(TableMapping())) == (
         '--map pressure="D [psi]:psi_gauge" --map contraction="C [mm]:mm" --map force="B [N]:N"')
     del tables[0].columns['D [psi]']
+    tables[0].columns['C [mm]'] = pd.Series(250.0 + np.arange(9.0))
+    assert '"C [mm]:mm:zero=258:gain=-1"' in how_to_begin(tables, Guess(TableMapping()))
     assert '"E [MPa]:MPa_gauge" (or MPa_abs)' in how_to_begin(tables, Guess(TableMapping()))
     only = [Table('m.csv', {'A [V]': pd.Series(np.arange(9.0))})]
     assert how_to_begin(only, Guess(TableMapping())) == '--map SIGNAL="COLUMN:UNIT"'
@@ -123,6 +126,56 @@ def test_a_column_that_may_be_a_signal_is_told(tmp_path, monkeypatch, capsys):
         assert option in capsys.readouterr().out
     assert main(['import', 'a.csv', '--preview', '--map', 'force=rest [m2]:N']) == 0
     assert option not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize('column, values, answers', [
+    ('Laenge_mm', 200.0 - 1e3 * SHORTENED_M, ['mm:zero=200:gain=-1']),
+    ('Länge [mm]', 200.0 - 1e3 * SHORTENED_M, ['mm:zero=200:gain=-1']),
+    ('L_mm', 300.2 - 1e3 * SHORTENED_M, ['mm:zero=300.2:gain=-1']),
+    ('muscle length [m]', 0.3 - SHORTENED_M, ['m:zero=0.3:gain=-1']),
+    ('Longueur du muscle (cm)', 25.0 - 1e2 * SHORTENED_M, ['cm:zero=25:gain=-1']),
+    ('length', 200.0 - 1e3 * SHORTENED_M, ['mm:zero=200:gain=-1']),
+    ('length', 0.2 - SHORTENED_M, ['m:zero=0.2:gain=-1']),
+    ('Länge [mm]', 1e3 * SHORTENED_M, []), ('Länge [mm]', 0.0 * SHORTENED_M + 200.0, []),
+    ('Länge [mm]', 5e3 - 1e3 * SHORTENED_M, []), ('Länge [V]', 5.0 - SHORTENED_M, []),
+    ('hose length [mm]', 200.0 - 1e3 * SHORTENED_M, []),
+    ('L', np.array(['left', 'right'] * 30), [])])
+def test_a_length_in_place_of_the_contraction_is_asked_for(column, values, answers):
+    tables = [Table('m.csv', {
+        'p_bar': pd.Series(1e-5 * (PRESSURE_PA - P_ATM_PA)), column: pd.Series(values)})]
+    found = guess(tables, TableMapping())
+    assert [list(one.answers) for one in found.questions] == ([answers] if answers else [])
+    assert all(one.signal == 'contraction' and one.column == column and 'guess' in one.text
+               for one in found.questions)
+    tables[0].columns['x_mm'] = pd.Series(1e3 * SHORTENED_M)
+    assert not guess(tables, TableMapping()).questions
+
+
+def test_two_lengths_are_asked_for_together_and_a_mapped_one_is_not():
+    lengths = pd.Series(200.0 - 1e3 * SHORTENED_M)
+    tables = [Table('m.csv', {'L_mm': lengths, 'length_mm': lengths - 3.0})]
+    question, = guess(tables, TableMapping()).questions
+    assert question.answers == ('L_mm:mm:zero=200:gain=-1', 'length_mm:mm:zero=197:gain=-1')
+    mapping = TableMapping().with_options(['contraction=L_mm:mm:zero=201:gain=-1'])
+    assert not guess(tables, mapping).questions
+
+
+def test_a_table_with_a_length_is_refused_or_asked(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    rows = ''.join(f'{0.01 * k:.2f};{k % 9 / 3:.2f};{200 - k % 9}\n' for k in range(200))
+    (tmp_path / 'a.csv').write_text(f'Zeit_s;Druck_bar;Länge [mm]\n{rows}', encoding='utf-8')
+    option = '--map contraction="Länge [mm]:mm:zero=200:gain=-1"'
+    assert main(['import', 'a.csv', '--preview']) == 0
+    assert option in capsys.readouterr().out
+    assert main(['import', 'a.csv', '--out', 'bag']) == 2
+    assert option in capsys.readouterr().err and not (tmp_path / 'bag').exists()
+    for stream in ('stdin', 'stdout'):
+        monkeypatch.setattr(f'sys.{stream}.isatty', lambda: True)
+    answers = iter(['m:zero=201:gain=-1', 'mm:zero=201:gain=-1'])
+    monkeypatch.setattr('builtins.input', lambda _: next(answers))
+    assert main(['import', 'a.csv', '--out', 'bag']) == 0
+    assert 'where the zero may be another' in capsys.readouterr().out
+    assert load_run('bag')['contraction']['contraction_m'][0] == pytest.approx(1e-3)
 
 
 @pytest.mark.parametrize('column', [
