@@ -198,7 +198,7 @@ def _tell(args: argparse.Namespace, recording: 'Recording', found: 'Guess',
     lines += [f'  {text}' for text in recording.told]
     for name, one in found.mapping.signals.items():
         stamps, _ = recording.signals.get(name, ((), ()))
-        lines.append(f'  {name}: column "{one.column}" in {one.unit.name} '
+        lines.append(f'  {name}: column "{one.column}" in {one.reading} '
                      f'({found.told.get(name, "as stated")}), {len(stamps)} values')
     if left:
         lines.append('  not imported: ' + ', '.join(f'"{column}"' for column in left[:_MOST_LEFT])

@@ -102,6 +102,11 @@ class ColumnMap:
         return (*found, *([f'missing={self.missing:g}'] if self.missing is not None else []))
 
     @property
+    def reading(self) -> str:
+        """Return how its numbers are taken, for people: ``mm, zero=200, gain=-1``."""
+        return ', '.join([self.unit.name, *self.numbers])
+
+    @property
     def words(self) -> str:
         """Return what stands after the column in ``--map``: ``mm:zero=200:gain=-1``."""
         return ':'.join([self.unit.name, *self.numbers])

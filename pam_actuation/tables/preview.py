@@ -164,7 +164,7 @@ def _meaning(table: Table, found: Guess) -> dict[str, str]:
     for name, one in found.mapping.signals.items():
         column = table.name_of(one.column)
         if column is not None:
-            meant[column] = f'{name} in {one.unit.name} ({found.told.get(name, "as stated")})'
+            meant[column] = f'{name} in {one.reading} ({found.told.get(name, "as stated")})'
     for question in found.questions:
         if table.name_of(question.column) is not None:
             meant[question.column] = f'{question.signal}? ({BY_NAME[question.signal].meaning})'

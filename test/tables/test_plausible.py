@@ -174,7 +174,13 @@ def test_a_table_with_a_length_is_refused_or_asked(tmp_path, monkeypatch, capsys
     answers = iter(['m:zero=201:gain=-1', 'mm:zero=201:gain=-1'])
     monkeypatch.setattr('builtins.input', lambda _: next(answers))
     assert main(['import', 'a.csv', '--out', 'bag']) == 0
-    assert 'where the zero may be another' in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert 'where the zero may be another' in said
+    assert 'contraction: column "Länge [mm]" in mm, zero=201, gain=-1 (as answered)' in said
+    mapped = 'contraction=Länge [mm]:mm:zero=202:gain=-1:missing=0'
+    assert main(['import', 'a.csv', '--preview', '--map', mapped]) == 0
+    said = capsys.readouterr().out
+    assert 'contraction in mm, zero=202, gain=-1, missing=0 (as stated)' in said
     assert load_run('bag')['contraction']['contraction_m'][0] == pytest.approx(1e-3)
 
 
