@@ -32,6 +32,7 @@ HELP = """Make a bag of a table measured elsewhere: CSV, Excel, LabVIEW, MAT, or
 
 Without --map the columns are found by name, unit and range; --preview shows how. What the file
 cannot tell is asked for. Several files are one recording: the next part, or other signals."""
+RIG_FILE = 'my_rig.yaml'            # that pam rig new writes
 _MOST_LEFT = 12                     # names of columns that are told
 EXAMPLE = 'pam import run7.csv --map pressure="p_bar:bar_gauge" --out runs/run7'
 
@@ -117,7 +118,7 @@ def run(args: argparse.Namespace) -> int:
     if args.save_mapping:
         write_text(args.save_mapping, found.mapping.to_yaml())
     _tell(args, recording, found, counts, out, unread(tables, found),
-          may_be_signals(tables, found))
+          may_be_signals(tables, found), _following(recording, out, args.rig, model))
     return EXIT_FINDING if recording.found else EXIT_DONE
 
 
@@ -191,8 +192,25 @@ def _show(args: argparse.Namespace, tables: 'list[Table]', found: 'Guess') -> in
     return EXIT_DONE
 
 
+def _following(recording: 'Recording', out: str, rig: str | None, model: Any) -> str:
+    """Return the command that comes next: what a model of the rig makes of the recording."""
+    import os
+    known = recording.signals.keys()
+    if recording.is_of_joint:
+        return f'pam gap {out} --model {rig} --out gap' if rig else f'pam report {out}'
+    if 'pressure' not in known or not {'contraction', 'force'} & known:
+        return f'pam report {out}'
+    file = rig or RIG_FILE
+    ways = [f'pam identify {out} --rig {file}', f'pam gap {out} --model {file} --out gap']
+    if model is not None and not getattr(model, 'unknown', ()):     # nothing to be identified
+        del ways[0]
+    first = '' if rig or os.path.isfile(file) else f'pam rig new, which writes {file}; then '
+    return first + ', or '.join(ways)
+
+
 def _tell(args: argparse.Namespace, recording: 'Recording', found: 'Guess',
-          counts: dict[str, int], out: str, left: list[str], likely: list[str]) -> None:
+          counts: dict[str, int], out: str, left: list[str], likely: list[str],
+          following: str) -> None:
     remarks = [one.sentence for one in recording.found]
     lines = [f'imported {recording.duration_s:.4g} s from {", ".join(recording.sources)}']
     lines += [f'  {text}' for text in recording.told]
@@ -210,9 +228,9 @@ def _tell(args: argparse.Namespace, recording: 'Recording', found: 'Guess',
         lines.append('  no command of the valve: pam gap and pam identify compare muscle and '
                      'load, driven by the pressure')
     lines += [f'remark: {text}' for text in remarks]
-    lines += [f'bag: {out}', f'next: pam report {out}']
+    lines += [f'bag: {out}', f'next: {following}']
     payload: dict[str, Any] = {
-        'bag': out, 'duration_s': recording.duration_s, 'messages': counts,
+        'bag': out, 'next': following, 'duration_s': recording.duration_s, 'messages': counts,
         'valve': recording.valve, 'remarks': remarks, 'not_imported': left,
         'mapping': found.mapping.to_yaml()}
     emit(args, payload, '\n'.join(lines))

@@ -184,6 +184,27 @@ def test_a_table_with_a_length_is_refused_or_asked(tmp_path, monkeypatch, capsys
     assert load_run('bag')['contraction']['contraction_m'][0] == pytest.approx(1e-3)
 
 
+@pytest.mark.parametrize('columns, there, options, following', [
+    ('p_bar,x_mm', '', [], 'pam rig new, which writes my_rig.yaml; then pam identify bag --rig '
+     'my_rig.yaml, or pam gap bag --model my_rig.yaml --out gap'),
+    ('p_bar,F_N', 'my_rig.yaml', [], 'pam identify bag --rig my_rig.yaml, or pam gap bag --model '
+     'my_rig.yaml --out gap'),
+    ('p_bar,x_mm', 'a.yaml', ['--rig', 'a.yaml'], 'pam identify bag --rig a.yaml, or pam gap bag '
+     '--model a.yaml --out gap'),
+    ('p_bar,x_mm', '', ['--rig', 'dmsp_5_300_hanging_mass'],
+     'pam gap bag --model dmsp_5_300_hanging_mass --out gap'),
+    ('x_mm,F_N', '', [], 'pam report bag')])
+def test_what_comes_next_needs_the_file_of_the_rig(columns, there, options, following, tmp_path,
+                                                   monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    rows = ''.join(f'{0.01 * k:.2f},{k % 9 / 3:.2f},{1 + k % 7}\n' for k in range(200))
+    (tmp_path / 'a.csv').write_text(f't_s,{columns}\n{rows}')
+    if there:
+        assert main(['rig', 'new', '--unknown', 'mass_kg', '--out', there]) == 0
+    assert main(['import', 'a.csv', '--out', 'bag', *options]) in (0, 1)
+    assert f'next: {following}\n' in capsys.readouterr().out
+
+
 @pytest.mark.parametrize('column', [
     'Tijd (s)', 'Messzeit_s', 'Zeitstempel [s]', 'Zeit_ms', '時間[s]', 'Čas (s)', '시간'])
 def test_the_time_in_the_language_of_the_lab(column):
