@@ -15,13 +15,14 @@
 """The questions that describe a rig on a terminal: each with its default and its range."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TypeVar
 
 from pam_actuation.rig_files.description import Description
 from pam_actuation.rig_files.numbers import FORMS, read_range, read_stated
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.load import LOADS
-from pam_sim.muscle.muscle import DIMENSIONS, muscle_names
+from pam_sim.muscle.muscle import DIMENSIONS, get_muscle, Muscle, muscle_names
 from pam_sim.parameters import Parameter
 from pam_sim.sensors import SENSOR_PARAMETERS
 from pam_sim.valve import VALVES
@@ -58,6 +59,7 @@ def ask_description(ask: Ask, tell: Tell) -> Description:
                 f'[{one.default / factor:g}]: '), _scaled(one, factor))
     else:
         found.muscle = muscle
+        _length(ask, tell, found, get_muscle(muscle))
     found.load = _choice(ask, tell, 'load', tuple(LOADS), found.load)
     for parameter in LOADS[found.load].PARAMETERS:
         _stated(ask, tell, found, parameter.name)
@@ -74,6 +76,16 @@ def ask_description(ask: Ask, tell: Tell) -> Description:
             if value != parameter.default:
                 found.sensors[parameter.name] = value
     return found
+
+
+def _length(ask: Ask, tell: Tell, found: Description, like: Muscle) -> None:
+    """Ask for the length of a muscle of the list: it is sold in any length."""
+    one = next(p for p in DIMENSIONS if p.name == 'length_m')
+    length_m = _again(ask, tell, (
+        f'{one.description} {1e3 * one.lower:g} to {1e3 * one.upper:g} mm '
+        f'[{1e3 * like.length_m:g}]: '), _scaled(replace(one, default=like.length_m), 1e-3))
+    if length_m != like.length_m:
+        found.dimensions[one.name] = length_m
 
 
 def _regulator(ask: Ask, tell: Tell, found: Description) -> None:

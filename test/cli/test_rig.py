@@ -255,6 +255,24 @@ def test_questions_come_again_until_the_answer_is_possible():
     assert rig.sensors['pressure_noise_pa'] == 200.0 and text.startswith('# A rig')
 
 
+@pytest.mark.parametrize('answer, length_m, muscle', [
+    ('200', 0.2, '  length_m: 0.2\n'), ('', 0.3, 'muscle: dmsp_20_300\n'),
+    ('300', 0.3, 'muscle: dmsp_20_300\n')])
+def test_the_length_of_a_listed_muscle_is_asked_for(answer, length_m, muscle):
+    answers = iter(['dmsp_20_300', '5', answer])
+    asked, told = [], []
+
+    def reply(question):
+        asked.append(question)
+        return next(answers, '')
+    described = ask_description(reply, told.append)
+    described.work_out()
+    text, rig = rig_file(described, 'asked.yaml')
+    assert rig.muscle.length_m == length_m and rig.muscle.bore_m == 0.02 and muscle in text
+    assert sum('Length at rest' in one and '[300]' in one for one in asked) == 2
+    assert any('20 to 9000 mm' in one for one in asked) and any('0.02' in one for one in told)
+
+
 def test_a_terminal_is_asked_and_an_early_end_writes_nothing(folder):
     above, below = pty.openpty()
     process = subprocess.Popen(
