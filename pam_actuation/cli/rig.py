@@ -259,7 +259,8 @@ def _law_text(rig: 'Rig') -> list[str]:
     """Return a line on a force law that is taken as exact beside unknown numbers."""
     if rig.unknown_of_law or not (rig.unknown and rig.law_list):
         return []
-    return ['  force law: exact, that of another muscle; with --unknown law it is found as well']
+    return ['  force law: its shape is exact, that of another muscle; with --unknown law it is '
+            'found as well']
 
 
 def _inexact(rig: 'Rig') -> list[Any]:

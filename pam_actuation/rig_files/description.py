@@ -27,6 +27,7 @@ from pam_sim.rig_parameters import rig_parameters
 from pam_sim.tolerance import AbsoluteSd, Tolerance
 from pam_sim.valve.regulator_presets import get_regulator
 
+TYPE_TOLERANCE = 0.15        # of a force map of the type: muscles of a type differ by 10 to 20 %
 BY_BORE_TOLERANCE = 0.2      # of a force map taken from a muscle of another bore
 LAG_TOLERANCE = 0.5          # of the lag of a regulator that nobody stated
 DAMPING_TOLERANCE = 0.5      # of the damping of a muscle of another bore that nobody stated
@@ -98,6 +99,7 @@ class Description:
         if self.muscle is None:
             self.muscle = self._nearest()
         self._scale_force_map()
+        self._doubt_force_map()
         self._scale_damping()
         if self.valve == 'ppr':
             self._regulator()
@@ -130,6 +132,13 @@ class Description:
                              f'with the force map of {self.muscle}', '--bore-mm')
         self._add('force_map_gain', round(gain, 6), BY_BORE_TOLERANCE,
                   f'(bore / bore of {self.muscle})^2: a first guess, measure it')
+
+    def _doubt_force_map(self) -> None:
+        """State how well the force map of a type is known, unless its coefficients are unknown."""
+        name = 'force_map_gain'
+        if not (self.force_map or self.unknown_law or name in self.numbers):
+            self._add(name, 1.0, TYPE_TOLERANCE, 'of the type, not measured on this muscle: '
+                      'muscles of a type differ by 10 to 20 %')
 
     def _scale_damping(self) -> None:
         """Take the damping of the nominal muscle by cross-section, where the bore is another."""
