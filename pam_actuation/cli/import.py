@@ -86,6 +86,7 @@ def run(args: argparse.Namespace) -> int:
     from pam_actuation.bags.place import check_bag_target
     from pam_actuation.cli.common import check_outputs
     from pam_actuation.tables.importer import digest_of, recording_of, write_bag
+    from pam_actuation.tables.lengths import longest_at_rest
     from pam_actuation.tables.preview import may_be_signals, unread
     from pam_actuation.tables.repeats import without_repeats
     from pam_actuation.tables.resample import hint, resampled
@@ -102,7 +103,9 @@ def run(args: argparse.Namespace) -> int:
         return _show(args, tables, found)
     recording = recording_of(
         tables, found.mapping, sort=args.sort, missing=args.missing, accept=args.accept,
-        length_m=MUSCLE_LENGTH_M if rig is None else rig.muscle.length_m)
+        length_m=rig.muscle.length_m if rig is not None else longest_at_rest(
+            (one for name, one in found.mapping.signals.items()
+             if name.endswith('contraction')), MUSCLE_LENGTH_M))
     if args.begin_s > 0.0 or args.end_s < float('inf'):
         recording = recording.between(args.begin_s, args.end_s)
     recording = without_repeats(recording)

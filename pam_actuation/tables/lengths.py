@@ -14,6 +14,7 @@
 
 """A column of the muscle's length: the contraction is what it lacks of the length at rest."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -86,6 +87,12 @@ def length_column(column: str, values: FloatArray, unit_text: str) -> LengthColu
     maps = tuple(ColumnMap(column, unit, zero=float(f'{high:.4g}'), gain=-1.0)
                  for unit in fitting)
     return LengthColumn(column, low, high, maps) if maps else None
+
+
+def longest_at_rest(maps: Iterable[ColumnMap], usual_m: float) -> float:
+    """Return the largest length [m] that muscles may have: the usual one, or a zero stated."""
+    return max([usual_m, *(one.zero * one.unit.factor * -one.gain for one in maps
+                           if one.gain < 0.0)])
 
 
 def _fits(low: float, high: float, unit: Unit) -> bool:

@@ -184,6 +184,20 @@ def test_a_table_with_a_length_is_refused_or_asked(tmp_path, monkeypatch, capsys
     assert load_run('bag')['contraction']['contraction_m'][0] == pytest.approx(1e-3)
 
 
+def test_a_muscle_longer_than_usual_is_taken_as_the_question_says(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    shares = 0.5 - 0.5 * np.cos(np.arange(400) / 40.0)
+    rows = ''.join(f'{0.01 * k:.2f},{4.0 * share:.3f},{1234.4 - 250.0 * share:.1f}\n'
+                   for k, share in enumerate(shares))
+    (tmp_path / 'a.csv').write_text(f't_s,p_bar,L_mm\n{rows}')
+    assert main(['import', 'a.csv', '--out', 'bag']) == 2
+    option = 'contraction=L_mm:mm:zero=1234:gain=-1'
+    assert option.partition('=')[2] in capsys.readouterr().err
+    assert main(['import', 'a.csv', '--out', 'bag', '--map', option]) == 0
+    assert load_run('bag')['contraction']['contraction_m'].max() == pytest.approx(
+        0.2496, abs=1e-4)
+
+
 @pytest.mark.parametrize('columns, there, options, following', [
     ('p_bar,x_mm', '', [], 'pam rig new, which writes my_rig.yaml; then pam identify bag --rig '
      'my_rig.yaml, or pam gap bag --model my_rig.yaml --out gap'),
