@@ -69,7 +69,7 @@ def page(result: 'Identification', runs: 'Sequence[Run]') -> str:
     known = len(result.found) - len(result.open_names)
     lead = f'{known} of {len(result.found)} unknown numbers are determined by these recordings.'
     body = table(('number', 'status', 'value', '95 % interval'),
-                 [(one.number.name, one.status, *one.shown()) for one in result.found])
+                 [(one.number.name, one.verdict, *one.shown()) for one in result.found])
     body += ''.join(paragraph(f'Known together: {c.text()}.') for c in result.combinations)
     body += ''.join(paragraph(f'{remark}.', 'note') for remark in result.remarks)
     if result.next_experiment is not None:

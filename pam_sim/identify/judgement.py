@@ -28,6 +28,9 @@ from pam_sim.identify.profile import Interval
 DETERMINED, TOGETHER, UNDETERMINED = 'determined', 'only together', 'not determined'
 # Ratio of the ends of an interval; or its share of the range of a zero, or of a small size.
 NARROW_RATIO, NARROW_SHARE, NARROW_SHARE_OF_SMALL = 1.5, 0.02, 0.2
+# How near to an end of its range a value is at that end, in distances to the other end of its
+# interval.
+NEAR_EDGE = 0.05
 KNOWN = 0.5                  # standard deviation of what is worth telling, in coordinates
 ROUND = 0.03                 # how near to a whole number a power is one
 GENTLE = 1e-12
@@ -75,6 +78,21 @@ def is_narrow(number: Number, low: float, high: float) -> bool:
         return False
     return high - low <= (NARROW_SHARE_OF_SMALL * number.small if number.is_size
                           else NARROW_SHARE * (number.upper - number.lower))
+
+
+def is_at_edge(number: Number, value: float, interval: Interval) -> bool:
+    """
+    Tell whether the fit ends at an end of the allowed range, and would perhaps go on beyond it.
+
+    A size of 0 is none: there is nothing below. Where the interval is open at both ends, the
+    recordings say nothing, and the value lies anywhere.
+    """
+    if not number.unknown or interval.open_low == interval.open_high:
+        return False
+    at, low, high = (number.coordinate(v) for v in (value, interval.low, interval.high))
+    if interval.open_high:
+        return number.coordinate(number.upper) - at <= NEAR_EDGE * (at - low)
+    return not number.is_size and at - number.coordinate(number.lower) <= NEAR_EDGE * (high - at)
 
 
 def judge(numbers: Sequence[Number], intervals: Sequence[Interval], x: FloatArray,

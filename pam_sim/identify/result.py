@@ -17,7 +17,7 @@
 from dataclasses import dataclass, field
 from typing import Any
 
-from pam_sim.identify.judgement import Combination, DETERMINED
+from pam_sim.identify.judgement import Combination, DETERMINED, is_narrow
 from pam_sim.identify.numbers import Number
 from pam_sim.identify.profile import Interval
 from pam_sim.rig import Rig
@@ -27,6 +27,7 @@ from pam_sim.units import behind_number
 # For people: factor from SI and unit.
 READABLE = {'Pa': (1e-3, 'kPa'), 'Pa/V': (1e-3, 'kPa/V'), 'm': (1e3, 'mm'), 's': (1e3, 'ms'),
             'N/m': (1e-3, 'N/mm')}
+AT_EDGE = 'at the edge'
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,9 @@ class Found:
         95 %.
     status : str
         ``determined``, ``only together`` or ``not determined``.
+    at_edge : bool
+        Whether the value lies at an end of its allowed range. It is then not determined, however
+        short the interval.
 
     """
 
@@ -50,12 +54,24 @@ class Found:
     value: float
     interval: Interval
     status: str
+    at_edge: bool = False
+
+    @property
+    def is_narrow(self) -> bool:
+        """Tell whether the interval is short: more recordings of this kind tell little more."""
+        return is_narrow(self.number, self.interval.low, self.interval.high)
+
+    @property
+    def verdict(self) -> str:
+        """Return the status in words for people."""
+        return AT_EDGE if self.at_edge and self.is_narrow else self.status
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data; an open end of the interval is null."""
         n, i = self.number, self.interval
         return {'name': n.name, 'effect': n.effect or None, 'parameter': n.parameter,
                 'unit': n.unit, 'status': self.status, 'value': self.value,
+                'at_edge': self.at_edge,
                 'ci95': [None if i.open_low else i.low, None if i.open_high else i.high],
                 'allowed': [n.lower, n.upper],
                 'profile': [{'value': v, 'rise': r} for v, r in i.points]}
@@ -74,8 +90,16 @@ class Found:
         """Return it as a line."""
         value, span = self.shown()
         is_open = self.interval.open_low and self.interval.open_high
-        return (f'{self.number.name:24} {self.status:15} {value} '
+        return (f'{self.number.name:24} {self.verdict:15} {value} '
                 f'({span if is_open else f"95 %: {span}"})')
+
+    def edge(self) -> str:
+        """Return a sentence on a value at an end of its allowed range."""
+        factor, unit = READABLE.get(self.number.unit, (1.0, self.number.unit))
+        other = 'another law' if self.number.of_law else 'another model'
+        return (f'{self.number.name}: at the edge of its allowed range '
+                f'({factor * self.number.lower:.4g} to {factor * self.number.upper:.4g}'
+                f'{behind_number(unit)}): {other} or a wider range may fit better')
 
 
 @short_repr

@@ -30,7 +30,8 @@ from pam_sim.gap.verify.uncertainty import NORMAL_95
 from pam_sim.identify.advice import next_experiment, where_open
 from pam_sim.identify.fit import fit, NOWHERE, Weighted
 from pam_sim.identify.inputs import noise_beyond
-from pam_sim.identify.judgement import Combination, DETERMINED, judge
+from pam_sim.identify.judgement import (
+    Combination, DETERMINED, is_at_edge, judge, UNDETERMINED)
 from pam_sim.identify.numbers import (
     known_numbers_of, Number, unknown_numbers, with_values)
 from pam_sim.identify.possible import (
@@ -161,6 +162,7 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
         _signals(before, _rms(squares)), incomplete, bent=bent)
     result.remarks += remarks + ([] if force_compared else _of_one_scale(acting))
     result.remarks += _starting_values(left, [name for name in starting if name not in at_rest])
+    result.remarks += [one.edge() for one in numbers_found if one.at_edge]
     result.remarks += _of_another_law(rig, left)
     result.remarks += [f'{name}: from the holds, where the regulator has settled; no effect of '
                        'the library explains its edges' for name in at_rest]
@@ -170,10 +172,12 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
     result.remarks += [
         f'{n.name}: nothing in these recordings depends on it; {_what_shows(n)}'
         for n in wanted if n not in acting]
-    if advise and (result.open_names or len(acting) < len(wanted)):
+    # What ends at the edge of its range needs another model rather than another recording.
+    if advise and (any(not one.is_narrow for one in numbers_found) or len(acting) < len(wanted)):
         with_force = any('force' in one.recording.signals for one in offers)
         x, information = where_open(acting, [one.interval for one in first],
-                                    [one.status for one in first], x, information)
+                                    [DETERMINED if one.is_narrow else one.status
+                                     for one in first], x, information)
         result.next_experiment = next_experiment(
             with_values(rig, numbers, weighted.values(x)), wanted, acting, information,
             offers, with_force)
@@ -202,8 +206,9 @@ def _judged(weighted: Weighted, x: FloatArray, acting: Sequence[Number], forms: 
     information = np.linalg.inv(
         covariance[:count, :count] + noise + np.diag((forms / NORMAL_95) ** 2))
     statuses, combinations = judge(acting, intervals, x[:count], information)
-    found = [Found(n, n.value(float(c)), i, s)
-             for n, c, i, s in zip(acting, x, intervals, statuses)]
+    edges = [is_at_edge(n, n.value(float(c)), i) for n, c, i in zip(acting, x, intervals)]
+    found = [Found(n, n.value(float(c)), i, UNDETERMINED if edge and s == DETERMINED else s, edge)
+             for n, c, i, s, edge in zip(acting, x, intervals, statuses, edges)]
     return x, information, found, combinations
 
 

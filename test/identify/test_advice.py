@@ -17,13 +17,13 @@
 from made_records import RIG
 import numpy as np
 from pam_sim.identify.advice import where_open
-from pam_sim.identify.judgement import DETERMINED, TOGETHER, UNDETERMINED
+from pam_sim.identify.judgement import DETERMINED, is_at_edge, TOGETHER, UNDETERMINED
 from pam_sim.identify.numbers import unknown_numbers
 from pam_sim.identify.profile import Interval
 from pam_sim.identify.result import Found
 import pytest
 
-MASS, MAP = unknown_numbers(RIG, ['mass_kg', 'force_map_gain'])
+MASS, MAP, SPRING = unknown_numbers(RIG, ['mass_kg', 'force_map_gain', 'spring_n_per_m'])
 LIFTS, GAIN = 0.3, 1.1
 
 
@@ -51,3 +51,15 @@ def test_a_load_that_is_about_to_lift_tells_nothing_of_its_mass(status, low, hig
 def test_an_interval_that_is_open_at_an_end_is_told_as_such(ends, said):
     assert Found(MASS, 2.0, Interval(1.0, 3.0, *ends, ()), DETERMINED).text().endswith(
         f'2 kg ({said})')
+
+
+@pytest.mark.parametrize('number, value, interval, there', [
+    (MAP, MAP.upper, (4.0, 5.0, False, True), True),
+    (MAP, MAP.lower, (0.2, 0.25, True, False), True),
+    (MAP, 4.7, (4.0, 5.0, False, True), False),         # the recordings rule out nothing above
+    (MAP, MAP.upper, (4.0, 5.0, False, False), False),
+    (MAP, MAP.upper, (0.2, 5.0, True, True), False),    # they say nothing at all
+    (SPRING, SPRING.upper, (9e5, 1e6, False, True), True),
+    (SPRING, 0.0, (0.0, 20.0, True, False), False)])    # there is no spring, and none below
+def test_a_value_at_an_end_of_its_range_is_seen(number, value, interval, there):
+    assert is_at_edge(number, value, Interval(*interval, ())) is there

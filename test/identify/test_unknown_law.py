@@ -19,6 +19,7 @@ from types import SimpleNamespace
 
 from made_records import inside, record, RIG
 import numpy as np
+from pam_actuation.report.identify import page
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.identify import identify, workflow
@@ -39,6 +40,28 @@ def test_a_coefficient_is_found_from_the_force():
     assert inside(found['law.a5_n_per_pa'], true)
     assert found['law.a5_n_per_pa'].status == 'determined'
     assert found.rig.unknown == () and found.rig.prior_sd('law.a5_n_per_pa') < 0.02 * true
+
+
+def test_a_coefficient_at_the_edge_of_its_range_is_not_called_determined():
+    """The true one lies outside the factor of two, so the fit ends where the range does."""
+    name = 'law.a5_n_per_pa'
+    truth = ISOMETRIC.with_(parameters={name: 3.0 * ISOMETRIC.number(name)})
+    run = record(truth, keep=('pressure', 'force'), command=False, hold_s=0.4)
+    result = identify(run, ISOMETRIC, [name])
+    found = result[name]
+    assert found.value == found.number.upper
+    assert found.at_edge and found.is_narrow and found.status == 'not determined'
+    assert name in result.open_names and name in result.rig.unknown
+    assert result.rig.number(name) == found.value
+    said = [one for one in result.remarks if one.startswith(f'{name}: at the edge of its allowed')]
+    assert len(said) == 1 and 'another law or a wider range may fit better' in said[0]
+    assert f'remark: {said[0]}' in result.text() and 'at the edge' in found.text()
+    # Another recording would end there as well.
+    assert result.next_experiment is None
+    data = result.to_dict()['numbers'][0]
+    assert data['at_edge'] and data['status'] == 'not determined'
+    html = page(result, [run])
+    assert said[0] in html and '0 of 1 unknown numbers are determined' in html
 
 
 def test_coefficients_that_one_length_does_not_tell_apart_are_said_so():
