@@ -50,6 +50,7 @@ def run(args: argparse.Namespace) -> int:
     """Identify, write what was found, and say what to measure next."""
     from pam_actuation.bags.load import load_run
     from pam_actuation.report.identify import FILES, save_identification
+    from pam_actuation.report.next_run import before_it, command_on_rig
     from pam_sim import load_rig
     from pam_sim.files import check_folder
     from pam_sim.identify import identify
@@ -65,10 +66,15 @@ def run(args: argparse.Namespace) -> int:
     if args.out is not None:
         save_identification(found, runs, args.out)
         lines.append(f'results: {args.out}')
+        model = Path(args.out) / 'rig.yaml'
         if found.next_experiment is not None:
-            lines.append(f'next: pam run {Path(args.out) / "next_experiment.yaml"}')
+            before = before_it(runs, found.next_experiment, model)
+            lines += [f'before it: {before}'] if before else []
+            lines.append('next: ' + command_on_rig(
+                runs, Path(args.out) / 'next_experiment.yaml', model,
+                found.next_experiment['name']))
         else:
             lines.append(f'next: pam gap {" ".join(args.run)} --model '
-                         f'{Path(args.out) / "rig.yaml"} --out gap')
+                         f'{model} --out gap')
     emit(args, found.to_dict(), '\n'.join(lines))
     return EXIT_DONE

@@ -21,6 +21,7 @@ from made_records import RIG, spring
 from pam_actuation.bags.load import load_run
 from pam_actuation.cli.main import main
 from pam_sim import load_rig
+from pam_sim.identify.result import Identification
 from pam_sim.identify.schema import identify_schema
 import pytest
 
@@ -81,3 +82,19 @@ def test_a_mistake_is_one_line_and_exit_code_2(bag, options, said, capsys, tmp_p
     err = capsys.readouterr().err
     assert said in err and len(err.strip().splitlines()) == 1
     assert not (tmp_path / 'found').exists()
+
+
+def test_the_next_experiment_is_run_on_the_rig_that_was_recorded(bag, tmp_path, capsys,
+                                                                 monkeypatch):
+    """The rig of the bag is a file of its own, so what was found of it is simulated."""
+    def identify(runs, rig, *_, **__):
+        return Identification(rig, [], [], [], {}, False, next_experiment={
+            'name': 'stairs_with_more_mass', 'why': 'the same steps', 'determines': [],
+            'experiment': {'name': 'stairs'}, 'added_kg': 1.2, 'needs_force': True})
+    monkeypatch.setattr('pam_sim.identify.identify', identify)
+    out = tmp_path / 'found'
+    assert main(['identify', str(bag), '--rig', 'dmsp_5_300_hanging_mass', '--out', str(out)]) == 0
+    *_, before, following = capsys.readouterr().out.splitlines()
+    assert before.startswith('before it: put 1.2 kg more into `mass_kg` of a copy of ')
+    assert following == (f'next: pam run {out / "next_experiment.yaml"} '
+                         f'--rig {out / "rig.yaml"}')

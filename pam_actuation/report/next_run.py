@@ -1,0 +1,99 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""How a proposed experiment is run on the rig that was recorded, a real or a simulated one."""
+
+from collections.abc import Mapping, Sequence
+import os
+import shlex
+from typing import Any, TYPE_CHECKING
+
+from pam_sim.files import StrPath
+
+if TYPE_CHECKING:
+    from pam_sim.run import Run
+
+HARDWARE_FILE = 'my_hardware.yaml'       # stands for the user's own; its name is in no bag
+
+
+def is_simulated(run: 'Run') -> bool:
+    """Tell whether a recording says that it is of a simulated rig: such a bag has a seed."""
+    return bool(run.metadata.get('seed'))
+
+
+def command_on_rig(runs: 'Sequence[Run]', experiment: StrPath, model: StrPath,
+                   name: str = 'next') -> str:
+    """
+    Return the command that runs an experiment on the rig of these recordings, and records it.
+
+    Parameters
+    ----------
+    runs : list of pam_sim.run.Run
+        The recordings. One that does not say that it was simulated is of a real rig.
+    experiment : path
+        File of the experiment.
+    model : path
+        Rig file with what is known of the rig.
+    name : str
+        Of the folder in ``runs`` for the new recording.
+
+    """
+    played = shlex.quote(str(experiment))
+    if not all(is_simulated(run) for run in runs):
+        return (f'pam up rig --hardware {HARDWARE_FILE} --model {shlex.quote(str(model))} '
+                f'--experiment {played} --record {shlex.quote(os.path.join("runs", name))}')
+    return f'pam run {played} --rig {_recorded_preset(runs) or shlex.quote(str(model))}'
+
+
+def before_it(runs: 'Sequence[Run]', advice: Mapping[str, Any], model: StrPath) -> str:
+    """
+    Return what must be done before the next experiment of an identification; '' for nothing.
+
+    Parameters
+    ----------
+    runs : list of pam_sim.run.Run
+        The recordings.
+    advice : dict
+        ``next_experiment`` of the result.
+    model : path
+        Rig file with the numbers found.
+
+    """
+    found = []
+    if advice['added_kg']:
+        more = f'{advice["added_kg"]:g} kg'
+        found.append(
+            f'put {more} more into `mass_kg` of a copy of {model} and run that'
+            if all(is_simulated(run) for run in runs) else f'hang {more} more on the load')
+        found[-1] += (f', since the experiment needs another load than the rig file has; '
+                      f'pam identify is told of it by --added-kg {"0 " * len(runs)}'
+                      f'{advice["added_kg"]:g}')
+    if advice['needs_force'] and not any('force' in run for run in runs):
+        found.append('record the force with a load cell')
+    return '; '.join(found)
+
+
+def _recorded_preset(runs: 'Sequence[Run]') -> str:
+    """Return the options for the preset that all recordings are of; '' where there is none."""
+    from pam_sim import load_rig, preset_names
+    from pam_sim.errors import InputError
+    try:
+        rigs = [load_rig(run.metadata['rig']) for run in runs]
+    except (InputError, KeyError):
+        return ''
+    first = rigs[0]
+    if first.name not in preset_names() or any(
+            rig.to_yaml() != load_rig(first.name, valve=first.valve).to_yaml() for rig in rigs):
+        return ''
+    return f'{first.name} --valve {first.valve}'

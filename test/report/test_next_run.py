@@ -1,0 +1,55 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The command that runs a proposed experiment is one for the rig that was recorded."""
+
+from pam_actuation.cli.main import build_parser
+from pam_actuation.report.next_run import before_it, command_on_rig, is_simulated
+from pam_sim import load_rig
+from pam_sim.run import Run
+import pytest
+
+PRESET = 'dmsp_20_300_hanging_mass'
+OWN = load_rig(PRESET).with_(parameters={'mass_kg': 3.3})
+IMPORTED = Run({}, {'origin': 'imported'})
+HARDWARE = Run({}, {'origin': 'live', 'rig': OWN.to_yaml()})
+OF_PRESET = Run({}, {'seed': '0', 'rig': load_rig(PRESET).to_yaml()})
+OF_A_FILE = Run({}, {'seed': '0', 'rig': OWN.to_yaml()})
+
+
+@pytest.mark.parametrize('runs, rig', [
+    ([OF_PRESET], f'{PRESET} --valve ppr'), ([OF_A_FILE], 'found/rig.yaml'),
+    ([OF_PRESET, OF_A_FILE], 'found/rig.yaml'), ([Run({}, {'seed': '1'})], 'found/rig.yaml')])
+def test_a_simulated_rig_is_simulated_again(runs, rig):
+    command = command_on_rig(runs, 'found/next_experiment.yaml', 'found/rig.yaml')
+    assert command == f'pam run found/next_experiment.yaml --rig {rig}'
+    assert build_parser().parse_args(command.split()[1:]).rig == rig.split()[0]
+
+
+@pytest.mark.parametrize('runs', [[IMPORTED], [HARDWARE], [Run({})], [OF_PRESET, IMPORTED]])
+def test_a_real_rig_is_run_with_its_hardware_and_recorded(runs):
+    command = command_on_rig(runs, 'a b/next.yaml', 'found/rig.yaml', 'stairs')
+    assert command == ("pam up rig --hardware my_hardware.yaml --model found/rig.yaml "
+                       "--experiment 'a b/next.yaml' --record runs/stairs")
+    assert not all(is_simulated(run) for run in runs)
+
+
+def test_another_load_and_a_load_cell_are_said_before():
+    advice = {'added_kg': 1.2, 'needs_force': True}
+    said = before_it([IMPORTED, IMPORTED], advice, 'found/rig.yaml')
+    assert said.startswith('hang 1.2 kg more on the load') and '--added-kg 0 0 1.2' in said
+    assert said.endswith('; record the force with a load cell')
+    said = before_it([OF_A_FILE], advice, 'found/rig.yaml')
+    assert 'put 1.2 kg more into `mass_kg` of a copy of found/rig.yaml' in said
+    assert before_it([IMPORTED], {'added_kg': 0.0, 'needs_force': False}, 'found/rig.yaml') == ''
