@@ -110,6 +110,20 @@ class Criteria:
         0.05, 'of an even share', 'health',
         'Moves, up or down, below which a part has none, so that edges are dealt out in pieces.',
         'Recordings of an identification: the least is three times as much.')
+    rest_stroke_share: float = _criterion(
+        0.005, 'of the stroke', 'health',
+        'Contraction up to which a load may rest on its stop.',
+        'A few deviations of a contraction sensor; 0.25 mm of a stroke of 50 mm.')
+    least_rest_s: float = _criterion(
+        0.1, 's', 'health',
+        'Time without a break in which the load cell reads far less than the load weighs, from '
+        'which on the load rests on a stop.',
+        'A load that falls passes the last 0.5 % of the stroke in some 10 ms.')
+    least_line_share: float = _criterion(
+        0.25, 'of the contraction', 'health',
+        'Range of contraction of a moving load, from which on a line through its force reaches '
+        'to zero contraction.',
+        'Own measurements of a lab: the line is within 5 % of the weight.')
     seen_gap: float = _criterion(
         0.05, 'floors squared', 'detection',
         'Gap from which on a subsystem needs an explanation.',

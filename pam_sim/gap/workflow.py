@@ -22,6 +22,7 @@ from pam_sim.gap.data.commanded import all_commanded
 from pam_sim.gap.data.health import check_for, without_dead
 from pam_sim.gap.data.overlap import check_apart
 from pam_sim.gap.data.recording import Recording
+from pam_sim.gap.data.resting import rest_of
 from pam_sim.gap.data.speeds import moves_at_one_speed
 from pam_sim.gap.data.split import FIT, SELECT, settling_s, split_of
 from pam_sim.gap.fit.estimator import Estimator
@@ -107,7 +108,6 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     runs = [runs] if isinstance(runs, Run) else list(runs)
     if certify is not None:
         check_apart(runs, certify, criteria)
-    driven = rig.is_driven
     runs, certify, told = all_commanded(runs, certify, rig)
     health = [check_for(run, rig, criteria)
               for run in [*runs, *([certify] if certify else [])]]
@@ -117,7 +117,7 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
         text = '; '.join(refusals)
         return GapResult('refused', text[:1].upper() + text[1:] + '.', remarks=remarks,
                          runtime_s=time.perf_counter() - started, model_yaml=rig.to_yaml())
-    recordings = [Recording(without_dead(run), rig.valve, driven) for run in runs]
+    recordings = [_recording(run, rig, criteria) for run in runs]
     given = any(r.pressure_given for r in recordings)
     if (rig.valve == 'hsv' and rig.fidelity == 'averaged' and not given
             and shows_pulses(rig, recordings, criteria)):
@@ -129,8 +129,7 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     progress(0.1)
     deadline = started + seconds
     # Its input alone: what else was measured on it stays untouched until the validation.
-    held_out = (Recording(without_dead(certify), rig.valve, driven) if certify
-                else recordings[0])
+    held_out = _recording(certify, rig, criteria) if certify else recordings[0]
     split = split_of(held_out, criteria=criteria)
     settled = {s: held_out.time_s[s] > (settling_s(held_out, s) if certify else split.unused_s(s))
                for s in held_out.signals}
@@ -228,6 +227,12 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     progress(1.0)
     result.runtime_s = time.perf_counter() - started
     return result
+
+
+def _recording(run: Run, rig: Rig, criteria: Criteria) -> Recording:
+    """Return a recording without dead sensors, and without the force of a load at rest."""
+    run = without_dead(run)
+    return Recording(run, rig.valve, rig.is_driven, rest=rest_of(run, rig, criteria))
 
 
 def _not_judged(estimator: Estimator) -> dict[str, str]:

@@ -22,6 +22,7 @@ from pam_sim.errors import InputError
 from pam_sim.gap.data.health import missed_pulses
 from pam_sim.gap.data.noise import noise_of
 from pam_sim.gap.data.recording import Recording
+from pam_sim.gap.data.resting import Rest, rest_of
 from pam_sim.gap.data.signals import tells_of
 from pam_sim.gap.subsystems.mechanics import MechanicsProblem
 from pam_sim.gap.subsystems.problem import SubsystemProblem
@@ -53,6 +54,8 @@ class Offer:
         For people.
     added_kg : float
         Known mass that hung on the load in addition.
+    rest : Rest or None
+        When the load rested on a stop; the force of then is left out.
 
     """
 
@@ -62,6 +65,7 @@ class Offer:
     mechanics: bool
     kind: str
     added_kg: float = 0.0
+    rest: Rest | None = None
 
 
 class LoadedMechanics(MechanicsProblem):
@@ -133,7 +137,8 @@ def offer_of(run: Run, rig: Rig, added_kg: float = 0.0) -> Offer:
         raise InputError(f'has a pressure alone: {needs} tells of muscle and load, a '
                          f'`valve_signal` of the valve (a `pressure_command` too, behind a '
                          'regulator)', where)
-    recording = Recording(run, rig.valve, held, 0.0 if isometric_m is None else isometric_m)
+    rest = None if held else rest_of(run, rig, added_kg=added_kg)
+    recording = Recording(run, rig.valve, held, 0.0 if isometric_m is None else isometric_m, rest)
     if recording.grid_s[-1] < LEAST_DURATION_S:
         raise InputError(f'has {recording.grid_s[-1]:.2f} s in which all its signals are there; '
                          f'at least {LEAST_DURATION_S:g} s are needed', where)
@@ -142,7 +147,7 @@ def offer_of(run: Run, rig: Rig, added_kg: float = 0.0) -> Offer:
               'muscle at a held length')
     kinds = [word for word, there in (('valve', valve), (muscle, mechanics)) if there]
     kind = ' and '.join(kinds) + (f'; the valve is left out: {missed}' if missed else '')
-    return Offer(where, recording, valve, mechanics, kind, added_kg)
+    return Offer(where, recording, valve, mechanics, kind, added_kg, rest)
 
 
 def _is_held(run: Run, rig: Rig) -> bool:

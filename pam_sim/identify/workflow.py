@@ -160,6 +160,7 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
         _identified(rig, numbers_found), numbers_found, combinations,
         [{'path': one.path, 'kind': one.kind, 'added_kg': one.added_kg} for one in offers],
         _signals(before, _rms(squares)), incomplete, bent=bent)
+    result.remarks += [f'{one.path}: {one.rest.text()}' for one in offers if one.rest]
     result.remarks += remarks + ([] if force_compared else _of_one_scale(acting))
     result.remarks += _starting_values(left, [name for name in starting if name not in at_rest])
     result.remarks += [one.edge() for one in numbers_found if one.at_edge]

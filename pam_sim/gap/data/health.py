@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.gap.criteria import CRITERIA, Criteria
+from pam_sim.gap.data.resting import rest_of
 from pam_sim.gap.data.signals import FIELD, READABLE, recorded_valve, SIGNALS
 from pam_sim.rig import Rig
 from pam_sim.run import Run
@@ -55,8 +56,11 @@ class Health:
 
 def check_for(run: Run, rig: Rig, criteria: Criteria = CRITERIA) -> Health:
     """Check a recording that shall be compared with a rig; see ``check_health``."""
-    return check_health(run, rig.valve, criteria, rig.is_driven,
-                        rig.parameters.get('ppr_highest_v', MAX_VOLTAGE_V))
+    health = check_health(run, rig.valve, criteria, rig.is_driven,
+                          rig.parameters.get('ppr_highest_v', MAX_VOLTAGE_V))
+    rest = rest_of(run, rig, criteria) if health.usable and 'force' in health.signals else None
+    health.remarks += [] if rest is None else [rest.text()]
+    return health
 
 
 def check_health(run: Run, valve: str, criteria: Criteria = CRITERIA,

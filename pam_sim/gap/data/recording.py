@@ -19,14 +19,15 @@ from functools import cached_property
 from typing import Protocol
 
 import numpy as np
-from pam_sim.annotations import BoolArray, FloatArray, IntArray
+from pam_sim.annotations import BoolArray, FloatArray
 from pam_sim.gap.data.given_motion import given_motion
 from pam_sim.gap.data.jumps import jump_shares
 from pam_sim.gap.data.noise import SLOW_S
 from pam_sim.gap.data.pulses import openings, Pulses
-from pam_sim.gap.data.signals import FIELD, SIGNALS, tells_of, VALVE_FIELDS
+from pam_sim.gap.data.resting import Rest
+from pam_sim.gap.data.signals import FIELD, ordered, SIGNALS, tells_of, VALVE_FIELDS
 from pam_sim.response import Response
-from pam_sim.run import Run, Series
+from pam_sim.run import Run
 from pam_sim.units import P_ATM_PA
 
 GRID_S = 0.001
@@ -67,6 +68,8 @@ class Recording:
         Contraction is an input of the model (isometric or driven load), no output.
     held_m : float
         The contraction where none is recorded [m].
+    rest : Rest, optional
+        When the load rests on a stop; the force of then is left out.
 
     Attributes
     ----------
@@ -88,8 +91,8 @@ class Recording:
 
     """
 
-    def __init__(self, run: Run, valve: str, driven: bool = False, held_m: float = 0.0
-                 ) -> None:
+    def __init__(self, run: Run, valve: str, driven: bool = False, held_m: float = 0.0,
+                 rest: Rest | None = None) -> None:
         self.valve = valve
         self.driven = driven
         known = tuple(s for s in SIGNALS if s in run and FIELD[s] in run.topics[s].values)
@@ -105,9 +108,11 @@ class Recording:
         self.grid_s = np.arange(self.steps + 1) * GRID_S
         self.stamp_ns, self.time_s, self.measured = {}, {}, {}
         for signal in known:
-            stamp, value = _ordered(run.topics[signal], FIELD[signal])
+            stamp, value = ordered(run.topics[signal], FIELD[signal])
             seconds = (stamp - self.start_ns) * 1e-9
             inside = (seconds >= 0.0) & (seconds <= self.grid_s[-1])
+            if rest is not None and signal == 'force':
+                inside &= ~np.isin(stamp, rest.stamp_ns)
             self.stamp_ns[signal] = stamp[inside]
             self.time_s[signal] = seconds[inside]
             self.measured[signal] = value[inside]
@@ -115,20 +120,20 @@ class Recording:
             self.time_s['contraction'] = self.time_s['pressure']
             self.measured['contraction'] = np.full(self.time_s['pressure'].size, held_m)
         stamped = [] if command is None else [
-            _ordered(command, name) for name in VALVE_FIELDS[valve]]
+            ordered(command, name) for name in VALVE_FIELDS[valve]]
         self._valve = [((s - self.start_ns) * 1e-9, v) for s, v in stamped]
         period_s = float(np.median(np.diff(self._valve[0][0]))) if self.messages > 1 else 0.0
         # A valve signal that comes less often may have changed unseen.
         self.unseen_s = period_s if period_s > SLOW_S else 0.0
         self.supply: tuple[FloatArray, FloatArray] | None = None
         if 'supply_pressure' in run and 'pressure_pa' in run.topics['supply_pressure'].values:
-            stamp, value = _ordered(run.topics['supply_pressure'], 'pressure_pa')
+            stamp, value = ordered(run.topics['supply_pressure'], 'pressure_pa')
             seconds = (stamp - self.start_ns) * 1e-9
             inside = (seconds >= 0.0) & (seconds <= self.grid_s[-1])
             self.supply = seconds[inside], value[inside]
         self.external_force_n = None
         if 'external_force' in run:
-            stamp, value = _ordered(run.topics['external_force'], 'force_n')
+            stamp, value = ordered(run.topics['external_force'], 'force_n')
             self.external_force_n = held_mean(
                 (stamp - self.start_ns) * 1e-9, value, self.grid_s, before=0.0)
 
@@ -217,7 +222,8 @@ class Recording:
             # A bent rise is above its line, which would begin too high.
             return min(level, float(self.measured[signal][0])) if (
                 signal == 'pressure' and self.starts_empty) else level
-        return float(np.median(self.measured[signal][self.time_s[signal] <= START_S]))
+        early_s = max(START_S, float(self.time_s[signal][0]))
+        return float(np.median(self.measured[signal][self.time_s[signal] <= early_s]))
 
     def moves_at_start(self, signal: str) -> bool:
         """Return whether a signal follows a line rather than a level at the start."""
@@ -295,15 +301,3 @@ def held_mean(time_s: FloatArray, value: FloatArray, grid_s: FloatArray,
         since, until = (np.interp(grid_s[mixed + k], knots, integral) for k in range(2))
         mean[mixed] = (until - since) / step_s
     return mean
-
-
-def _ordered(series: Series, field: str) -> tuple[IntArray, FloatArray]:
-    """Return (stamp_ns, value) sorted by stamp, the later one of equal stamps kept."""
-    stamp = np.asarray(series.stamp_ns, dtype=np.int64)
-    value = np.asarray(series.values[field], dtype=float)
-    good = np.isfinite(value)
-    stamp, value = stamp[good], value[good]
-    order = np.argsort(stamp, kind='stable')
-    stamp, value = stamp[order], value[order]
-    last = np.append(np.diff(stamp) > 0, True)[:stamp.size]
-    return stamp[last], value[last]

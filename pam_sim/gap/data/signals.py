@@ -14,7 +14,9 @@
 
 """The recorded signals: names, fields of a run, units."""
 
-from pam_sim.run import Run
+import numpy as np
+from pam_sim.annotations import FloatArray, IntArray
+from pam_sim.run import Run, Series
 
 SIGNALS = ('pressure', 'contraction', 'force')
 FIELD = {'pressure': 'pressure_pa', 'contraction': 'contraction_m', 'force': 'force_n'}
@@ -33,3 +35,15 @@ def tells_of(run: Run, valve: str) -> bool:
     """Return whether a run holds the signal of a valve."""
     return 'valve_signal' in run and all(
         name in run.topics['valve_signal'].values for name in VALVE_FIELDS[valve])
+
+
+def ordered(series: Series, field: str) -> tuple[IntArray, FloatArray]:
+    """Return (stamp_ns, value) sorted by stamp; the later one of equal stamps counts."""
+    stamp = np.asarray(series.stamp_ns, dtype=np.int64)
+    value = np.asarray(series.values[field], dtype=float)
+    good = np.isfinite(value)
+    stamp, value = stamp[good], value[good]
+    order = np.argsort(stamp, kind='stable')
+    stamp, value = stamp[order], value[order]
+    last = np.append(np.diff(stamp) > 0, True)[:stamp.size]
+    return stamp[last], value[last]
