@@ -134,7 +134,7 @@ def _from_mapping(data: Located, name: str | None, seen: tuple[str, ...]) -> Rig
         base = Rig(name or 'rig', data.require('load', str, choices=tuple(LOADS)), muscle=muscle)
     muscle = base.muscle
     if 'law' in data:
-        muscle = muscle.with_law(read_law(data, muscle.law))
+        muscle = muscle.with_law(read_law(data, muscle.law, muscle.bore_m))
     known = rig_parameters(base.load)
     given = data.get('parameters', dict) if data.get('parameters') is not None else {}
     check_parameters(known, given)

@@ -226,7 +226,7 @@ class Rig:
         muscle : str or Muscle, optional
             Another muscle.
         law : str or LawChoice, optional
-            Another force law for the muscle; a name takes the law's first set.
+            Another force law for the muscle; a name takes the set of the nearest bore.
         tolerance : dict, optional
             How well numbers are known, those to change.
 

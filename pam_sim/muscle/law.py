@@ -16,6 +16,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+import math
 from typing import Any
 import warnings
 
@@ -35,6 +36,7 @@ RULES = {
     4: 'Contraction has an upper limit, where the muscle pulls with zero force.',
 }
 OUTSIDE = ('warn', 'refuse', 'allow')
+BORE_FITS = 1.5              # factor between the bores of a muscle and of a set that fits it
 MIN_STRAIN, MAX_STRAIN = -0.1, 0.9      # beyond these a length is a mistake, not a muscle
 
 
@@ -70,12 +72,15 @@ class ParameterSet:
     rests_on : str
         Where the numbers come from and how far to trust them.
     validity : Validity
+    bore_m : float
+        Bore of the muscle whose force they give; 0 where nobody says.
 
     """
 
     values: dict[str, float] = field(default_factory=dict)
     rests_on: str = ''
     validity: Validity = Validity()
+    bore_m: float = 0.0
 
 
 class MuscleLaw:
@@ -151,6 +156,30 @@ class MuscleLaw:
         self.values = check_parameters(
             self.PARAMETERS, {**self.SETS[muscle].values, **own}, where=where)
         self._check(where)
+
+    @classmethod
+    def set_for(cls, bore_m: float, where: str = '') -> str:
+        """
+        Return the name of the set whose bore is nearest to that of a muscle.
+
+        The first one of a law none of whose sets states a bore.
+
+        Raises
+        ------
+        InputError
+            No set is of a bore that fits.
+
+        """
+        bores = {name: one.bore_m for name, one in cls.SETS.items() if one.bore_m > 0.0}
+        if not bores:
+            return next(iter(cls.SETS))
+        nearest = min(bores, key=lambda name: abs(math.log(bores[name] / bore_m)))
+        if abs(math.log(bores[nearest] / bore_m)) > math.log(BORE_FITS):
+            known = ', '.join(f'{name} ({1e3 * bore:g} mm)' for name, bore in bores.items())
+            raise InputError(f'law `{cls.NAME}` has no set of numbers for a bore of '
+                             f'{1e3 * bore_m:g} mm; name the one to start from with `set`: '
+                             f'{known}', where)
+        return nearest
 
     def _check(self, where: str) -> None:
         """Raise InputError where the parameters together make no muscle."""

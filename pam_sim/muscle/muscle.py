@@ -33,7 +33,7 @@ from pam_sim.keys import Key, names_of
 from pam_sim.located_yaml import Located
 from pam_sim.muscle import geometry
 from pam_sim.muscle.lookup_table import LookupTable, read_table
-from pam_sim.muscle.registry import make_law
+from pam_sim.muscle.registry import get_law, make_law
 from pam_sim.named_files import NamedFiles
 from pam_sim.parameters import Parameter
 
@@ -66,7 +66,8 @@ KEYS = (
 )
 LAW_KEYS = (
     Key('name', str, 'Which law; `pam models` lists them.', otherwise='that of the muscle'),
-    Key('set', str, 'Named numbers of the law to start from.', otherwise='its first set'),
+    Key('set', str, 'Named numbers of the law to start from.',
+        otherwise='that of the nearest bore'),
     Key('parameters', dict, 'Coefficients that differ from the set.',
         otherwise='those of the set'),
     Key('table', dict, 'Law `lookup` only: path of a CSV file from `pam characterise`, or a '
@@ -93,7 +94,7 @@ class LawChoice:
     name : str
         Of the registry.
     set : str, optional
-        Named numbers of the law; its first ones by default.
+        Named numbers of the law; its first ones by default, in a muscle those of its bore.
     parameters : dict
         Values that differ from the set.
     table : LookupTable, optional
@@ -174,8 +175,9 @@ class Muscle:
         return geometry.volume_of(contraction_m, *self.shape)
 
     def with_law(self, law: LawChoice | str) -> 'Muscle':
-        """Return the muscle with another law, a LawChoice or a name."""
-        return replace(self, law=checked_law(LawChoice(law) if isinstance(law, str) else law))
+        """Return the muscle with another law, a LawChoice or a name; its set fits the bore."""
+        return replace(self, law=checked_law(
+            LawChoice(law) if isinstance(law, str) else law, bore_m=self.bore_m))
 
     def plain(self) -> dict[str, Any] | str:
         """Return the muscle as plain data for a model file: its name if that says all."""
@@ -238,11 +240,13 @@ def read_muscle(data: Located, name: str = 'muscle') -> Muscle:
     numbers = {one.name: data.require(one.name, float, one.lower, one.upper, unit=one.unit)
                for one in DIMENSIONS if one.name in data}
     rests_on = data.get('rests_on', str, base.rests_on if not numbers else 'stated by the model')
-    law = read_law(data, base.law) if 'law' in data else base.law
+    law = read_law(data, base.law, numbers.get('bore_m', base.bore_m)
+                   ) if 'law' in data else base.law
     return replace(base, name=name, **numbers, law=law, rests_on=' '.join(rests_on.split()))
 
 
-def read_law(data: Located, base: LawChoice | None = None) -> LawChoice:
+def read_law(data: Located, base: LawChoice | None = None, bore_m: float | None = None
+             ) -> LawChoice:
     """
     Return the LawChoice under the key ``law`` of a mapping: a name, or a mapping.
 
@@ -252,11 +256,13 @@ def read_law(data: Located, base: LawChoice | None = None) -> LawChoice:
         Has the key ``law``: a name, or ``name``, ``set``, ``parameters``, ``table``.
     base : LawChoice, optional
         Used where only its numbers change.
+    bore_m : float, optional
+        Of the muscle: the set is the one whose bore is nearest, where none is named.
 
     Raises
     ------
     InputError
-        Unknown law, set, parameter or table, with file and line.
+        Unknown law, set, parameter or table, or no set of a bore that fits, with file and line.
 
     """
     stated, where = data['law'], data.where('law')
@@ -269,12 +275,14 @@ def read_law(data: Located, base: LawChoice | None = None) -> LawChoice:
         table = _read_law_table(stated) if 'table' in stated else None
     else:
         name, chosen = data.require('law', str), None
-    return checked_law(LawChoice(name, chosen, given or {}, table), where)
+    return checked_law(LawChoice(name, chosen, given or {}, table), where, bore_m)
 
 
-def checked_law(choice: LawChoice, where: str = '') -> LawChoice:
+def checked_law(choice: LawChoice, where: str = '', bore_m: float | None = None) -> LawChoice:
     """
     Return a LawChoice with its set and plain parameters, once the law could be made.
+
+    Without a set it gets the one that fits a bore.
 
     Raises
     ------
@@ -285,7 +293,9 @@ def checked_law(choice: LawChoice, where: str = '') -> LawChoice:
     if choice.table is not None:
         law = make_law(choice.name, choice.table, where=where)
     else:
-        law = make_law(choice.name, choice.parameters or None, choice.set, where)
+        chosen = choice.set if choice.set is not None or bore_m is None else (
+            get_law(choice.name, where).set_for(bore_m, where))
+        law = make_law(choice.name, choice.parameters or None, chosen, where)
     if type(law).COMPILED is None:
         raise InputError(f'law `{choice.name}` has no compiled `tension_n` in its file, so a rig '
                          'cannot use it', where)

@@ -144,7 +144,34 @@ def test_a_model_states_its_own_muscle():
             P_ATM_PA + 400e3, 40.0 * 9.80665))
     assert load_rig(rig.to_yaml()) == rig
     assert load_rig('muscle: {length_m: 0.2, bore_m: 0.012, law: situm_herceg}\n'
-                    'load: isometric\n').muscle.law.set == 'dmsp_5'
+                    'load: isometric\n').muscle.law.set == 'dmsp_10'
+
+
+@pytest.mark.parametrize('muscle, law, chosen', [
+    ('{like: dmsp_20_300, law: {name: tondu_lopez}, length_m: 0.2}', '', 'dmsp_20_constant_k'),
+    ('{like: dmsp_20_300, law: tondu_lopez}', '', 'dmsp_20_constant_k'),
+    ('dmsp_40_300', 'law: chou_hannaford', 'dmsp_40'),
+    ('dmsp_10_250', 'law: {name: inoue_pair}', 'dmsp_10'),
+    ('dmsp_5_300', 'law: tondu_lopez', 'dmsp_5'),
+    ('{like: dmsp_20_300, law: {parameters: {a3: -20.0}}}', '', 'dmsp_20_300_map'),
+    ('{length_m: 0.2, bore_m: 0.021, law: {name: tondu_lopez, set: dmsp_5}}', '', 'dmsp_5'),
+    ('dmsp_20_300', 'law: repperger', 'reynolds_2003')])      # nobody knows of which bore
+def test_a_law_without_a_set_takes_the_one_of_the_bore(muscle, law, chosen):
+    rig = load_rig(f'muscle: {muscle}\nload: hanging_mass\n{law}\n')
+    assert rig.muscle.law.set == chosen
+    assert load_rig(rig.to_yaml()).muscle.law == rig.muscle.law
+
+
+def test_a_name_in_python_takes_the_set_of_the_bore_too():
+    assert load_rig('dmsp_20_300_hanging_mass').with_(
+        law='chou_hannaford').muscle.law.set == 'dmsp_20'
+
+
+def test_every_set_named_after_a_size_says_its_bore():
+    for law in laws().values():
+        for name, one in law.SETS.items():
+            if name.startswith('dmsp_'):
+                assert one.bore_m == pytest.approx(1e-3 * int(name.split('_')[1])), name
 
 
 def test_a_table_by_path_stands_beside_the_model(tmp_path):
@@ -165,6 +192,8 @@ def test_a_table_by_path_stands_beside_the_model(tmp_path):
     ('muscle:\n  like: dmsp_5_300\n  length_m: 20\nload: isometric\n', 3,
      ['length_m', '0.02', '9']),
     ('muscle: {length_m: 0.3}\nload: isometric\n', 1, ['bore_m', 'like']),
+    ('muscle:\n  length_m: 0.3\n  bore_m: 0.08\n  law: tondu_lopez\nload: isometric\n', 4,
+     ['no set of numbers for a bore of 80 mm', '`set`', 'dmsp_40_constant_k (40 mm)']),
     ('rig: knee\nload: antagonistic_joint\n', 2, ['load_joint']),
     (f'rig: {RIG}\nlaw: {{name: lookup, table: {{load_n: [0, 1]}}}}\n', 2,
      ['pressure_gauge_pa', 'missing']),

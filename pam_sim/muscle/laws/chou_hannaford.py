@@ -49,24 +49,25 @@ def diameter_for(force_n: float, pressure_gauge_pa: float, angle_rad: float = AN
     return math.sqrt(force_n / (pressure_gauge_pa * 0.25 * math.pi * (a - b)))
 
 
-def _sized(length_m: float, force_n: float, pressure_pa: float,
+def _sized(bore_m: float, length_m: float, force_n: float, pressure_pa: float,
            strain: float = 0.25) -> ParameterSet:
     return ParameterSet(
         {'length_m': length_m, 'diameter_m': diameter_for(force_n, pressure_pa),
          'braid_angle_rad': ANGLE_RAD},
         _EFFECTIVE.format(f'{force_n:g} N at {pressure_pa / 1e3:g} kPa'),
-        Validity((0.0, pressure_pa), (0.0, strain)))
+        Validity((0.0, pressure_pa), (0.0, strain)), bore_m)
 
 
 # Theoretical forces of the maker's data sheets at the rated pressure of each size.
 GEOMETRY_SETS = {
-    'dmsp_5': _sized(0.300, 140.0, 600e3),
-    'dmsp_10': _sized(0.250, 630.0, 800e3),
-    'dmsp_20': _sized(0.300, 1500.0, 600e3),
-    'dmsp_40': _sized(0.300, 6000.0, 600e3),
+    'dmsp_5': _sized(0.005, 0.300, 140.0, 600e3),
+    'dmsp_10': _sized(0.010, 0.250, 630.0, 800e3),
+    'dmsp_20': _sized(0.020, 0.300, 1500.0, 600e3),
+    'dmsp_40': _sized(0.040, 0.300, 6000.0, 600e3),
     'bore_5': ParameterSet(
         {'length_m': 0.300, 'diameter_m': 0.005, 'braid_angle_rad': ANGLE_RAD},
-        'bore 5 mm and braid angle as they are; 67 N at 600 kPa, half of the data sheet'),
+        'bore 5 mm and braid angle as they are; 67 N at 600 kPa, half of the data sheet',
+        bore_m=0.005),
 }
 GEOMETRY = (
     Parameter('length_m', 'm', 0.300, 0.02, 9.0, 0.0, 'Length at rest.', 'chapter, L0'),

@@ -45,7 +45,7 @@ def _braid(name: str) -> ParameterSet:
         {'length_m': base.values['length_m'], 'diameter_m': diameter,
          'a': a * area / diameter ** 2, 'b': b * area / diameter ** 2},
         f'a and b from the braid angle; {base.rests_on}; numbers of the paper not seen; '
-        f'pulley, inertia and damping are design values', base.validity)
+        f'pulley, inertia and damping are design values', base.validity, base.bore_m)
 
 
 class InouePair(MuscleLaw):

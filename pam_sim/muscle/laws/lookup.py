@@ -180,7 +180,7 @@ class Lookup(MuscleLaw):
     SETS = {
         'dmsp_5_300': ParameterSet(
             {}, 'a simulation of the nominal rig, whose force map is scaled from a measured '
-            'DMSP-10-250; no DMSP-5 was measured', Validity((0.0, 600e3), (0.0, 0.2))),
+            'DMSP-10-250; no DMSP-5 was measured', Validity((0.0, 600e3), (0.0, 0.2)), 0.005),
         'table': ParameterSet({}, 'the table given; its source line says what it is')}
     CLAIMS = (1, 2, 3, 4)
     EXTRAPOLATES = False

@@ -88,28 +88,29 @@ class Sarosi(MuscleLaw):
             _si(_DMSP_5, 1e3),
             'the force map of the rig: measured map of a DMSP-10-250 fitted and scaled to 140 N '
             'at 600 kPa; no DMSP-5 force data exist, good to 15 %',
-            Validity((50e3, 600e3), (0.0, 0.25))),
+            Validity((50e3, 600e3), (0.0, 0.25)), 0.005),
         'dmsp_10': ParameterSet(
             _si((-9.2194029, 203.7012413, -0.34221042, -3.2255991, 109.2038216, -208.372034),
-                1e5), _PUBLISHED, Validity((0.0, 600e3), (0.0, 0.25))),
+                1e5), _PUBLISHED, Validity((0.0, 600e3), (0.0, 0.25)), 0.010),
         'dmsp_20_200n': ParameterSet(
             _si((-4.00180705, 292.4620246, -0.32930845, -9.33564098, 294.0538256, -280.498151),
-                1e5), _PUBLISHED + '; named for 200 N', Validity((0.0, 600e3), (0.0, 0.27))),
+                1e5), _PUBLISHED + '; named for 200 N', Validity((0.0, 600e3), (0.0, 0.27)),
+            0.020),
         'dmsp_20_400n': ParameterSet(
             _si((-4.35573, 281.2237, -0.32866, -9.27035, 302.20107, -263.69185), 1e5),
-            _PUBLISHED + '; named for 400 N', Validity((0.0, 600e3), (0.0, 0.28))),
+            _PUBLISHED + '; named for 400 N', Validity((0.0, 600e3), (0.0, 0.28)), 0.020),
     }
     SETS['dmsp_10_250_map'] = ParameterSet(
         dict(zip(_NAMES, _DMSP_10_MAP)), _MAP.format('DMSP-10-250', 0.25),
-        Validity((50e3, 650e3), (0.0, 0.208)))
+        Validity((50e3, 650e3), (0.0, 0.208)), 0.010)
     SETS['dmsp_20_300_map'] = ParameterSet(
         dict(zip(_NAMES, _DMSP_20_MAP)), _MAP.format('DMSP-20-300', 0.38),
-        Validity((35e3, 675e3), (0.0133, 0.26)))
+        Validity((35e3, 675e3), (0.0133, 0.26)), 0.020)
     SETS['dmsp_40'] = ParameterSet(
         _scaled(_DMSP_20_MAP, 6000.0 / _AT_REST_20_N),
         'the fitted DMSP-20-300 map scaled to the data sheet, 6000 N at 600 kPa at rest; no '
         'DMSP-40 force data at hand, the shape is that of the smaller muscle',
-        Validity((35e3, 600e3), (0.0, 0.25)))
+        Validity((35e3, 600e3), (0.0, 0.25)), 0.040)
     CLAIMS = (2, 3, 4)
 
     def _check(self, where: str) -> None:

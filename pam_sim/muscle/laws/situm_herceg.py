@@ -28,13 +28,14 @@ from pam_sim.muscle.law import MuscleLaw, ParameterSet, Validity
 from pam_sim.parameters import Parameter
 
 
-def _chosen(length_m: float, force_n: float, pressure_pa: float, shortest: float) -> ParameterSet:
+def _chosen(bore_m: float, length_m: float, force_n: float, pressure_pa: float,
+            shortest: float) -> ParameterSet:
     return ParameterSet(
         {'length_m': length_m, 'shortest_length_m': shortest * length_m,
          'k_p_n_per_pa_m': force_n / (pressure_pa * (1.0 - shortest) * length_m)},
         f'constant chosen for {force_n:g} N at {pressure_pa / 1e3:g} kPa at rest (data sheet) '
         f'and no force at {100 * (1 - shortest):g} % contraction; numbers of the paper not seen',
-        Validity((0.0, pressure_pa), (0.0, 1.0 - shortest)))
+        Validity((0.0, pressure_pa), (0.0, 1.0 - shortest)), bore_m)
 
 
 @compiled
@@ -62,10 +63,10 @@ class SitumHerceg(MuscleLaw):
         Parameter('t_m_s', 's', 0.060, 1e-4, 10.0, 0.02, 'Time constant Tm.', 'design value'),
     )
     SETS = {
-        'dmsp_5': _chosen(0.300, 140.0, 600e3, 0.80),
-        'dmsp_10': _chosen(0.250, 630.0, 800e3, 0.75),
-        'dmsp_20': _chosen(0.300, 1500.0, 600e3, 0.75),
-        'dmsp_40': _chosen(0.300, 6000.0, 600e3, 0.75),
+        'dmsp_5': _chosen(0.005, 0.300, 140.0, 600e3, 0.80),
+        'dmsp_10': _chosen(0.010, 0.250, 630.0, 800e3, 0.75),
+        'dmsp_20': _chosen(0.020, 0.300, 1500.0, 600e3, 0.75),
+        'dmsp_40': _chosen(0.040, 0.300, 6000.0, 600e3, 0.75),
     }
     CLAIMS = (2, 3, 4)
 

@@ -65,11 +65,11 @@ class TonduLopez(MuscleLaw):
             {'length_m': 0.300, 'diameter_m': 8.97e-3, 'braid_angle_rad': math.radians(33.6),
              'k0': 1.0, 'k_rise': 9.84, 'k_pressure_pa': 235e3},
             'fit of the pressure-dependent k to the scaled DMSP-10-250 map of the rig, '
-            '4.7 N RMSE; no DMSP-5 force data exist', Validity((50e3, 600e3), (0.0, 0.25))),
+            '4.7 N RMSE; no DMSP-5 force data exist', Validity((50e3, 600e3), (0.0, 0.25)), 0.005),
         **{f'{name}_constant_k': ParameterSet(
             {**GEOMETRY_SETS[name].values, **_CONSTANT},
             GEOMETRY_SETS[name].rests_on + '; k 1.25 as used for a McKibben arm',
-            GEOMETRY_SETS[name].validity)
+            GEOMETRY_SETS[name].validity, GEOMETRY_SETS[name].bore_m)
            for name in ('dmsp_5', 'dmsp_10', 'dmsp_20', 'dmsp_40')},
     }
     CLAIMS = (1, 2, 3, 4)
