@@ -14,7 +14,7 @@
 
 """Which experiment would determine what the recordings leave open: predicted, not guessed."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 import math
 from typing import Any
@@ -129,7 +129,8 @@ def where_open(numbers: Sequence[Number], intervals: Sequence[Interval], statuse
 
 
 def next_experiment(rig: Rig, wanted: Sequence[Number], acting: Sequence[Number],
-                    information: FloatArray, offers: Sequence[Offer], has_force: bool
+                    information: FloatArray, offers: Sequence[Offer], has_force: bool,
+                    progress: Callable[[float], object] = lambda done: None
                     ) -> dict[str, Any] | None:
     """
     Return the first experiment that determines all numbers, else the one that determines most.
@@ -146,6 +147,8 @@ def next_experiment(rig: Rig, wanted: Sequence[Number], acting: Sequence[Number]
         The recordings.
     has_force : bool
         Whether there is a load cell.
+    progress : callable
+        Told the share that is done, 0 to 1.
 
     Returns
     -------
@@ -159,7 +162,9 @@ def next_experiment(rig: Rig, wanted: Sequence[Number], acting: Sequence[Number]
     noise = _noise(offers)
     known_before = _narrow(rig, wanted, whole)
     best: tuple[int, Proposal, list[str]] | None = None
-    for proposal in proposals(rig, has_force):
+    offered = proposals(rig, has_force)
+    for done, proposal in enumerate(offered):
+        progress(done / len(offered))
         after = _narrow(rig, wanted, whole + _information(rig, wanted, proposal, noise))
         gained = [n for n in after if n not in known_before]
         if gained and (best is None or len(gained) > best[0]):

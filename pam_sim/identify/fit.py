@@ -20,7 +20,7 @@ of ten leaves no slope to follow. Weights are the noise floors, lowered by misfi
 what is left. An incomplete model then does not seem to know its numbers better than it does.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 import math
 
@@ -52,6 +52,7 @@ GAIN, TIGHT = 0.02, 1e-9     # of the cost, which ends them; least room of a num
 # What a wrong formulation leaves of a signal acts alike through the whole record: it counts as
 # so many independent errors, however long the record is.
 FORMS = 12
+RANKED, REFINED = 0.2, 0.7   # share of the work that is done by then
 
 
 @dataclass
@@ -252,7 +253,8 @@ def used(problem: SubsystemProblem) -> BoolArray:
     return np.isin(problem.part, (FIT, SELECT))
 
 
-def fit(weighted: Weighted, seed: int = 0) -> FloatArray:
+def fit(weighted: Weighted, seed: int = 0,
+        progress: Callable[[float], object] = lambda done: None) -> FloatArray:
     """
     Return the best coordinates of the numbers; the weights settle on the way.
 
@@ -262,6 +264,8 @@ def fit(weighted: Weighted, seed: int = 0) -> FloatArray:
         Its weights are changed.
     seed : int
         Of the spread of the starts.
+    progress : callable
+        Told the share that is done, 0 to 1.
 
     """
     # Coefficients of the force law begin at those of its set, once the other numbers are found.
@@ -279,14 +283,17 @@ def fit(weighted: Weighted, seed: int = 0) -> FloatArray:
             starts.append(x)
     # Where other values fit no better, those of the rig file stay.
     ranked = [starts[0], *sorted(starts[1:], key=weighted.misfit)]
+    ranked = ranked[:FOLLOWED + 1]
+    progress(RANKED)
     best: FloatArray = ranked[0]
     least = np.inf
     start: FloatArray
-    for start in ranked[:FOLLOWED + 1]:
-        for evaluations in (EVALUATIONS // 2, EVALUATIONS):
+    for k, start in enumerate(ranked):
+        for half, evaluations in enumerate((EVALUATIONS // 2, EVALUATIONS), 1):
             # From full weight: a poor start would lower the weight that could lead away from it.
             weighted.temper = [np.ones(len(p.signals)) for p in weighted.problems]
             start, _ = weighted.solve(start, late, evaluations)
+            progress(RANKED + (REFINED - RANKED) * (k + 0.5 * half) / len(ranked))
         misfit = weighted.misfit(start)
         if misfit < least - BETTER:
             best, least = start, misfit

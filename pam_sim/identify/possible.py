@@ -27,7 +27,7 @@ it explains as much; how far the numbers move between those that explain about a
 intervals.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from pam_sim.annotations import FloatArray
@@ -111,7 +111,8 @@ def counted_in(problems: Sequence[SubsystemProblem], numbers: Sequence[Number]
             if not with_force and effect.fitting.same_without_force in unknown]
 
 
-def in_other_forms(weighted: Weighted, x: FloatArray, count: int
+def in_other_forms(weighted: Weighted, x: FloatArray, count: int,
+                   progress: Callable[[float], object] = lambda done: None
                    ) -> tuple[Weighted, FloatArray, FloatArray]:
     """
     Return (problem, solution, spread of the first numbers) with the effects that matter reformed.
@@ -124,12 +125,15 @@ def in_other_forms(weighted: Weighted, x: FloatArray, count: int
         Its solution.
     count : int
         How many numbers are sought; the spread is in their coordinates.
+    progress : callable
+        Told the share that is done, 0 to 1.
 
     """
     met: list[tuple[float, FloatArray]] = []
     there = {e.name for e in weighted.rig.effects}
     slopes = weighted.slopes(x)
-    for name in _that_matter(weighted, x, slopes):
+    for done, name in enumerate(_that_matter(weighted, x, slopes)):
+        progress(done / TRIED)
         base, start, base_slopes = weighted, x, slopes
         least = base.misfit(x)
         met.append((least, x[:count]))

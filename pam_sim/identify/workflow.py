@@ -49,13 +49,14 @@ from pam_sim.tolerance import AbsoluteSd, UNKNOWN
 # Without a force, both bend the way from pressure to contraction.
 LAW_AND_EFFECT = ('something is missing from the model, and without a recorded force it is not '
                   'told from the force law')
+Progress = Callable[[float], object]
 Squares = list[tuple[SubsystemProblem, str, float]]
 RETURNS = 4                  # to the fit, where a profile met a better solution
 
 
 def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
              added_kg: Sequence[float] = (), seed: int = 0, advise: bool = True,
-             progress: Callable[[float], object] = lambda done: None,
+             progress: Progress = lambda done: None,
              spare_certify: bool = False) -> Identification:
     """
     Determine the unknown numbers of a rig.
@@ -93,6 +94,7 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
         force law is unknown, while no force was recorded and an effect is missing.
 
     """
+    progress = _onward(progress)
     runs = [runs] if isinstance(runs, Run) else list(runs)
     if added_kg and len(added_kg) != len(runs):
         raise InputError(f'{len(added_kg)} masses for {len(runs)} recordings; give one for each, '
@@ -112,7 +114,7 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
     numbers = [*acting, *known_numbers_of(problems, acting)]
     weighted = Weighted(rig, problems, numbers)
     before = _rms(weighted.mean_squares(np.zeros(len(numbers))))
-    x = fit(weighted, seed)
+    x = fit(weighted, seed, _part(progress, 0.0, 0.3))
     progress(0.3)
     incomplete = is_incomplete(weighted, x)
     force_compared = any('force' in p.signals for p in problems)
@@ -137,17 +139,18 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
             x, _, _ = solve_from(weighted, x)
         progress(0.4)
         weighted.retemper(x)
-        weighted, x, forms = in_other_forms(weighted, x, len(acting))
+        weighted, x, forms = in_other_forms(
+            weighted, x, len(acting), _part(progress, 0.4, 0.6))
         x = settle(weighted, x)
     progress(0.6)
     x, information, numbers_found, combinations = _judged(
-        weighted, x, acting, forms, lambda done: progress(0.6 + 0.3 * done))
+        weighted, x, acting, forms, _part(progress, 0.6, 0.9))
     first, squares = numbers_found, weighted.mean_squares(x)
     numbers_found, at_rest = with_settled_zero(
         rig, [p for p, _, square in squares if square > CRITERIA.clear_rest], first)
     beside = beside_settled_zero(weighted, x, numbers_found) if at_rest else None
     if beside is not None:
-        more, joined, own = _without_valve(*beside)
+        more, joined, own = _without_valve(*beside, _part(progress, 0.9, 0.95))
         numbers_found = [more.get(one.number.name, one) for one in numbers_found]
         combinations = joined + [c for c in combinations if not set(more) & set(c.weights)]
         squares = own + [one for one in squares if one[0].subsystem == 'valve']
@@ -181,9 +184,25 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
                                      for one in first], x, information)
         result.next_experiment = next_experiment(
             with_values(rig, numbers, weighted.values(x)), wanted, acting, information,
-            offers, with_force)
+            offers, with_force, _part(progress, 0.95, 1.0))
     progress(1.0)
     return result
+
+
+def _onward(progress: Progress) -> Progress:
+    """Return the same that is told no share below an earlier one, as where a step is repeated."""
+    farthest = [0.0]
+
+    def tell(done: float) -> None:
+        if done > farthest[0]:
+            farthest[0] = done
+            progress(done)
+    return tell
+
+
+def _part(progress: Progress, begin: float, end: float) -> Progress:
+    """Return the progress of a step that is a part of the whole."""
+    return lambda done: progress(begin + (end - begin) * done)
 
 
 def identify_beside(law: Sequence[str], runs: Sequence[Run], rig: Rig, **options: Any
@@ -195,8 +214,7 @@ def identify_beside(law: Sequence[str], runs: Sequence[Run], rig: Rig, **options
 
 
 def _judged(weighted: Weighted, x: FloatArray, acting: Sequence[Number], forms: FloatArray,
-            progress: Callable[[float], object] = lambda done: None
-            ) -> tuple[FloatArray, FloatArray, list[Found], list[Combination]]:
+            progress: Progress) -> tuple[FloatArray, FloatArray, list[Found], list[Combination]]:
     """Return (solution, information, what is known of each first number, and of several)."""
     count = len(acting)
     x, covariance, slopes, intervals = _profiles(weighted, x, count, progress)
@@ -213,7 +231,7 @@ def _judged(weighted: Weighted, x: FloatArray, acting: Sequence[Number], forms: 
     return x, information, found, combinations
 
 
-def _without_valve(weighted: Weighted, x: FloatArray, count: int
+def _without_valve(weighted: Weighted, x: FloatArray, count: int, progress: Progress
                    ) -> tuple[dict[str, Found], list[Combination], Squares]:
     """Return (numbers by name, combinations, mean squares) of muscle and load alone."""
     acting = weighted.numbers[:count]
@@ -222,13 +240,13 @@ def _without_valve(weighted: Weighted, x: FloatArray, count: int
         x, _, _ = solve_from(weighted, x)
     if weighted.incomplete:
         weighted.retemper(x)
-        weighted, x, forms = in_other_forms(weighted, x, count)
+        weighted, x, forms = in_other_forms(weighted, x, count, _part(progress, 0.0, 0.5))
     x = settle(weighted, x)
-    x, _, found, combinations = _judged(weighted, x, acting, forms)
+    x, _, found, combinations = _judged(weighted, x, acting, forms, _part(progress, 0.5, 1.0))
     return ({one.number.name: one for one in found}, combinations, weighted.mean_squares(x))
 
 
-def _profiles(weighted: Weighted, x: FloatArray, count: int, progress: Callable[[float], object]
+def _profiles(weighted: Weighted, x: FloatArray, count: int, progress: Progress
               ) -> tuple[FloatArray, FloatArray, FloatArray, list[Interval]]:
     """Return (solution, covariance, slopes, interval of each of the first numbers)."""
     for left in reversed(range(RETURNS)):

@@ -169,3 +169,13 @@ def test_a_mistake_is_told(unknown, masses, said):
     with pytest.raises(InputError) as caught:
         identify(record(RIG, hold_s=0.3), RIG, unknown, masses)
     assert said in str(caught.value)
+
+
+def test_the_work_that_is_done_is_told_along_the_way():
+    """Within the first fit as well, and never less than before."""
+    told = []
+    run = record(RIG.with_(parameters={'mass_kg': 4.0}), gauge_pa=(50e3, 400e3, 100e3))
+    identify(run, RIG, ['mass_kg', 'K_m'], progress=told.append)
+    assert told == sorted(set(told)) and told[-1] == 1.0
+    assert sum(done <= 0.3 for done in told) > 5
+    assert all(later - done <= 0.31 for done, later in zip([0.0, *told], told))
