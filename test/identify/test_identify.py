@@ -179,3 +179,18 @@ def test_the_work_that_is_done_is_told_along_the_way():
     assert told == sorted(set(told)) and told[-1] == 1.0
     assert sum(done <= 0.3 for done in told) > 5
     assert all(later - done <= 0.31 for done, later in zip([0.0, *told], told))
+
+
+def test_a_load_cell_that_reads_nothing_on_a_stop_does_not_bend_the_mass():
+    """The stop carries the load of a vented muscle; in the model the cell still reads it."""
+    run = record(RIG.with_(parameters={'mass_kg': 4.0}),
+                 gauge_pa=(0.0, 400e3, 200e3, 500e3, 0.0, 300e3, 0.0))
+    force = run['force']['force_n'].copy()
+    force[run['contraction']['contraction_m'] < 1e-4] = 0.1
+    series = Series(run.topics['force'].stamp_ns, {'force_n': force}, {'force_n': 'N'})
+    found = identify(Run({**run.topics, 'force': series}, path='bag'), RIG, ['mass_kg'])
+    assert found['mass_kg'].status == 'determined' and inside(found['mass_kg'], 4.0)
+    assert found.rig.parameters['mass_kg'] == pytest.approx(4.0, rel=0.005)
+    said = [one for one in found.remarks if one.startswith('bag: in ')]
+    assert len(said) == 1 and 'the load rests on a stop: the load cell reads 0.1 N' in said[0]
+    assert not found.incomplete
