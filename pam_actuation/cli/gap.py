@@ -17,6 +17,7 @@
 import argparse
 import json
 import os
+import shlex
 from typing import TYPE_CHECKING
 
 from pam_actuation.cli.common import (
@@ -25,8 +26,11 @@ from pam_actuation.cli.common import (
 from pam_actuation.cli.options import number, out_path, Parser, source
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from pam_actuation.report.joint_gap import Question
     from pam_sim.gap.result import GapResult
+    from pam_sim.run import Run
 
 HELP = 'Find what a model misses in recorded runs, name it, add it and prove that the gap shrank.'
 EXAMPLE = 'pam gap runs/first --model dmsp_5_300_hanging_mass --certify runs/second --out gap'
@@ -82,9 +86,11 @@ def run(args: argparse.Namespace) -> int | None:
     lines: list[str] = []
     for question in questions(args.model, args.run[0], args.namespace):
         out = os.path.join(args.out, question.side) if question.side else args.out
-        found[question.side] = result = _ask(args, question, out)
+        found[question.side], runs = _ask(args, question, out)
+        result = found[question.side]
         lines += [f'{question.side}:'] if question.side else []
-        lines += [result.text(), f'results: {out}', *_next_lines(result, out)]
+        lines += [result.text(), f'results: {out}',
+                  *_next_lines(result, out, [] if question.side else runs)]
     alone = found.get('')
     emit(args, alone.to_dict() if alone is not None else {
         'schema': 1, **{side: result.to_dict() for side, result in found.items()}},
@@ -93,8 +99,9 @@ def run(args: argparse.Namespace) -> int | None:
     return EXIT_FINDING if refused else EXIT_DONE
 
 
-def _ask(args: argparse.Namespace, question: 'Question', out: str) -> 'GapResult':
-    """Return the result for one muscle, written into its folder."""
+def _ask(args: argparse.Namespace, question: 'Question', out: str
+         ) -> 'tuple[GapResult, Sequence[Run]]':
+    """Return the result for one muscle, written into its folder, and its recordings."""
     from pam_actuation.report.gap import FILES, write_gap
     from pam_actuation.report.origin import is_of, origin
     from pam_sim.files import check_folder
@@ -108,10 +115,10 @@ def _ask(args: argparse.Namespace, question: 'Question', out: str) -> 'GapResult
     with progress(args, 1.0, '', question.side or 'gap') as bar:
         return write_gap(
             runs, question.model, out, certify, of, effects=names, seconds=args.seconds,
-            materiality=args.materiality, progress=lambda done: bar.update(done - bar.n))
+            materiality=args.materiality, progress=lambda done: bar.update(done - bar.n)), runs
 
 
-def _next_lines(result: 'GapResult', out: str) -> list[str]:
+def _next_lines(result: 'GapResult', out: str, runs: 'Sequence[Run]' = ()) -> list[str]:
     """Return how to use a proposed term, what to measure next and how; nothing where none."""
     from pathlib import Path
     from pam_actuation.report.gap import next_command, with_term
@@ -120,7 +127,8 @@ def _next_lines(result: 'GapResult', out: str) -> list[str]:
         lines += [f'the model with the term: {with_term(out)}']
     if result.next_experiment:
         lines += [f'what to measure next: {result.next_experiment["why"]}',
-                  f'next: {next_command(result, Path(out) / "next_experiment.yaml")}']
+                  'next: ' + next_command(result, Path(out) / 'next_experiment.yaml', runs,
+                                          Path(out) / 'model.yaml')]
     return lines
 
 
@@ -130,6 +138,7 @@ def _plan(args: argparse.Namespace) -> int:
 
     from pam_actuation.experiments import load_experiment
     from pam_actuation.experiments.protocols import plan
+    from pam_actuation.report.next_run import on_hardware
     from pam_sim import load_rig
     from pam_sim.files import check_folder, whole_files, write_text
     from pam_sim.located_yaml import dump_yaml
@@ -146,7 +155,10 @@ def _plan(args: argparse.Namespace) -> int:
         with whole_files(args.out) as folder:
             write_text(folder / 'plan.json', json.dumps(found.to_dict(), indent=2) + '\n')
             write_text(folder / 'experiment.yaml', dump_yaml(found.best.experiment))
-        text += f'\nrun it with: pam run {Path(args.out) / "experiment.yaml"}'
+        played, model = (shlex.quote(str(one)) for one in (
+            Path(args.out) / 'experiment.yaml', args.model))
+        text += (f'\nrun it with: {on_hardware(played, model, "first")}'
+                 f'\nsimulated: pam run {played} --rig {model} --valve {rig.valve}')
     emit(args, found.to_dict(), text)
     return EXIT_DONE
 

@@ -32,6 +32,7 @@ import numpy as np
 from pam_actuation.bags.ending import early_sentences
 from pam_actuation.bags.writer import BagWriter
 from pam_actuation.experiments.separating import next_experiment, not_played
+from pam_actuation.report.next_run import command_on_rig, is_of_muscle
 from pam_actuation.report.page import render
 from pam_actuation.report.pages import FOOTER
 from pam_actuation.report.sections.gap import gap_section, VERDICT_TEXT
@@ -196,12 +197,21 @@ def _save_into(out_dir: Path, result: 'GapResult', run: 'Run', of: str) -> None:
     write_text(out_dir / 'report.html', render(
         'Recording against model', VERDICT_TEXT.get(result.verdict, result.verdict) + '.',
         [*numbers_section(result),
-         gap_section(result, command=next_command(result, 'next_experiment.yaml')),
+         gap_section(result, command=next_command(
+             result, 'next_experiment.yaml', [run] if is_of_muscle(run) else [])),
          provenance([('recording', run)])], footer=FOOTER, of=of))
 
 
-def next_command(result: 'GapResult', path: StrPath) -> str:
-    """Return the command that runs the next experiment on the rig that was recorded."""
+def next_command(result: 'GapResult', path: StrPath, runs: 'Sequence[Run]' = (),
+                 model: StrPath = 'model.yaml') -> str:
+    """
+    Return the command that runs the next experiment on the rig that was recorded.
+
+    ``runs`` are the recordings of a muscle; ``model`` is the file with the model found. Without
+    recordings the rig is a simulated one.
+    """
+    if runs:
+        return command_on_rig(runs, path, model)
     return f'pam run {shlex.quote(str(path))} --valve {load_rig(result.model_yaml).valve}'
 
 

@@ -32,6 +32,16 @@ def is_simulated(run: 'Run') -> bool:
     return bool(run.metadata.get('seed'))
 
 
+def is_of_muscle(run: 'Run') -> bool:
+    """Tell whether a recording is of a single muscle, as far as it says what it is of."""
+    from pam_sim import load_rig
+    from pam_sim.errors import InputError
+    try:
+        return 'rig' not in run.metadata or bool(load_rig(run.metadata['rig']))
+    except InputError:
+        return False
+
+
 def command_on_rig(runs: 'Sequence[Run]', experiment: StrPath, model: StrPath,
                    name: str = 'next') -> str:
     """
@@ -49,11 +59,16 @@ def command_on_rig(runs: 'Sequence[Run]', experiment: StrPath, model: StrPath,
         Of the folder in ``runs`` for the new recording.
 
     """
-    played = shlex.quote(str(experiment))
+    played, described = shlex.quote(str(experiment)), shlex.quote(str(model))
     if not all(is_simulated(run) for run in runs):
-        return (f'pam up rig --hardware {HARDWARE_FILE} --model {shlex.quote(str(model))} '
-                f'--experiment {played} --record {shlex.quote(os.path.join("runs", name))}')
-    return f'pam run {played} --rig {_recorded_preset(runs) or shlex.quote(str(model))}'
+        return on_hardware(played, described, name)
+    return f'pam run {played} --rig {_recorded_preset(runs) or described}'
+
+
+def on_hardware(experiment: str, model: str, name: str) -> str:
+    """Return the command that runs an experiment on a real rig; files as the shell takes them."""
+    return (f'pam up rig --hardware {HARDWARE_FILE} --model {model} --experiment {experiment} '
+            f'--record {shlex.quote(os.path.join("runs", name))}')
 
 
 def before_it(runs: 'Sequence[Run]', advice: Mapping[str, Any], model: StrPath) -> str:

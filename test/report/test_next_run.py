@@ -14,9 +14,12 @@
 
 """The command that runs a proposed experiment is one for the rig that was recorded."""
 
-from pam_actuation.cli.main import build_parser
-from pam_actuation.report.next_run import before_it, command_on_rig, is_simulated
+from pam_actuation.cli import gap as gap_verb
+from pam_actuation.cli.main import build_parser, main
+from pam_actuation.report.next_run import before_it, command_on_rig, is_of_muscle, is_simulated
 from pam_sim import load_rig
+from pam_sim.gap.result import GapResult
+from pam_sim.joint import load_joint
 from pam_sim.run import Run
 import pytest
 
@@ -53,3 +56,29 @@ def test_another_load_and_a_load_cell_are_said_before():
     said = before_it([OF_A_FILE], advice, 'found/rig.yaml')
     assert 'put 1.2 kg more into `mass_kg` of a copy of found/rig.yaml' in said
     assert before_it([IMPORTED], {'added_kg': 0.0, 'needs_force': False}, 'found/rig.yaml') == ''
+
+
+def test_a_gap_is_measured_on_where_it_was_recorded(tmp_path):
+    result = GapResult('ambiguous', '', model_yaml=load_rig('dmsp_5_300_realistic').to_yaml())
+    result.next_experiment = {'name': 'next', 'why': 'It tells A from B.', 'experiment': {}}
+    lab = Run({}, {'rig': load_rig('dmsp_20_300_hanging_mass').to_yaml()})
+    simulated = Run({}, {**lab.metadata, 'seed': '3'})
+    _, told = gap_verb._next_lines(result, 'gap', [lab])
+    assert told == ('next: pam up rig --hardware my_hardware.yaml --model gap/model.yaml '
+                    '--experiment gap/next_experiment.yaml --record runs/next')
+    _, told = gap_verb._next_lines(result, 'gap', [simulated])
+    assert told == ('next: pam run gap/next_experiment.yaml --rig dmsp_20_300_hanging_mass '
+                    '--valve ppr')
+    joint = load_joint('joint_dmsp_5_300_realistic').to_yaml()
+    assert is_of_muscle(lab) and not is_of_muscle(Run({}, {'rig': joint}))
+
+
+def test_a_plan_says_how_it_is_run_for_real_and_simulated(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(['gap', '--plan', 'staircase', '--model', 'dmsp_5_300_hanging_mass', '--effects',
+                 'leakage', '--out', 'planned']) == 0
+    out = capsys.readouterr().out
+    assert ('run it with: pam up rig --hardware my_hardware.yaml --model dmsp_5_300_hanging_mass '
+            '--experiment planned/experiment.yaml --record runs/first') in out
+    assert ('simulated: pam run planned/experiment.yaml --rig dmsp_5_300_hanging_mass '
+            '--valve ppr') in out
