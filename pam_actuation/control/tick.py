@@ -36,6 +36,7 @@ from pam_sim.units import P_ATM_PA
  FORCE_AHEAD, FORCE_NOT_FINITE, FORCE_IMPLAUSIBLE, NO_ANGLE, ANGLE_OLD, ANGLE_AHEAD,
  ANGLE_NOT_FINITE, ANGLE_IMPLAUSIBLE, EFFORT_LOST, CONTRACTION_FROZEN,
  FORCE_FROZEN, ANGLE_FROZEN, MUSCLE_SLACK, TWO_SENSORS) = range(25)
+NOT_MEASURED = 'measured yet'        # how the reasons of missing sensors end
 REASONS = (
     'ok',
     'no contraction measured yet',

@@ -31,6 +31,7 @@ import traceback
 from typing import Any
 
 from pam_actuation.drivers.parameter import node_parameter
+from pam_actuation.messages import ACTIVE, CONFIGURED
 from pam_actuation.namespaces import node_name_of
 from pam_actuation.nodes import lockstep
 from pam_actuation.nodes import qos
@@ -408,7 +409,7 @@ class ManagedNode(LifecycleNode):
             self.simulated_time = self.loops.time = self.make_simulated_time()
         for sentence in unused_qos(self):
             self.get_logger().warning(sentence)
-        self.diagnostics.update(OK, 'configured, not active')
+        self.diagnostics.update(OK, CONFIGURED)
 
     def _activate(self) -> None:
         self._await_subscriber()
@@ -426,7 +427,7 @@ class ManagedNode(LifecycleNode):
         # Also while a simulated time stands still.
         steady = None if self.simulated_time is None else SteadyTime()
         self.loops.add(self.value('diagnostics_period_s'), self._report, steady)
-        self.diagnostics.update(OK, 'active')
+        self.diagnostics.update(OK, ACTIVE)
         self.get_logger().info('active')
 
     def _report(self) -> None:

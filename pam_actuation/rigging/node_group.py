@@ -25,14 +25,17 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 import shutil
 import tempfile
+import time
 from typing import Self, TYPE_CHECKING
 
+from pam_actuation.control.tick import NOT_MEASURED
 from pam_actuation.interrupts import held, undisturbed
+from pam_actuation.messages import ACTIVE, CONFIGURED
 from pam_actuation.rigging.compile_ahead import compile_ahead
 from pam_actuation.rigging.domain import DomainLock
 from pam_actuation.rigging.node_spec import NodeSpec, ORDER
 from pam_actuation.rigging.node_template import template_for
-from pam_actuation.rigging.plan import DRIVER, RECORDER
+from pam_actuation.rigging.plan import DRIVER, RECORDER, REFERENCE
 from pam_actuation.rigging.processes import end_all, node_environment, NodeProcess
 from pam_actuation.rigging.transitions import (
     change, CLOSE_TIMEOUT_S, SessionFailed, STOP_TIMEOUT_S, TRANSITION_TIMEOUT_S)
@@ -42,6 +45,8 @@ from pam_sim.errors import InputError
 if TYPE_CHECKING:
     from pam_actuation.rigging.client import RigClient
 
+CONTROLLERS = ('sofc_controller', 'pid_controller', 'joint_controller')
+INPUTS_TIMEOUT_S = 5.0        # DDS tells of a node again every 3 s
 START_TIMEOUT_S = 150.0       # the first start compiles: two minutes on a small machine
 VENT_S = 0.8                  # for the air, before watchdogs and plant stop
 
@@ -166,10 +171,33 @@ class NodeGroup:
         self.change(self.processes, 'configure', START_TIMEOUT_S)
         for kind in ORDER:
             names = self.of_kind(kind)
+            if kind == REFERENCE and names:
+                self._await_inputs()
             self._asked.update(names)
             self._uncertain.update(names)
             self.change(names, 'activate')
             self._uncertain.clear()
+
+    def _await_inputs(self) -> None:
+        """
+        Wait until the controllers hear their sensors, so that no reference begins before.
+
+        DDS may connect a reader seconds after the writer, if a message of the discovery is lost.
+        """
+        controllers = [name for kind in CONTROLLERS for name in self.of_kind(kind)]
+        deadline = time.monotonic() + INPUTS_TIMEOUT_S
+        while time.monotonic() < deadline and not all(
+                self.processes[name].running and self._hears(name) for name in controllers):
+            if self.ended() is not None:
+                return
+            self.started.spin(0.01)
+
+    def _hears(self, name: str) -> bool:
+        """Tell whether a controller has said that it lacks no measurement."""
+        full_name = self.processes[name].full_name
+        message = self.started.statuses.get(full_name, (0, '', {}))[1]
+        return (message not in ('', CONFIGURED, ACTIVE)
+                and not message.endswith(NOT_MEASURED))
 
     def change(self, names: Iterable[str], transition: str,
                timeout_s: float = TRANSITION_TIMEOUT_S) -> None:

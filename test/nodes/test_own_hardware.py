@@ -19,11 +19,13 @@ import subprocess
 import sys
 import time
 
+import numpy as np
 import pytest
 
 pytest.importorskip('rclpy')
 
 from pam_actuation.bags.load import load_run                                # noqa: E402, I100
+from pam_actuation.control.tick import CONTRACTION_OLD, NO_CONTRACTION      # noqa: E402
 from pam_actuation.rigging import layouts                                   # noqa: E402
 from pam_actuation.rigging.domain import DomainLock                         # noqa: E402
 from pam_actuation.rigging.processes import node_environment                # noqa: E402
@@ -51,6 +53,33 @@ def test_a_watchdog_takes_the_place_of_sensors_and_simulator():
     knee = names(layouts.knee(hardware='topics'))
     assert '/knee/flexor/valve_watchdog' in knee and '/knee/joint_controller' in knee
     assert not any('hardware_sensors' in name or 'simulator' in name for name in knee)
+
+
+def test_the_reference_waits_for_sensors_that_come_late(tmp_path):
+    lock = DomainLock()
+    environment = {**node_environment(lock.domain_id, tmp_path), 'PYTHONUNBUFFERED': '1'}
+    (tmp_path / 'lift.yaml').write_text(LIFT)
+    rig = subprocess.Popen(
+        [sys.executable, '-m', 'pam_actuation.cli.main', 'up', 'rig', '--hardware', 'topics',
+         '--experiment', str(tmp_path / 'lift.yaml'), '--record', str(tmp_path / 'bag'),
+         '--seconds', '2'],
+        env=environment, text=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    own = None
+    try:
+        time.sleep(2.5)         # the nodes are up, or come up later: both is well
+        own = subprocess.Popen(
+            [sys.executable, EXAMPLE, '--ros-args', '-r', '__ns:=/muscle'], env=environment)
+        rig.wait(timeout=60)
+    finally:
+        for process in filter(None, (own, rig)):
+            process.kill()
+            process.wait()
+        lock.release()
+    run = load_run(tmp_path / 'bag')
+    reference, states = run.topics['reference'], run.topics['controller_state']
+    at = np.searchsorted(states.stamp_ns, reference.stamp_ns[0])
+    assert states.values['input_reason'][0] == NO_CONTRACTION
+    assert states.values['input_reason'][at] not in (NO_CONTRACTION, CONTRACTION_OLD)
 
 
 def test_the_example_is_moved_and_its_end_is_told_and_vents(tmp_path):
