@@ -93,7 +93,9 @@ def tabulate_static_inverse(rig: Rig) -> FloatArray:
     """
     # A ratio of whole numbers: the nodes are those of the tables in older recordings.
     step_m = _LEAST_UPPER_M / (_LEAST_NODES - 1)
-    nodes = max(_LEAST_NODES, 1 + math.floor(rig.muscle.stroke_m / step_m))
+    # All a controller needs is the static pressure: a rig without a muscle ends at 35 mm.
+    reach_m = rig.muscle.stroke_m if hasattr(rig, 'muscle') else _LEAST_UPPER_M
+    nodes = max(_LEAST_NODES, 1 + math.floor(reach_m / step_m))
     pressure_pa = np.array(rig.static_pressure_pa(step_m * np.arange(nodes)), dtype=float)
     held = np.flatnonzero(pressure_pa <= P_ATM_PA + _HIGHEST_GAUGE_PA)
     last = int(held[-1]) if held.size else 0
