@@ -32,12 +32,14 @@ from launch.actions import OpaqueFunction
 from launch.actions import RegisterEventHandler
 from launch.actions import SetLaunchConfiguration
 from launch.conditions import IfCondition
+from launch.conditions import UnlessCondition
 from launch.event_handlers import OnProcessExit
 from launch.events import Shutdown
 from launch.substitutions import AndSubstitution
 from launch.substitutions import EqualsSubstitution
 from launch.substitutions import LaunchConfiguration
 from launch.substitutions import NotEqualsSubstitution
+from launch.substitutions import NotSubstitution
 from launch.substitutions import OrSubstitution
 from launch_ros.actions import LifecycleNode
 from launch_ros.parameter_descriptions import ParameterValue
@@ -140,21 +142,21 @@ def generate_launch_description():
         'learning': ParameterValue(LaunchConfiguration('learning'), value_type=bool)}
     hardware, file = LaunchConfiguration('hardware'), LaunchConfiguration(HARDWARE_FILE)
     simulated = EqualsSubstitution(hardware, SIMULATED)
-    by_topics = OrSubstitution(simulated, EqualsSubstitution(hardware, TOPICS))
-    real = AndSubstitution(*(NotEqualsSubstitution(hardware, no) for no in (SIMULATED, TOPICS)))
+    by_signal = OrSubstitution(simulated, EqualsSubstitution(hardware, TOPICS))
     awaited = {'await_subscriber': valve['await_subscriber']}
     drivers = [
         _node('valve_driver', valve, {
             'rig': _text(LaunchConfiguration('joint'), '/', side),
             'controller': _text(LaunchConfiguration('controller_file'))}, file, side=side)
         for side in SIDES]
-    watchdogs = [_node('valve_watchdog', valve, side=side, condition=IfCondition(by_topics))
+    watchdogs = [_node('valve_watchdog', valve, side=side, condition=IfCondition(by_signal))
                  for side in SIDES]
-    sensors = [_node('hardware_sensors', awaited, file, side=side, condition=IfCondition(real))
-               for side in SIDES]
+    sensors = [_node('hardware_sensors', awaited, file, side=side,
+                     condition=UnlessCondition(by_signal)) for side in SIDES]
     angle = _node(
         'hardware_sensors', awaited, {'place': 'joint'}, file, condition=IfCondition(
-            AndSubstitution(real, EqualsSubstitution(LaunchConfiguration('angle'), BY_SENSORS))))
+            AndSubstitution(NotSubstitution(by_signal), EqualsSubstitution(
+                LaunchConfiguration('angle'), BY_SENSORS))))
     plant = _node('joint_simulator', valve, joint, seed, condition=IfCondition(simulated))
     controller = _node(
         'joint_controller', valve, joint, control, condition=IfCondition(

@@ -141,16 +141,16 @@ def generate_launch_description():
         condition=IfCondition(LaunchConfiguration('record')))
     hardware = LaunchConfiguration('hardware')
     simulated = EqualsSubstitution(hardware, SIMULATED)
-    by_topics = OrSubstitution(simulated, EqualsSubstitution(hardware, TOPICS))
+    by_signal = OrSubstitution(simulated, EqualsSubstitution(hardware, TOPICS))
     plant = _node('plant_simulator', valve, seed, {'rig': _text('rig')},
                   condition=IfCondition(simulated))
     sensors = _node('hardware_sensors', LaunchConfiguration(HARDWARE_FILE),
-                    condition=UnlessCondition(by_topics))
+                    condition=UnlessCondition(by_signal))
     driver = _node(
         'valve_driver', valve, {'rig': _text('rig'), 'controller': _text(CONTROLLER_NAME)},
         {'accept_valve_command': ParameterValue(
             LaunchConfiguration(RAW), value_type=bool)}, LaunchConfiguration(HARDWARE_FILE))
-    watchdog = _node('valve_watchdog', valve, condition=IfCondition(by_topics))
+    watchdog = _node('valve_watchdog', valve, condition=IfCondition(by_signal))
     reference = _node(
         'reference_generator', valve,
         {'experiment': _text('experiment'), 'await_receiver': True, 'start_delay_s': 3.0,

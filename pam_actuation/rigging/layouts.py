@@ -32,6 +32,7 @@ from pam_sim.joint.parameters import SIDES
 NO_CONTROLLER = 'none'      # one of the user's own sends the pressure commands
 SIMULATED = 'sim'           # no hardware
 TOPICS = 'topics'           # sensors and valves are a program of the user's own
+BY_SIGNAL = (SIMULATED, TOPICS)     # what follows valve_signal, on which a watchdog can vent
 BY_SENSORS, BY_TOPIC = 'sensors', 'topic'       # who publishes the angle of a real joint
 KNEES = ('left_knee', 'right_knee')
 
@@ -81,7 +82,7 @@ def rig(namespace: str = '/muscle', rig: str = 'dmsp_5_300_realistic', valve: st
     accept = {'accept_other_rig': True} if accept_other_rig else {}
     nodes = [NodeSpec('sofc_controller', namespace, {
         **described, **accept, 'controller': name})] if name else []
-    if hardware in (SIMULATED, TOPICS):
+    if hardware in BY_SIGNAL:
         if hardware == SIMULATED:
             nodes.append(NodeSpec('plant_simulator', namespace, described))
         nodes += [NodeSpec('valve_watchdog', namespace, kind),
@@ -167,14 +168,13 @@ def knee(namespace: str = '/knee', joint: str = 'joint_dmsp_5_300_realistic', va
     namespace = namespace_of(namespace)
     common = {'valve_type': valve, 'muscle': namespace.rsplit('/', 1)[-1] or 'knee'}
     of_joint = {**common, 'joint': joint}
-    simulated = hardware == SIMULATED
-    by_topics = hardware == TOPICS
-    file = '' if simulated or by_topics else hardware_file(hardware)
+    by_signal = hardware in BY_SIGNAL
+    file = '' if by_signal else hardware_file(hardware)
     named = {'muscle': common['muscle']}
     nodes = []
-    if simulated:
+    if hardware == SIMULATED:
         nodes.append(NodeSpec('joint_simulator', namespace, {**of_joint, 'seed': seed}))
-    elif angle == BY_SENSORS and not by_topics:
+    elif angle == BY_SENSORS and not by_signal:
         nodes.append(NodeSpec('hardware_sensors', namespace, {**named, 'place': 'joint'}, file))
     if controller != NO_CONTROLLER:
         nodes.append(NodeSpec('joint_controller', namespace, {
@@ -185,7 +185,7 @@ def knee(namespace: str = '/knee', joint: str = 'joint_dmsp_5_300_realistic', va
         below = f'{namespace}/{side}'
         nodes += [NodeSpec('valve_driver', below,
                            {**common, **asking, 'rig': f'{joint}/{side}'}, file),
-                  NodeSpec('valve_watchdog', below, common) if simulated or by_topics
+                  NodeSpec('valve_watchdog', below, common) if by_signal
                   else NodeSpec('hardware_sensors', below, named, file)]
     nodes += _reference(namespace, experiment, common)
     if not record:
@@ -195,7 +195,7 @@ def knee(namespace: str = '/knee', joint: str = 'joint_dmsp_5_300_realistic', va
         from pam_sim.joint import load_joint
         controller = joint_preset_for(load_joint(joint, valve=valve), valve)
     return _recorded(nodes, namespace, {
-        **common, **({'seed': seed} if simulated else {}),
+        **common, **({'seed': seed} if hardware == SIMULATED else {}),
         'rig': joint, 'output': record, 'experiment': experiment,
         'controller': '' if controller == NO_CONTROLLER else controller}, overwrite)
 

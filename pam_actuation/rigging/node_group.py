@@ -40,12 +40,12 @@ from pam_actuation.rigging.processes import end_all, node_environment, NodeProce
 from pam_actuation.rigging.transitions import (
     change, CLOSE_TIMEOUT_S, SessionFailed, STOP_TIMEOUT_S, TRANSITION_TIMEOUT_S)
 from pam_actuation.ros_missing import ros_missing
+from pam_actuation.topics.table import CONTROLLERS
 from pam_sim.errors import InputError
 
 if TYPE_CHECKING:
     from pam_actuation.rigging.client import RigClient
 
-CONTROLLERS = ('sofc_controller', 'pid_controller', 'joint_controller')
 INPUTS_TIMEOUT_S = 5.0        # DDS tells of a node again every 3 s
 START_TIMEOUT_S = 150.0       # the first start compiles: two minutes on a small machine
 VENT_S = 0.8                  # for the air, before watchdogs and plant stop
@@ -118,6 +118,12 @@ class NodeGroup:
     def of_kind(self, kind: str) -> list[str]:
         """Return the names of all nodes of an executable."""
         return [name for name, node in self._nodes.items() if node.name == kind]
+
+    def status(self, name: str) -> tuple[int, str]:
+        """Return level and message of what a node said last, (0, '') if nothing."""
+        level, message, _ = self.started.statuses.get(
+            self.processes[name].full_name, (0, '', {}))
+        return level, message
 
     def was_asked(self, name: str) -> bool:
         """Tell whether a node was asked to become active."""
@@ -194,10 +200,8 @@ class NodeGroup:
 
     def _hears(self, name: str) -> bool:
         """Tell whether a controller has said that it lacks no measurement."""
-        full_name = self.processes[name].full_name
-        message = self.started.statuses.get(full_name, (0, '', {}))[1]
-        return (message not in ('', CONFIGURED, ACTIVE)
-                and not message.endswith(NOT_MEASURED))
+        _, message = self.status(name)
+        return message not in ('', CONFIGURED, ACTIVE) and not message.endswith(NOT_MEASURED)
 
     def change(self, names: Iterable[str], transition: str,
                timeout_s: float = TRANSITION_TIMEOUT_S) -> None:

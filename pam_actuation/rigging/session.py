@@ -216,19 +216,15 @@ class RigSession:
         self.group.started.spin(0.4)
         for driver, watchdog in zip(self.plan.drivers, self.plan.watchdogs):
             if self.processes[driver] is process:
-                level, message = self._status(watchdog)
+                level, message = self.group.status(watchdog)
                 vents = level >= LEVEL_ERROR and message.startswith(VENTS)
                 return (f'{sentence}; {watchdog}: {VENTS}' if vents
                         else f'{sentence}; nobody drives the valve')
         for driver in self.plan.drivers:
-            level, message = self._status(driver)
+            level, message = self.group.status(driver)
             if level:
                 return f'{sentence}; {driver}: {message}'
         return sentence
-
-    def _status(self, place: str) -> tuple[int, str]:
-        """Return level and message of what a node said last, (0, '') if nothing."""
-        return self.group.started.statuses.get(self.processes[place].full_name, (0, '', {}))[:2]
 
     def finish(self, ended: str = '', because: str = '') -> list[str]:
         """

@@ -87,8 +87,7 @@ class Supervisor:
 
     def status(self, name: str) -> tuple[int, str]:
         """Return level and message of what a node said last, (0, '') if nothing."""
-        level, message, _ = self._group.started.statuses.get(name, (0, '', {}))
-        return level, message
+        return self._group.status(name)
 
     def watch(self, seconds: float | None = None,
               until: Callable[[], bool] = lambda: False,
@@ -113,7 +112,7 @@ class Supervisor:
         self._from_start = {name for name, (level, *_) in started.statuses.items()
                             if level >= LEVEL_ERROR}
         while deadline is None or time.monotonic() < deadline:
-            self._group.started.spin(0.05)
+            started.spin(0.05)
             self._hear(tell, time.monotonic() > begun + SETTLED_S)
             ended = self._group.ended()
             if ended is not None:
