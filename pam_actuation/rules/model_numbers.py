@@ -42,12 +42,11 @@ def numbers_in_words(rules: 'RuleBase') -> str:
     """
     if not rules.covariance.any():
         return ''
-    # A model may have numbers and no rules of the path.
-    scaling = {'path_sets': 0, 'path_shortest_m': 1.0, 'path_longest_m': 1.0, **rules.scaling}
-    first_fading = scaling['path_sets'] - scaling.get('path_fading_sets', 0)
+    widths_m = path_widths_m(rules.scaling)
+    first_fading = len(widths_m) - rules.scaling.get('path_fading_sets', 0)
     span_m, rate_m_per_s, acceleration_m_per_s2 = SCALES
     names = {0: 'offset', 1: f'per {span_m * 1e3:g} mm of contraction'}
-    for q, width_m in enumerate(path_widths_m(scaling)[1:], 1):
+    for q, width_m in enumerate(widths_m[1:], 1):
         way = f'{width_m * 1e3:.2g} mm'
         names[number_of(q)] = (
             f'after a path of {way}' if q < first_fading else f'after a path, fading over {way}')

@@ -43,15 +43,15 @@ def path_widths_m(scaling: Mapping[str, Any]) -> FloatArray:
     Parameters
     ----------
     scaling : mapping
-        With ``path_sets`` and what else says what path rules mean. The sets that fade are the
-        last. The widths of either kind are even in ratio.
+        What says what path rules mean; without ``path_sets`` there are none, and a width that
+        is not said is 1. The sets that fade are the last. The widths of either kind are even in
+        ratio.
 
     """
-    sets, fading = int(scaling['path_sets']), int(scaling.get('path_fading_sets', 0))
-    plays = np.geomspace(
-        scaling['path_shortest_m'], scaling['path_longest_m'], max(sets - 1 - fading, 0))
-    fades = np.geomspace(scaling.get('path_fading_shortest_m', 1.0),
-                         scaling.get('path_fading_longest_m', 1.0), fading)
+    sets, fading = (int(scaling.get(name, 0)) for name in ('path_sets', 'path_fading_sets'))
+    plays, fades = (np.geomspace(
+        scaling.get(f'path_{kind}shortest_m', 1.0), scaling.get(f'path_{kind}longest_m', 1.0),
+        max(count, 0)) for kind, count in (('', sets - 1 - fading), ('fading_', fading)))
     return np.concatenate([np.zeros(min(sets, 1)), plays, fades])
 
 

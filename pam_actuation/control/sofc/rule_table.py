@@ -246,12 +246,11 @@ class RuleBase:
 
     def _path_antecedent(self, unit: str, per_m: float) -> Antecedent:
         """Return the sets of the path."""
-        given = {'path_shortest_m': 1.0, 'path_longest_m': 1.0, **self.scaling,
-                 'path_sets': self.path.shape[0]}
-        fading = int(given.get('path_fading_sets', 0))
-        plays = self.path.shape[0] - 1 - fading
-        words = ('any', *['play'] * plays, *[FADING] * fading) if fading else ()
-        return Antecedent('path', unit, per_m * path_widths_m(given), words)
+        sets = self.path.shape[0]
+        fading = int(self.scaling.get('path_fading_sets', 0))
+        words = ('any', *['play'] * (sets - 1 - fading), *[FADING] * fading) if fading else ()
+        widths_m = path_widths_m({**self.scaling, 'path_sets': sets})
+        return Antecedent('path', unit, per_m * widths_m, words)
 
     def arrays(self, suffix: str = '') -> Tables:
         """Return the arrays of all tables: values, or with '_initial', '_fired' those."""
