@@ -18,18 +18,17 @@ from pathlib import Path
 import re
 import signal
 import subprocess
-import sys
 import time
 
 import pytest
 
 pytest.importorskip('rclpy')
 
-from pam_actuation.bags.load import load_run                                # noqa: E402, I100
+from own_programs import Processes                                          # noqa: E402, I100
+from pam_actuation.bags.load import load_run                                # noqa: E402
 from pam_actuation.cli.main import main                                     # noqa: E402
 from pam_actuation.rigging.client import local_context                      # noqa: E402
 from pam_actuation.rigging.domain import DomainLock                         # noqa: E402
-from pam_actuation.rigging.processes import node_environment                # noqa: E402
 import rclpy                                                                # noqa: E402
 from sensor_msgs.msg import JointState                                      # noqa: E402
 
@@ -38,14 +37,6 @@ pytestmark = pytest.mark.ros
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLE = ROOT / 'examples' / 'own_controller.py'
 ATMOSPHERE_PA = 101_325.0
-LIFT = """\
-name: lift
-domain: contraction
-segments:
-  - rest: {duration_s: 0.5}
-  - ramp: {to_m: 0.008, duration_s: 1.5}
-  - hold: {duration_s: 60.0}
-"""
 
 
 def test_the_page_shows_the_example_as_it_is():
@@ -57,29 +48,16 @@ def test_the_page_shows_the_example_as_it_is():
 
 
 def test_the_example_moves_the_muscle_and_the_rig_survives_its_end(tmp_path):
-    lock = DomainLock()
-    environment = {**node_environment(lock.domain_id, tmp_path), 'PYTHONUNBUFFERED': '1'}
-    (tmp_path / 'lift.yaml').write_text(LIFT)
-    rig = subprocess.Popen(
-        [sys.executable, '-m', 'pam_actuation.cli.main', 'up', 'rig', '--controller', 'none',
-         '--namespace', 'leg/', '--experiment', str(tmp_path / 'lift.yaml'),
-         '--record', str(tmp_path / 'bag')],
-        env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
-    own = None
-    try:
+    with Processes(tmp_path) as processes:
+        rig = processes.pam_up('--controller', 'none', '--namespace', 'leg/',
+                               stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
         assert '5 nodes are active' in rig.stdout.readline()
-        own = subprocess.Popen(
-            [sys.executable, EXAMPLE, '--ros-args', '-r', '__ns:=/leg'], env=environment)
+        own = processes.start(EXAMPLE, '--ros-args', '-r', '__ns:=/leg')
         time.sleep(7.0)
         own.send_signal(signal.SIGKILL)
         time.sleep(1.0)
         rig.send_signal(signal.SIGINT)
         output, _ = rig.communicate(timeout=30)
-    finally:
-        for process in filter(None, (own, rig)):
-            process.kill()
-            process.wait()
-        lock.release()
     assert rig.returncode == 1, output
     assert 'finding: /leg/valve_driver: vented because no valid pressure command' in output
     run = load_run(tmp_path / 'bag')

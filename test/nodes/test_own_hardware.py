@@ -16,7 +16,6 @@
 from pathlib import Path
 import signal
 import subprocess
-import sys
 import time
 
 import numpy as np
@@ -24,23 +23,14 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from pam_actuation.bags.load import load_run                                # noqa: E402, I100
+from own_programs import Processes                                          # noqa: E402, I100
+from pam_actuation.bags.load import load_run                                # noqa: E402
 from pam_actuation.control.tick import CONTRACTION_OLD, NO_CONTRACTION      # noqa: E402
 from pam_actuation.rigging import layouts                                   # noqa: E402
-from pam_actuation.rigging.domain import DomainLock                         # noqa: E402
-from pam_actuation.rigging.processes import node_environment                # noqa: E402
 
 pytestmark = pytest.mark.ros
 
 EXAMPLE = Path(__file__).resolve().parents[2] / 'examples' / 'own_hardware.py'
-LIFT = """\
-name: lift
-domain: contraction
-segments:
-  - rest: {duration_s: 0.5}
-  - ramp: {to_m: 0.008, duration_s: 1.5}
-  - hold: {duration_s: 60.0}
-"""
 
 
 def names(nodes):
@@ -56,25 +46,12 @@ def test_a_watchdog_takes_the_place_of_sensors_and_simulator():
 
 
 def test_the_reference_waits_for_sensors_that_come_late(tmp_path):
-    lock = DomainLock()
-    environment = {**node_environment(lock.domain_id, tmp_path), 'PYTHONUNBUFFERED': '1'}
-    (tmp_path / 'lift.yaml').write_text(LIFT)
-    rig = subprocess.Popen(
-        [sys.executable, '-m', 'pam_actuation.cli.main', 'up', 'rig', '--hardware', 'topics',
-         '--experiment', str(tmp_path / 'lift.yaml'), '--record', str(tmp_path / 'bag'),
-         '--seconds', '2'],
-        env=environment, text=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    own = None
-    try:
+    with Processes(tmp_path) as processes:
+        rig = processes.pam_up('--hardware', 'topics', '--seconds', '2',
+                               stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         time.sleep(2.5)         # the nodes are up, or come up later: both is well
-        own = subprocess.Popen(
-            [sys.executable, EXAMPLE, '--ros-args', '-r', '__ns:=/muscle'], env=environment)
+        processes.start(EXAMPLE, '--ros-args', '-r', '__ns:=/muscle')
         rig.wait(timeout=60)
-    finally:
-        for process in filter(None, (own, rig)):
-            process.kill()
-            process.wait()
-        lock.release()
     run = load_run(tmp_path / 'bag')
     reference, states = run.topics['reference'], run.topics['controller_state']
     at = np.searchsorted(states.stamp_ns, reference.stamp_ns[0])
@@ -82,28 +59,16 @@ def test_the_reference_waits_for_sensors_that_come_late(tmp_path):
 
 
 def test_the_example_is_moved_and_its_end_is_told_and_vents(tmp_path):
-    lock = DomainLock()
-    environment = {**node_environment(lock.domain_id, tmp_path), 'PYTHONUNBUFFERED': '1'}
-    (tmp_path / 'lift.yaml').write_text(LIFT)
-    own = subprocess.Popen(
-        [sys.executable, EXAMPLE, '--ros-args', '-r', '__ns:=/muscle'], env=environment)
-    rig = None
-    try:
-        rig = subprocess.Popen(
-            [sys.executable, '-m', 'pam_actuation.cli.main', 'up', 'rig', '--hardware', 'topics',
-             '--experiment', str(tmp_path / 'lift.yaml'), '--record', str(tmp_path / 'bag')],
-            env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    with Processes(tmp_path) as processes:
+        own = processes.start(EXAMPLE, '--ros-args', '-r', '__ns:=/muscle')
+        rig = processes.pam_up(
+            '--hardware', 'topics', stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         assert '5 nodes are active' in rig.stdout.readline()
         time.sleep(6.0)
         own.send_signal(signal.SIGKILL)
         time.sleep(1.5)
         rig.send_signal(signal.SIGINT)
         output, told = rig.communicate(timeout=30)
-    finally:
-        for process in filter(None, (own, rig)):
-            process.kill()
-            process.wait()
-        lock.release()
     assert rig.returncode == 1
     assert '/muscle/valve_driver: ' in told and 'finding: /muscle/valve_driver: ' in output
     run = load_run(tmp_path / 'bag')
