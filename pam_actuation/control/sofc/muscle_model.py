@@ -218,8 +218,8 @@ def doubt_numbers(par: np.record, covariance_pa2: FloatArray) -> None:
     Make the numbers of a rule file less sure, in place; ``covariance_pa2`` is (N, N).
 
     They may come from a model or from another day. A number that is taken for sure is not found
-    anew within minutes: with numbers taught on one rig, another one of the 200 of ``tracking.py``
-    had 40 times the error that it has untaught.
+    anew within minutes. With numbers of another rig, one of the 200 rigs of ``tracking.py`` had 40
+    times the error that it has untaught.
     """
     for i in range(NUMBERS):
         if covariance_pa2[i, i] > 0.0:

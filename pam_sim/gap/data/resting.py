@@ -70,8 +70,9 @@ def rest_of(run: Run, rig: Rig, criteria: Criteria = CRITERIA, added_kg: float =
     Return when the load of a recording rests on its stop; None where that is not seen.
 
     A force that is far below the weight at zero contraction may also be that of a lighter load, or
-    of a spring. So it must be far below what the same load cell reads of the moving load, carried
-    on to zero contraction by a straight line; where the mass is known, below its weight too.
+    of a spring. So it must be far below what the same load cell reads of the moving load. A
+    straight line carries that on to zero contraction. Where the mass is known, the force must be
+    far below its weight, too.
 
     Parameters
     ----------

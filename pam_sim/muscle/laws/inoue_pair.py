@@ -16,9 +16,9 @@
 Two muscles against each other over a pulley: second order, forced by pressure difference.
 
 K. Inoue (1988), Rubbertuators and applications for robots. One muscle pulls
-with F = D^2 p (a (1 - eps)^2 - b). With both pre-contracted to eps0 and
-pressures p0 + dp/2 and p0 - dp/2 the joint is, linearised about the middle,
-J phi'' + c phi' + k phi = g dp; without friction model, as in the paper.
+with F = D^2 p (a (1 - eps)^2 - b). Both are pre-contracted to eps0, with
+pressures p0 + dp/2 and p0 - dp/2. Linearised about the middle, the joint is
+J phi'' + c phi' + k phi = g dp. There is no friction model, as in the paper.
 """
 
 from typing import Any
