@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from pam_sim.effects.registry import all_effects, get_effect
+from pam_sim.effects.setting import EffectSetting
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.files import shown, StrPath
 from pam_sim.keys import Key, names_of
@@ -27,7 +28,7 @@ from pam_sim.muscle.coefficients import ALL, coefficients, PREFIX, stated_names
 from pam_sim.muscle.muscle import get_muscle, LawChoice, muscle_names, read_law, read_muscle
 from pam_sim.named_files import file_stem, NamedFiles
 from pam_sim.parameters import check_parameters, Parameter
-from pam_sim.rig import EffectSetting, Rig
+from pam_sim.rig import Rig
 from pam_sim.rig_parameters import rig_parameters
 from pam_sim.sensors import SENSOR_PARAMETERS
 from pam_sim.tolerance import read_tolerance, Tolerance

@@ -21,13 +21,13 @@ from typing import Any, overload, TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 from pam_sim.annotations import FloatArray, Number
-from pam_sim.effects.registry import get_effect
+from pam_sim.effects.setting import EffectSetting, settings_of
 from pam_sim.errors import InputError
 from pam_sim.load import LOADS
 from pam_sim.load.registry import has_force, load_force_n
 from pam_sim.muscle.coefficients import coefficients, own_value, PREFIX, with_coefficients
 from pam_sim.muscle.muscle import get_muscle, LawChoice, Muscle
-from pam_sim.parameters import check_parameters, Parameter
+from pam_sim.parameters import check_given, check_parameters, Parameter
 from pam_sim.rig_parameters import rig_parameters
 from pam_sim.rig_text import rig_to_yaml
 from pam_sim.sensors import SENSOR_PARAMETERS
@@ -40,43 +40,6 @@ if TYPE_CHECKING:
     from pam_sim.response import Response
 
 _HALVINGS = 52              # of the stroke, to the last bit
-
-
-@dataclass(frozen=True)
-class EffectSetting:
-    """
-    An effect with its numbers, as a model file lists it.
-
-    Parameters
-    ----------
-    name : str
-    parameters : dict
-        All parameters of the effect, name -> value, SI.
-    source : dict
-        Where the numbers come from (bag, date, ci95); kept, not used.
-
-    """
-
-    name: str
-    parameters: dict[str, float] = field(default_factory=dict)
-    source: dict[str, Any] = field(default_factory=dict)
-
-    @classmethod
-    def of(cls, item: 'EffectSetting | Mapping[str, Any] | str') -> 'EffectSetting':
-        """
-        Return a checked setting from a name, a mapping (name, parameters) or a setting.
-
-        Raises
-        ------
-        InputError
-            Unknown effect or parameter, value out of bounds.
-
-        """
-        if isinstance(item, str):
-            item = {'name': item}
-        if not isinstance(item, EffectSetting):
-            item = cls(item['name'], item.get('parameters') or {}, dict(item.get('source') or {}))
-        return cls(item.name, get_effect(item.name).values(item.parameters), dict(item.source))
 
 
 @dataclass(frozen=True)
@@ -127,21 +90,12 @@ class Rig:
         if isinstance(self.muscle, str):
             object.__setattr__(self, 'muscle', get_muscle(self.muscle))
         known = rig_parameters(self.load)
-        if self.parameters.get('contraction_m', 0.0) > self.muscle.stroke_m:
-            raise InputError(
-                f'`contraction_m` is {self.parameters["contraction_m"]:g}; allowed 0 to '
-                f'{self.muscle.stroke_m:g} m with muscle {self.muscle.name}', 'parameters')
-        settings: dict[str, EffectSetting] = {}
-        for item in self.effects:
-            setting = EffectSetting.of(item)
-            if setting.name in settings:
-                raise InputError(f'effect `{setting.name}` is listed twice', 'effects')
-            settings[setting.name] = setting
+        _check_contraction(self.parameters, self.muscle)
         checked: dict[str, object] = {
             'parameters': check_parameters(known, self.parameters),
             'sensors': check_parameters(SENSOR_PARAMETERS, self.sensors, 'sensor setting'),
             'tolerance': tolerances(known, self.tolerance, self.law_list),
-            'effects': list(settings.values())}
+            'effects': settings_of(self.effects)}
         for name, ready in checked.items():
             object.__setattr__(self, name, ready)
 
@@ -236,6 +190,9 @@ class Rig:
             Unknown name or value out of bounds.
 
         """
+        if all(other is None for other in (
+                valve, fidelity, load, sensors, name, muscle, law, tolerance)):
+            return self._with_numbers(parameters or {}, effects)
         new_load = load or self.load
         chosen = get_muscle(muscle) if isinstance(muscle, str) else muscle or self.muscle
         if law is not None:
@@ -258,6 +215,30 @@ class Rig:
             effects=self.effects if effects is None else [
                 EffectSetting.of(item) for item in effects], tolerance=tolerated,
             sensors={**self.sensors, **(sensors or {})}, muscle=chosen)
+
+    def _with_numbers(self, parameters: Mapping[str, float], effects: Sequence[
+            EffectSetting | Mapping[str, Any] | str] | None) -> 'Rig':
+        """
+        Return a copy with other numbers or effects; arguments and errors as of ``with_``.
+
+        A fit asks for one before every simulation, so only what changes is checked.
+        """
+        given = {key: value for key, value in parameters.items() if not key.startswith(PREFIX)}
+        of_law = {key: value for key, value in parameters.items() if key not in given}
+        numbers, muscle, settings = dict(self.parameters), self.muscle, list(self.effects)
+        if of_law:
+            muscle = replace(muscle, law=with_coefficients(muscle.law, of_law))
+        if given:
+            numbers.update(check_given(rig_parameters(self.load), given))
+        if given or of_law:
+            _check_contraction(numbers, muscle)
+        if effects is not None:
+            settings = settings_of(effects, self.effects)
+        changed = object.__new__(Rig)
+        vars(changed).update(
+            vars(self), parameters=numbers, effects=settings, muscle=muscle,
+            sensors=dict(self.sensors), tolerance=dict(self.tolerance))
+        return changed
 
     # -- statics ---------------------------------------------------------------------------
     @overload
@@ -467,3 +448,12 @@ class Rig:
     def volume_m3(self, contraction_m: Number) -> Number:
         """Return muscle and dead volume [m^3] at a contraction [m]; scalar or array."""
         return self.parameters['V_dead'] + self.muscle.volume_m3(contraction_m)
+
+
+def _check_contraction(numbers: Mapping[str, float], muscle: Muscle) -> None:
+    """Refuse a contraction at rest beyond the stroke of the muscle."""
+    held_m = numbers.get('contraction_m', 0.0)
+    if held_m > muscle.stroke_m:
+        raise InputError(
+            f'`contraction_m` is {held_m:g}; allowed 0 to {muscle.stroke_m:g} m with muscle '
+            f'{muscle.name}', 'parameters')

@@ -43,7 +43,7 @@ from pam_sim.rig import Rig
 from pam_sim.units import P_ATM_PA
 
 if TYPE_CHECKING:
-    from pam_sim.rig import EffectSetting
+    from pam_sim.effects.setting import EffectSetting
 
 FRICTION_FACTOR = (0.5, 2.0)
 VALVE_FACTOR = (0.7, 1.3)

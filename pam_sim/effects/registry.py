@@ -24,7 +24,7 @@ from pam_sim.plugins import pick, plugin_files, plugin_module
 from pam_sim.rollout.hooks import check_hook, HOOKS
 
 _OWN_FOLDER = Path(__file__).parent
-_NOT_EFFECTS = ('effect', 'fitting', 'registry')
+_NOT_EFFECTS = ('effect', 'fitting', 'registry', 'setting')
 # What several effects call.
 _SHARED = ('air_volume', 'lag', 'loop_level', 'presliding', 'progressive', 'saturation')
 _UNNAMED_FOLDER = _OWN_FOLDER / 'unnamed'

@@ -19,13 +19,14 @@ from dataclasses import dataclass
 import math
 
 from pam_sim.effects.registry import get_effect
+from pam_sim.effects.setting import EffectSetting
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.gap.data.noise import SMALLEST
 from pam_sim.gap.subsystems.effects import acts_on
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.muscle.coefficients import ALL, PREFIX
 from pam_sim.parameters import Parameter
-from pam_sim.rig import EffectSetting, Rig
+from pam_sim.rig import Rig
 from pam_sim.sensors.zeros import ZEROS
 
 # A range over more than this factor is one of scales: its middle is that of the logarithms.

@@ -1,0 +1,80 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""An effect with its numbers, as a rig lists it."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from pam_sim.effects.registry import get_effect
+from pam_sim.errors import InputError
+
+
+@dataclass(frozen=True)
+class EffectSetting:
+    """
+    An effect with its numbers, as a model file lists it.
+
+    Parameters
+    ----------
+    name : str
+    parameters : dict
+        All parameters of the effect, name -> value, SI.
+    source : dict
+        Where the numbers come from (bag, date, ci95); kept, not used.
+
+    """
+
+    name: str
+    parameters: dict[str, float] = field(default_factory=dict)
+    source: dict[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, item: 'EffectSetting | Mapping[str, Any] | str') -> 'EffectSetting':
+        """
+        Return a checked setting from a name, a mapping (name, parameters) or a setting.
+
+        Raises
+        ------
+        InputError
+            Unknown effect or parameter, value out of bounds.
+
+        """
+        if isinstance(item, str):
+            item = {'name': item}
+        if not isinstance(item, EffectSetting):
+            item = cls(item['name'], item.get('parameters') or {}, dict(item.get('source') or {}))
+        return cls(item.name, get_effect(item.name).values(item.parameters), dict(item.source))
+
+
+def settings_of(items: Iterable[EffectSetting | Mapping[str, Any] | str],
+                checked: Sequence[EffectSetting] = ()) -> list[EffectSetting]:
+    """
+    Return the checked settings of effects; those of ``checked`` stay as they are.
+
+    Raises
+    ------
+    InputError
+        As of ``EffectSetting.of``, or an effect is listed twice.
+
+    """
+    kept = {id(setting): setting for setting in checked}
+    settings = [kept.get(id(item)) or EffectSetting.of(item) for item in items]
+    seen = set()
+    for setting in settings:
+        if setting.name in seen:
+            raise InputError(f'effect `{setting.name}` is listed twice', 'effects')
+        seen.add(setting.name)
+    return settings
