@@ -19,9 +19,6 @@ from contextlib import contextmanager
 import os
 import re
 
-from pam_sim.characterise import characterise_table
-from pam_sim.characterise.dimensions import Dimensions
-from pam_sim.characterise.tables import read_measured_table
 from pam_sim.errors import InputError
 from pam_sim.files import check_file
 from pam_sim.muscle.lookup_table import COLUMNS, read_commented_csv, read_table
@@ -72,6 +69,10 @@ def force_map_of(path: str, length_m: float | None, bore_m: float | None, out: s
         read_table(path)
         yield path
         return
+    # Slow to import, and most rig files need no table.
+    from pam_sim.characterise import characterise_table
+    from pam_sim.characterise.dimensions import Dimensions
+    from pam_sim.characterise.tables import read_measured_table
     measured = read_measured_table(path)
     if length_m is None or bore_m is None:
         raise InputError('a table measured by others needs --length-mm and --bore-mm, the size of '
