@@ -190,8 +190,10 @@ class Rig:
             Unknown name or value out of bounds.
 
         """
-        if all(other is None for other in (
-                valve, fidelity, load, sensors, name, muscle, law, tolerance)):
+        if all(other is None for other in (sensors, muscle, law, tolerance)) and all(
+                other is None or other == own for other, own in (
+                    (valve, self.valve), (fidelity, self.fidelity), (load, self.load),
+                    (name, self.name))):
             return self._with_numbers(parameters or {}, effects)
         new_load = load or self.load
         chosen = get_muscle(muscle) if isinstance(muscle, str) else muscle or self.muscle
