@@ -34,6 +34,7 @@ MUSCLE = {'contraction': SignalGap('m', 2e-5, 6e-4, 4e-4, 1e-4),
           'force': SignalGap('N', 0.1, 1.0, 0.11, 0.1)}
 
 
+@pytest.mark.usefixtures('no_proposal')
 @pytest.mark.parametrize('own_proof', [True, False])
 def test_a_valve_without_a_name_takes_none_from_the_muscle(own_proof):
     rig = nominal().with_(effects=[STICKY, RUBBING])

@@ -37,6 +37,7 @@ def rig(friction_n, sticky_pa=0.0):
     return nominal().with_(effects=effects)
 
 
+@pytest.mark.usefixtures('no_proposal')
 def test_what_makes_a_signal_worse_is_not_added_and_the_rest_is():
     """The regulator of the proof does not stick; its muscle rubs more than that of the search."""
     result = find_gap(

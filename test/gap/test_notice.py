@@ -128,6 +128,7 @@ def test_only_what_noise_cannot_make_is_a_gap():
     assert not Notice('valve', 'pressure', 0.9, 0.3, 2.9).is_gap(CRITERIA)
 
 
+@pytest.mark.usefixtures('no_proposal')
 def test_what_is_too_small_for_a_name_hides_no_gap_beside_it(monkeypatch):
     monkeypatch.setattr('pam_sim.gap.verdict.is_material', lambda *given: False)
     rig = nominal().with_(effects=[

@@ -91,6 +91,7 @@ def test_a_rough_number_takes_the_place_of_an_error_of_a_sensor(tied, behind, un
     assert [r.name for r in found] == stay
 
 
+@pytest.mark.usefixtures('no_proposal')
 def test_a_number_that_is_unknown_is_no_excuse_for_a_clear_gap():
     """Its prior would allow for any error; what is left of a clear gap is unknown."""
     rig = replace(nominal(), tolerance={'spring_n_per_m': UNKNOWN})

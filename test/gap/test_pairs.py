@@ -45,6 +45,7 @@ def test_the_true_pair_promises_most(run):
     assert all(a.name != b.name for (a, b), _ in pairs)
 
 
+@pytest.mark.usefixtures('no_proposal')
 def test_both_are_named_where_one_by_one_fails(run, monkeypatch):
     both = find_gap(run, nominal(), effects=LOOK_ALIKES)
     assert {e['name'] for e in both.effects} == {'creep', 'contraction_bias'}

@@ -25,7 +25,7 @@ NAMES = ['coulomb_friction', 'pressure_friction', 'viscous_damping']
 
 def run_with(name, **parameters):
     effect = {'name': name, 'parameters': parameters}
-    return recorded(nominal().with_(effects=[effect]), voltages(20.0))
+    return recorded(nominal().with_(effects=[effect]), voltages(14.0))
 
 
 @pytest.fixture(scope='module')
@@ -33,6 +33,7 @@ def smooth():
     return run_with('smooth_friction', force_n=2.0, speed_m_per_s=1.5e-3)
 
 
+@pytest.mark.usefixtures('no_proposal')
 def test_friction_that_does_not_stick_is_not_called_dry(smooth):
     result = find_gap(smooth, nominal(), effects=NAMES)
     assert result.verdict == 'unknown' and not result.effects
@@ -49,7 +50,7 @@ def test_it_is_named_by_whoever_asks_for_it(smooth):
 def test_one_that_the_model_has_is_not_held_against_a_name():
     model = nominal().with_(effects=[{'name': 'smooth_friction', 'parameters': {'force_n': 2.0}}])
     dry = {'name': 'coulomb_friction', 'parameters': {'force_n': 3.0}}
-    result = find_gap(recorded(model.with_(effects=[*model.effects, dry]), voltages(20.0)),
+    result = find_gap(recorded(model.with_(effects=[*model.effects, dry]), voltages(14.0)),
                       model, effects=NAMES)
     assert [e['name'] for e in result.effects] == ['coulomb_friction']
 

@@ -67,13 +67,13 @@ def test_a_bias_is_found_beside_an_effect_that_first_took_it_in():
     rig = nominal().with_(effects=[
         {'name': 'threshold_pressure', 'parameters': {'pressure_pa': 9e3}},
         {'name': 'pressure_bias', 'parameters': {'bias_pa': 2.6e3}}])
-    result = find_gap(recorded(rig, voltages(20.0)), nominal())
+    result = find_gap(recorded(rig, voltages(14.0)), nominal())
     assert {e['name'] for e in result.effects} == {'threshold_pressure', 'pressure_bias'}
     assert result.ambiguity_set == [e['name'] for e in result.effects]
 
 
 def test_a_cause_that_no_effect_explains_stays_unknown():
-    run = recorded(nominal(), voltages(20.0))
+    run = recorded(nominal(), voltages(12.0))
     at = run.topics['contraction'].time_s(run.start_ns)
     # A second body touches now and then; nothing in the model knows when.
     run.topics['contraction'].values['contraction_m'] += 4e-4 * (np.sin(7.3 * at) > 0.8)
@@ -265,7 +265,7 @@ def test_friction_that_bends_first_is_named_as_friction():
     """And leaves nothing that a second effect would have to explain."""
     rig = nominal().with_(effects=[{'name': 'coulomb_friction_presliding', 'parameters': {
         'force_n': 2.0, 'presliding_m': 2.5e-5}}])
-    result = find_gap(recorded(rig, voltages(20.0)), nominal())
+    result = find_gap(recorded(rig, voltages(14.0)), nominal())
     assert result.verdict == 'effects'
     assert [e['name'] for e in result.effects] == ['coulomb_friction']
     assert result.effects[0]['formulation'] == 'coulomb_friction_presliding'

@@ -129,9 +129,9 @@ def test_the_hsv_pair_keeps_no_gap_in_a_closed_volume():
 
 
 def test_without_a_load_cell_the_gap_is_still_measured():
-    run = recorded(load_rig('dmsp_5_300_realistic'), voltages(12.0),
-                   topics=('pressure', 'contraction'))
-    result = find_gap(run, nominal())
+    rig = load_rig('dmsp_5_300_realistic')
+    run = recorded(rig, voltages(12.0), topics=('pressure', 'contraction'))
+    result = find_gap(run, nominal(), effects=[e.name for e in rig.effects])
     assert set(result.signals) == {'pressure', 'contraction'}
     assert result.signals['contraction'].shrink_percent > 50.0
     assert any('load cell' in remark for remark in result.remarks)
