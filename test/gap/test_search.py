@@ -39,7 +39,7 @@ from pam_sim.gap.subsystems.problems import subsystem_problems
 import pytest
 
 
-def result_of(name, seconds=20.0, **parameters):
+def result_of(name, seconds=14.0, **parameters):
     rig = nominal().with_(effects=[{'name': name, 'parameters': parameters}])
     return find_gap(recorded(rig, voltages(seconds)), nominal())
 
