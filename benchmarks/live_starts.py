@@ -150,7 +150,7 @@ def show(args):
         way_ns = int(np.median([row['way_ns'] for _, row in rows]))
         if args.hidden:
             rigs = [hidden_rig(args.valve, HIDDEN_SEED + start) for start in range(args.starts)]
-            exact, with_way = ([exactly(one, other, args.controller, rules, folder, way, SEEDS[:2])
+            exact, with_way = ([exactly(one, other, args.controller, rules, folder, way)
                                 for other in rigs] for way in (0, way_ns))
         else:
             exact, with_way = (
