@@ -199,10 +199,7 @@ class Rig:
         chosen = get_muscle(muscle) if isinstance(muscle, str) else muscle or self.muscle
         if law is not None:
             chosen = chosen.with_law(law)
-        given = dict(parameters or {})
-        of_law = {key: given.pop(key) for key in list(given) if key.startswith(PREFIX)}
-        if of_law:
-            chosen = replace(chosen, law=with_coefficients(chosen.law, of_law))
+        given, chosen = _apart(parameters or {}, chosen)
         known = {p.name for p in rig_parameters(new_load)} if new_load in LOADS else set()
         kept = {key: value for key, value in self.parameters.items() if key in known}
         if chosen.law.name == self.muscle.law.name:
@@ -214,9 +211,8 @@ class Rig:
         return replace(
             self, name=name or self.name, load=new_load, valve=valve or self.valve,
             fidelity=fidelity or self.fidelity, parameters={**kept, **given},
-            effects=self.effects if effects is None else [
-                EffectSetting.of(item) for item in effects], tolerance=tolerated,
-            sensors={**self.sensors, **(sensors or {})}, muscle=chosen)
+            effects=self.effects if effects is None else settings_of(effects, self.effects),
+            tolerance=tolerated, sensors={**self.sensors, **(sensors or {})}, muscle=chosen)
 
     def _with_numbers(self, parameters: Mapping[str, float], effects: Sequence[
             EffectSetting | Mapping[str, Any] | str] | None) -> 'Rig':
@@ -225,17 +221,10 @@ class Rig:
 
         A fit asks for one before every simulation, so only what changes is checked.
         """
-        given = {key: value for key, value in parameters.items() if not key.startswith(PREFIX)}
-        of_law = {key: value for key, value in parameters.items() if key not in given}
-        numbers, muscle, settings = dict(self.parameters), self.muscle, list(self.effects)
-        if of_law:
-            muscle = replace(muscle, law=with_coefficients(muscle.law, of_law))
-        if given:
-            numbers.update(check_given(rig_parameters(self.load), given))
-        if given or of_law:
-            _check_contraction(numbers, muscle)
-        if effects is not None:
-            settings = settings_of(effects, self.effects)
+        given, muscle = _apart(parameters, self.muscle)
+        numbers = {**self.parameters, **check_given(rig_parameters(self.load), given)}
+        _check_contraction(numbers, muscle)
+        settings = list(self.effects) if effects is None else settings_of(effects, self.effects)
         changed = object.__new__(Rig)
         vars(changed).update(
             vars(self), parameters=numbers, effects=settings, muscle=muscle,
@@ -450,6 +439,15 @@ class Rig:
     def volume_m3(self, contraction_m: Number) -> Number:
         """Return muscle and dead volume [m^3] at a contraction [m]; scalar or array."""
         return self.parameters['V_dead'] + self.muscle.volume_m3(contraction_m)
+
+
+def _apart(parameters: Mapping[str, float], muscle: Muscle) -> tuple[dict[str, float], Muscle]:
+    """Return the numbers of a rig, and its muscle with those of the force law."""
+    given = {key: value for key, value in parameters.items() if not key.startswith(PREFIX)}
+    of_law = {key: value for key, value in parameters.items() if key not in given}
+    if of_law:
+        muscle = replace(muscle, law=with_coefficients(muscle.law, of_law))
+    return given, muscle
 
 
 def _check_contraction(numbers: Mapping[str, float], muscle: Muscle) -> None:
