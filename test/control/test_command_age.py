@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """Behind on/off valves the age at which commands act is found with the dead time."""
 
 from pam_actuation.control.config import load_controller
