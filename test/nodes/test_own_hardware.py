@@ -45,16 +45,26 @@ def test_a_watchdog_takes_the_place_of_sensors_and_simulator():
     assert not any('hardware_sensors' in name or 'simulator' in name for name in knee)
 
 
+def await_recording(bag):
+    """Return once the file of a bag is there."""
+    deadline_s = time.monotonic() + 60.0
+    while not list(bag.glob('*.mcap')):
+        assert time.monotonic() < deadline_s, 'nothing is recorded'
+        time.sleep(0.05)
+
+
 def test_the_reference_waits_for_sensors_that_come_late(tmp_path):
     with Processes(tmp_path) as processes:
         rig = processes.pam_up('--hardware', 'topics', '--seconds', '2',
                                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        time.sleep(2.5)         # the nodes are up, or come up later: both is well
+        await_recording(processes.bag)
+        time.sleep(1.0)         # the controller comes up as well
         processes.start(EXAMPLE, '--ros-args', '-r', '__ns:=/muscle')
         rig.wait(timeout=60)
     run = load_run(tmp_path / 'bag')
     reference, states = run.topics['reference'], run.topics['controller_state']
     at = np.searchsorted(states.stamp_ns, reference.stamp_ns[0])
+    assert states.values['input_reason'][0] == NO_CONTRACTION
     assert states.values['input_reason'][at] not in (NO_CONTRACTION, CONTRACTION_OLD)
 
 
