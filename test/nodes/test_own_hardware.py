@@ -23,7 +23,8 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from own_programs import Processes                                          # noqa: E402, I100
+from live_rig import wait_for                                               # noqa: E402, I100
+from own_programs import Processes                                          # noqa: E402
 from pam_actuation.bags.load import load_run                                # noqa: E402
 from pam_actuation.control.tick import CONTRACTION_OLD, NO_CONTRACTION      # noqa: E402
 from pam_actuation.rigging import layouts                                   # noqa: E402
@@ -45,19 +46,11 @@ def test_a_watchdog_takes_the_place_of_sensors_and_simulator():
     assert not any('hardware_sensors' in name or 'simulator' in name for name in knee)
 
 
-def await_recording(bag):
-    """Return once the file of a bag is there."""
-    deadline_s = time.monotonic() + 60.0
-    while not list(bag.glob('*.mcap')):
-        assert time.monotonic() < deadline_s, 'nothing is recorded'
-        time.sleep(0.05)
-
-
 def test_the_reference_waits_for_sensors_that_come_late(tmp_path):
     with Processes(tmp_path) as processes:
         rig = processes.pam_up('--hardware', 'topics', '--seconds', '2',
                                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        await_recording(processes.bag)
+        wait_for(lambda: list(processes.bag.glob('*.mcap')), 60.0, 'the recording')
         time.sleep(1.0)         # the controller comes up as well
         processes.start(EXAMPLE, '--ros-args', '-r', '__ns:=/muscle')
         rig.wait(timeout=60)
