@@ -23,7 +23,7 @@ from pam_sim.annotations import BoolArray, FloatArray, IntArray
 from pam_sim.gap.data.noise import smallest_step
 
 QUICK_STEPS = 4.0            # of the resolution, in one row: then a fresh reading must change
-FEWEST = 20                  # quick changes, one after the other
+FEWEST = 10                  # quick changes, one after the other; a record of steps has few
 HALF = 0.5                   # of them; fewer that follow a repeat are rests of the motion
 AT_REST_PERCENT = 90.0       # of the runs: a longer one is a signal at rest
 SLOWEST_S = 0.15             # of a reading; what stands still for longer moves in jumps

@@ -53,6 +53,14 @@ def test_a_signal_that_is_read_in_every_row_stays_whole(values):
     assert fresh_rows(STAMPS, values).all()
 
 
+@pytest.mark.parametrize('rows', [1, 2])
+def test_two_steps_tell_whether_a_sensor_answers_in_every_row(rows):
+    """A step is over in a few readings, and at rest nothing tells."""
+    since = (TIME_S[:, np.newaxis] - [5.0, 10.0]).clip(0.0)
+    values = 290.0 - 150.0 * (np.exp(-since / 0.06) * [1.0, -1.0]).sum(axis=1)
+    assert fresh_rows(STAMPS, held(np.round(values), rows)).mean() == 1.0 / rows
+
+
 def test_commands_keep_every_row_and_each_signal_its_own_stamps():
     given = {'pressure': held(MOTION, 2), 'contraction': MOTION, 'force': held(MOTION, 9),
              'ppr_voltage': held(MOTION, 5)}
