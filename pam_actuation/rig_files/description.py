@@ -24,13 +24,14 @@ from pam_sim.muscle.geometry import BORE_M as NOMINAL_BORE_M
 from pam_sim.muscle.muscle import DIMENSIONS, get_muscle, muscle_names
 from pam_sim.parameters import Parameter
 from pam_sim.rig_parameters import rig_parameters
-from pam_sim.tolerance import AbsoluteSd, Tolerance
+from pam_sim.tolerance import AbsoluteSd, Tolerance, UNKNOWN
 from pam_sim.valve.regulator_presets import get_regulator
 
 TYPE_TOLERANCE = 0.15        # of a force map of the type: muscles of a type differ by 10 to 20 %
 BY_BORE_TOLERANCE = 0.2      # of a force map taken from a muscle of another bore
 LAG_TOLERANCE = 0.5          # of the lag of a regulator that nobody stated
 DAMPING_TOLERANCE = 0.5      # of the damping of a muscle of another bore that nobody stated
+ZERO_SHARE = 0.02            # of the range; by data sheets 1 % each of regulator and sensor
 DAMPING = 'damping_n_s_per_m'
 REGULATOR_NUMBERS = ('K_m', 'ppr_lowest_v', 'ppr_highest_v', 'ppr_zero_pa')
 
@@ -175,13 +176,25 @@ class Description:
                                                               - nominal['ppr_lowest_v']))
         gain = float(f'{(high_pa - low_pa) / (high_v - low_v):.9g}')
         for name, value in zip(REGULATOR_NUMBERS, (gain, low_v, high_v, low_pa)):
-            # A data sheet begins its range where control begins, not quite at the lowest input.
-            unsure = AbsoluteSd(abs(low_pa)) if (
-                self.regulator and name == 'ppr_zero_pa' and low_pa != 0.0) else None
+            unsure = self._zero_tolerance(low_pa, high_pa) if name == 'ppr_zero_pa' else None
             self._add(name, value, unsure, source)
         if 'T_m' not in self.numbers:
             self._add('T_m', nominal['T_m'], LAG_TOLERANCE,
                       'not stated: that of the nominal regulator, yours may differ by half')
+
+    def _zero_tolerance(self, low_pa: float, high_pa: float) -> Tolerance:
+        """
+        Return how well the zero of the regulator is known.
+
+        A zero of the pressure sensor acts on what is read as it does. Where that one is unknown,
+        the regulator is the only reference there is.
+        """
+        # A data sheet begins its range where control begins, not quite at the lowest input.
+        begin_pa = abs(low_pa) if self.regulator else 0.0
+        sensor = self.numbers.get('pressure_zero_pa')
+        if sensor is None or sensor.tolerance != UNKNOWN:
+            begin_pa = max(begin_pa, ZERO_SHARE * (high_pa - low_pa))
+        return AbsoluteSd(begin_pa)
 
     def _add(self, name: str, value: float, tolerance: Tolerance | None, note: str) -> None:
         """Add a number that follows from others; how well it is known may be said beside it."""

@@ -192,6 +192,11 @@ def test_a_data_sheet_gives_the_pressures_and_asks_for_what_it_lacks(name, capsy
     ends = [rig.with_(parameters={'T_m': 0.01}).simulate([volts] * 1000).true_pressure_pa[-1]
             - 101_325.0 for volts in (0.0, 10.0)]
     assert ends == pytest.approx([sheet.lowest_gauge_pa, sheet.highest_gauge_pa], abs=1.0)
+    range_pa = sheet.highest_gauge_pa - sheet.lowest_gauge_pa
+    assert rig.prior_sd('ppr_zero_pa') == max(sheet.lowest_gauge_pa, 0.02 * range_pa)
+    # An unknown zero of the sensor has the regulator as its reference.
+    rig = new('--regulator', name, '--regulator-volts', '0:10', '--unknown', 'pressure_zero_pa',
+              '--overwrite')
     assert rig.prior_sd('ppr_zero_pa') == sheet.lowest_gauge_pa
 
 
