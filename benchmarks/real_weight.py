@@ -33,9 +33,9 @@ import black_boxes
 import numpy as np
 from pam_actuation.bags.load import load_run
 from pam_actuation.cli.main import main as pam
+from pam_actuation.report.gap import gap_of
 from pam_sim import load_rig
 from pam_sim.errors import InputError
-from pam_sim.gap import find_gap
 from pam_sim.gap.data.commanded import commanded
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.subsystems.simulation import free_run
@@ -138,9 +138,17 @@ def black_box_errors(kind, runs, judged, traces):
     return errors
 
 
-def by_hand(rig, given, runs, judged):
-    """Return {signal: rms} on a run of a rig whose valve has dead time and limits, fitted."""
-    *recordings, proof = [Recording(run, 'ppr') for run in commanded((*runs, judged), given)[0]]
+def free_errors(found, given, judged):
+    """Return the errors (rms) of a rig in free run by signal, in the unit of people."""
+    recording = Recording(commanded([judged], given)[0][0], 'ppr')
+    simulated = free_run(found, recording)
+    return [SIGNALS[signal][1] * black_boxes.rms(simulated[signal] - recording.measured[signal])
+            for signal in SIGNALS]
+
+
+def by_hand(rig, given, runs):
+    """Return the rig whose valve has a dead time and limits, fitted to runs."""
+    recordings = [Recording(run, 'ppr') for run in commanded(runs, given)[0]]
     starts, low, high = np.array([*BY_HAND.values()]).T
     scale = np.abs(starts)
 
@@ -151,16 +159,13 @@ def by_hand(rig, given, runs, judged):
         return rig.with_(parameters=values.pop(''), effects=[
             {'name': name, 'parameters': own} for name, own in values.items()])
 
-    def off(found, recording, signal):
-        return free_run(found, recording)[signal] - recording.measured[signal]
-
     fits = [least_squares(
-        lambda x: np.concatenate([off(made(x), one, 'pressure') for one in recordings]),
+        lambda x: np.concatenate([
+            free_run(made(x), one)['pressure'] - one.measured['pressure'] for one in recordings]),
         np.r_[1.0, lag_s / scale[1], -1.0, delay_s / scale[3], 1.0, 1.0],
         bounds=(low / scale, high / scale), diff_step=1e-2)
         for lag_s, delay_s in ((0.02, 0.02), (0.006, 0.01), (0.006, 0.03), (0.05, 0.005))]
-    found = made(min(fits, key=lambda fit: fit.cost).x)
-    return {signal: black_boxes.rms(off(found, proof, signal)) for signal in SIGNALS}
+    return made(min(fits, key=lambda fit: fit.cost).x)
 
 
 def show(name, folder, seconds, scratch):
@@ -169,7 +174,7 @@ def show(name, folder, seconds, scratch):
     runs = [imported(one_file(folder, pattern), scratch / f'{name}_{number}')
             for number, pattern in enumerate((*fitted, judged))]
     rig = rig_of(mass_kg, scratch / f'{name}.yaml')
-    result = find_gap(runs[:-1], rig, runs[-1], None, seconds)
+    result = gap_of(runs[:-1], rig, runs[-1], seconds=seconds)
     print(f'**{name}**: {told}. Verdict {result.verdict}: '
           + (', '.join(f'`{one["name"]}`' for one in result.effects) or 'nothing named')
           + f'; {result.simulations} simulations.\n')
@@ -179,9 +184,12 @@ def show(name, folder, seconds, scratch):
         getattr(result.traces[signal], field) - result.traces[signal].measured)
         for signal in SIGNALS] for title, field in (
             ('before', 'before'), ('calibrated', 'refit'), ('`pam gap`', 'after'))}
-    hand = by_hand(load_rig(result.model_yaml).with_(effects=[]), rig, runs[:-1], runs[-1])
-    rows['dead time, fill and vent limits, chosen by hand'] = [
-        SIGNALS[signal][1] * hand[signal] for signal in SIGNALS]
+    best = '`pam gap`'
+    if result.surrogate:
+        best = f'its surrogate: {", ".join(f"`{one}`" for one in result.surrogate.names)}'
+        rows[best] = free_errors(load_rig(result.surrogate.model_yaml), rig, runs[-1])
+    hand = by_hand(load_rig(result.model_yaml).with_(effects=[]), rig, runs[:-1])
+    rows['dead time, fill and vent limits, chosen by hand'] = free_errors(hand, rig, runs[-1])
     labels = []
     for kind in (black_boxes.arx, black_boxes.narx):
         title, errors = kind.__name__.upper(), black_box_errors(
@@ -190,7 +198,7 @@ def show(name, folder, seconds, scratch):
         labels += [f'{title}, {signal}: {label}' for signal, (*_, label) in errors.items()]
     for title, cells in rows.items():
         print(f'| {title} | {cells[0]:.2f} | {cells[1]:.3f} |')
-    times = [rows['`pam gap`'][k] / min(rows['ARX'][k], rows['NARX'][k]) for k in (0, 1)]
+    times = [rows[best][k] / min(rows['ARX'][k], rows['NARX'][k]) for k in (0, 1)]
     print(f'\nTimes the best black box: pressure {times[0]:.2f}, contraction {times[1]:.2f}; '
           f'bar {BAR}. ' + '; '.join(labels) + '.\n', flush=True)
 

@@ -52,6 +52,7 @@ from pam_sim.gap.data.health import check_for, dead_signals
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.signals import recorded_valve
 from pam_sim.gap.propose.proposal import EFFECT_FILE, MODEL_FILE
+from pam_sim.gap.propose.surrogate import FILE as SURROGATE_FILE
 from pam_sim.gap.select.memory import memories
 from pam_sim.gap.subsystems.simulation import free_run
 from pam_sim.identify.before_gap import numbers_block, numbers_first, numbers_text
@@ -65,7 +66,7 @@ if TYPE_CHECKING:
     from pam_sim.run import Run
 
 FILES = ('gap.json', 'model.yaml', 'next_experiment.yaml', 'compare.mcap', 'report.html',
-         EFFECT_FILE, MODEL_FILE)
+         EFFECT_FILE, MODEL_FILE, SURROGATE_FILE)
 NUMBERS_SHARE = 0.3          # of the progress, where numbers are unknown
 FOLDERS = ('measured', 'simulated_before', 'simulated_refit', 'simulated_after',
            'residual_before', 'residual_after')
@@ -175,7 +176,8 @@ def save_gap(result: 'GapResult', run: 'Run', out_dir: StrPath, of: str = '') ->
     Write gap.json, model.yaml, compare.mcap and report.html of a result.
 
     Where rivals are left, next_experiment.yaml too, which ``pam run`` executes. Where a term is
-    proposed, its effect file and the model with it. Such files of an earlier result are removed.
+    proposed, its effect file and the model with it. Where there is a surrogate, its model. Such
+    files of an earlier result are removed.
     """
     # A model that has the proposed effect needs its file.
     kept = (EFFECT_FILE, MODEL_FILE) if Path(EFFECT_FILE).stem in result.model_yaml else ()
@@ -192,6 +194,8 @@ def _save_into(out_dir: Path, result: 'GapResult', run: 'Run', of: str) -> None:
     if result.proposal:
         write_text(out_dir / result.proposal.file, result.proposal.text)
         write_text(out_dir / MODEL_FILE, result.proposal.model_yaml)
+    if result.surrogate:
+        write_text(out_dir / SURROGATE_FILE, result.surrogate.model_yaml)
     if result.traces:
         write_compare(result, run.namespace, out_dir / 'compare.mcap')
     write_text(out_dir / 'report.html', render(

@@ -18,9 +18,9 @@ from dataclasses import dataclass, field
 import math
 from typing import Any
 
-import numpy as np
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.gap.data.signals import READABLE
+from pam_sim.plain_json import finite
 from pam_sim.short_repr import short_repr
 
 SCHEMA = 1
@@ -219,6 +219,8 @@ class GapResult:
         The same for a person.
     proposal : pam_sim.gap.propose.proposal.Proposal, optional
         A term without a name that the certify data confirm.
+    surrogate : pam_sim.gap.propose.surrogate.Surrogate, optional
+        A model without named effects that follows the certify data better.
 
     """
 
@@ -251,6 +253,7 @@ class GapResult:
     numbers_first: dict[str, Any] | None = None
     first_lines: list[str] = field(default_factory=list)
     proposal: Any = None
+    surrogate: Any = None
 
     @property
     def place(self) -> str:
@@ -273,11 +276,12 @@ class GapResult:
 
     def to_dict(self) -> dict[str, Any]:
         """Return what gap.json holds, plain data without NaN."""
-        return _finite({
+        return finite({
             'schema': SCHEMA, 'verdict': self.verdict,
             'subsystems': {name: one.to_dict() for name, one in self.subsystems.items()},
             'not_judged': self.not_judged,
             'proposal': self.proposal.to_dict() if self.proposal else None,
+            'surrogate': self.surrogate.to_dict() if self.surrogate else None,
             'effects': self.effects,
             'parameters': [p.to_dict() for p in self.parameters],
             'ambiguity_set': self.ambiguity_set, 'next_experiment': self.next_experiment,
@@ -294,17 +298,3 @@ def _when(condition: str) -> str:
     if condition in ('contracting', 'extending'):
         return f'while {condition}'
     return f'at {condition}' if condition[0].isdigit() else condition
-
-
-def _finite(value: Any) -> Any:
-    """Return the value with NumPy numbers as plain ones and NaN or infinity as None."""
-    if isinstance(value, dict):
-        return {str(k): _finite(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_finite(v) for v in value]
-    if isinstance(value, (bool, str, type(None))):
-        return value
-    if isinstance(value, (int, np.integer)):
-        return int(value)
-    number = float(value)
-    return number if math.isfinite(number) else None

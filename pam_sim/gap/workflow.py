@@ -29,6 +29,7 @@ from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit
 from pam_sim.gap.plan.detectable import least_sizes
 from pam_sim.gap.propose.proposal import propose
+from pam_sim.gap.propose.surrogate import add_surrogate
 from pam_sim.gap.report.by_subsystem import add_place, subsystem_verdicts
 from pam_sim.gap.report.fingerprint import fingerprint
 from pam_sim.gap.report.place import places
@@ -224,6 +225,7 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     result.simulations = sum(
         one.simulations for one in (estimator, validation, own_runs))
     propose(result, estimator, final, held_out, certify is not None, seed, context.out_of_time)
+    add_surrogate(result, context, base, held_out, certify is not None, seed)
     progress(1.0)
     result.runtime_s = time.perf_counter() - started
     return result

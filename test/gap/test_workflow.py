@@ -237,7 +237,7 @@ def test_the_folder_holds_what_others_rely_on(two_effects):
     found = json.loads((folder / 'gap.json').read_text())
     assert found['schema'] == 1 and found['verdict'] == result.verdict
     assert set(found) == {
-        'schema', 'verdict', 'subsystems', 'proposal', 'effects', 'parameters',
+        'schema', 'verdict', 'subsystems', 'proposal', 'surrogate', 'effects', 'parameters',
         'ambiguity_set', 'next_experiment', 'where', 'signals', 'unexplained_fraction',
         'fingerprint', 'minimum_detectable', 'runtime_s', 'simulations', 'reason',
         'numbers_first', 'not_judged'}
