@@ -147,11 +147,12 @@ def _selected(context: SearchContext, problem: SubsystemProblem) -> Fit:
     learning.problems, learning.base = [problem], context.base
     learning.take_slopes([], context.base.known_z)
     others = [p.subsystem for p in context.problems if p is not problem]
+    # What acts elsewhere, too, would have to be judged there.
+    pool = tuple(c for c in context.pool if get_effect(c.effect).subsystem != 'sensor'
+                 and not any(acts_on(c.effect, s) for s in others))
     alone = replace(
         context, estimator=learning, ranking=Ranking(learning, context.base, context.seen_gap),
-        pool=tuple(c for c in context.pool if get_effect(c.effect).subsystem != 'sensor'
-                   # What acts elsewhere, too, would have to be judged there.
-                   and not any(acts_on(c.effect, s) for s in others)))
+        pool=pool, screened=tuple(s for s in context.screened if s.candidate in pool))
     current = context.base
     while len(current.hypothesis.names) < MAX_ADDED and alone.is_open(problem, current):
         better = _better(alone, problem, current)
