@@ -14,7 +14,7 @@
 
 """The whole workflow: health, subsystems, search, numbers, validation, verdict."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 import time
 
 from pam_sim.gap.criteria import CRITERIA, Criteria
@@ -59,6 +59,7 @@ SAME_EDGES = (
     'and does not show that other steps are followed; record other steps and give them as '
     '--certify')
 
+UNNAMED = ('term', 'surrogate')
 NOT_JUDGED = {'valve': 'the record has no valve command',
               'muscle': 'its contraction is given, and the record has no force'}
 
@@ -67,7 +68,7 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
              effects: Sequence[str] | None = None, seconds: float = 120.0,
              materiality: float = 1.0, seed: int = 0,
              progress: Callable[[float], object] = lambda done: None,
-             criteria: Criteria = CRITERIA) -> GapResult:
+             criteria: Criteria = CRITERIA, unnamed: Collection[str] = UNNAMED) -> GapResult:
     """
     Find what a model misses in recordings, add it, and prove it.
 
@@ -92,6 +93,8 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
         Told the share that is done, 0 to 1.
     criteria : Criteria
         Decision thresholds.
+    unnamed : collection of str
+        What is looked for where names leave much: a ``term``, a ``surrogate``.
 
     Returns
     -------
@@ -224,8 +227,11 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     result.reason = explain(result, outcome, harms)
     result.simulations = sum(
         one.simulations for one in (estimator, validation, own_runs))
-    propose(result, estimator, final, held_out, certify is not None, seed, context.out_of_time)
-    add_surrogate(result, context, base, held_out, certify is not None, seed)
+    if 'term' in unnamed:
+        propose(result, estimator, final, held_out, certify is not None, seed,
+                context.out_of_time)
+    if 'surrogate' in unnamed:
+        add_surrogate(result, context, base, held_out, certify is not None, seed)
     progress(1.0)
     result.runtime_s = time.perf_counter() - started
     return result

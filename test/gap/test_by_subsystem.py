@@ -34,13 +34,12 @@ MUSCLE = {'contraction': SignalGap('m', 2e-5, 6e-4, 4e-4, 1e-4),
           'force': SignalGap('N', 0.1, 1.0, 0.11, 0.1)}
 
 
-@pytest.mark.usefixtures('no_proposal')
 @pytest.mark.parametrize('own_proof', [True, False])
 def test_a_valve_without_a_name_takes_none_from_the_muscle(own_proof):
     rig = nominal().with_(effects=[STICKY, RUBBING])
     certify = None if own_proof else recorded(rig, voltages(12.0, seed=5), seed=8)
     result = find_gap(recorded(rig, voltages()), nominal(), certify,
-                      effects=['coulomb_friction'])
+                      effects=['coulomb_friction'], unnamed=())
     assert_form(result)
     # Much of the gap is of the valve, so the name in the muscle is a part of the answer.
     assert result.verdict == 'partial' and result.unexplained_fraction > 0.3

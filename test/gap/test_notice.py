@@ -128,13 +128,13 @@ def test_only_what_noise_cannot_make_is_a_gap():
     assert not Notice('valve', 'pressure', 0.9, 0.3, 2.9).is_gap(CRITERIA)
 
 
-@pytest.mark.usefixtures('no_proposal')
 def test_what_is_too_small_for_a_name_hides_no_gap_beside_it(monkeypatch):
     monkeypatch.setattr('pam_sim.gap.verdict.is_material', lambda *given: False)
     rig = nominal().with_(effects=[
         {'name': 'valve_hysteresis', 'parameters': {'half_width_pa': 500.0}},
         {'name': 'coulomb_friction', 'parameters': {'force_n': 1.5}}])
-    result = find_gap(recorded(rig, voltages(16.0)), nominal(), effects=['valve_hysteresis'])
+    result = find_gap(recorded(rig, voltages(16.0)), nominal(), effects=['valve_hysteresis'],
+                      unnamed=())
     assert result.verdict == 'unknown' and result.effects == []
     assert 'What valve_hysteresis would explain is too small to matter.' in result.remarks
     assert result.where[0].subsystem == 'muscle'

@@ -91,13 +91,12 @@ def test_a_rough_number_takes_the_place_of_an_error_of_a_sensor(tied, behind, un
     assert [r.name for r in found] == stay
 
 
-@pytest.mark.usefixtures('no_proposal')
 def test_a_number_that_is_unknown_is_no_excuse_for_a_clear_gap():
     """Its prior would allow for any error; what is left of a clear gap is unknown."""
     rig = replace(nominal(), tolerance={'spring_n_per_m': UNKNOWN})
     run = recorded(nominal().with_(parameters={'spring_n_per_m': 400.0}), voltages(14.0),
                    topics=WITHOUT_CELL)
-    result = find_gap(run, rig, effects=['contraction_bias', 'pressure_bias'])
+    result = find_gap(run, rig, effects=['contraction_bias', 'pressure_bias'], unnamed=())
     contraction = result.signals['contraction']
     left = contraction.rmse_after > 5.0 * contraction.noise_floor
     assert left == (result.verdict == 'unknown') and result.effects == []

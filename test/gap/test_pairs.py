@@ -45,13 +45,12 @@ def test_the_true_pair_promises_most(run):
     assert all(a.name != b.name for (a, b), _ in pairs)
 
 
-@pytest.mark.usefixtures('no_proposal')
 def test_both_are_named_where_one_by_one_fails(run, monkeypatch):
-    both = find_gap(run, nominal(), effects=LOOK_ALIKES)
+    both = find_gap(run, nominal(), effects=LOOK_ALIKES, unnamed=())
     assert {e['name'] for e in both.effects} == {'creep', 'contraction_bias'}
     assert both.verdict == 'effects'
     monkeypatch.setattr('pam_sim.gap.select.search.pair_of', lambda search, problem: None)
-    alone = find_gap(run, nominal(), effects=LOOK_ALIKES)
+    alone = find_gap(run, nominal(), effects=LOOK_ALIKES, unnamed=())
     assert {e['name'] for e in alone.effects} != {'creep', 'contraction_bias'}
 
 

@@ -33,9 +33,8 @@ def smooth():
     return run_with('smooth_friction', force_n=2.0, speed_m_per_s=1.5e-3)
 
 
-@pytest.mark.usefixtures('no_proposal')
 def test_friction_that_does_not_stick_is_not_called_dry(smooth):
-    result = find_gap(smooth, nominal(), effects=NAMES)
+    result = find_gap(smooth, nominal(), effects=NAMES, unnamed=())
     assert result.verdict == 'unknown' and not result.effects
     assert_form(result)
     assert 'coulomb_friction' in result.reason and 'smooth_friction' in result.reason
