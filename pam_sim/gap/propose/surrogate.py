@@ -134,11 +134,13 @@ def add_surrogate(result: GapResult, context: SearchContext, base: Fit, held_out
 
 
 def _is_proved(validation: Validation, problem: SubsystemProblem) -> bool:
-    """Return whether a part of the gap of a subsystem is gone, and no signal is worse."""
+    """Return whether a part of the gap of a subsystem is gone that matters, and none is worse."""
     criteria = validation.estimator.criteria
-    left = share_left((g for s, g in validation.signals().items() if s in problem.signals),
-                      criteria.floor_error)
-    return left < 1.0 - criteria.first_gain and not validation.worse()
+    own = {s: g for s, g in validation.signals().items() if s in problem.signals}
+    matters = any(g.rmse_refit ** 2 - g.rmse_after ** 2 > (
+        criteria.hint_sd * validation.noise[s]) ** 2 for s, g in own.items())
+    left = share_left(own.values(), criteria.floor_error)
+    return matters and left < 1.0 - criteria.first_gain and not validation.worse()
 
 
 def _selected(context: SearchContext, problem: SubsystemProblem) -> Fit:
