@@ -119,12 +119,17 @@ def _ask(args: argparse.Namespace, question: 'Question', out: str
 
 
 def _next_lines(result: 'GapResult', out: str, runs: 'Sequence[Run]' = ()) -> list[str]:
-    """Return how to use a proposed term, what to measure next and how; nothing where none."""
+    """Return how to use a model without a name, what to measure next and how, if anything."""
     from pathlib import Path
     from pam_actuation.report.gap import next_command, with_term
+    from pam_sim.gap.propose.surrogate import FILE as SURROGATE_FILE
     lines = []
     if result.proposal:
         lines += [f'the model with the term: {with_term(out)}']
+    if result.surrogate:
+        model = shlex.quote(str(Path(out) / SURROGATE_FILE))
+        lines += ['the surrogate: pam simulate sine_quarter_hz '
+                  f'--rig {model} --out runs/surrogate']
     if result.next_experiment:
         lines += [f'what to measure next: {result.next_experiment["why"]}',
                   'next: ' + next_command(result, Path(out) / 'next_experiment.yaml', runs,

@@ -171,6 +171,13 @@ def test_a_proposed_term_is_told_with_the_command_that_uses_it(monkeypatch):
     assert 'PAM_EFFECTS_PATH=effects:gap pam' in told
 
 
+def test_a_surrogate_is_told_with_the_command_that_simulates_it():
+    result = GapResult('unknown', '', surrogate=object())
+    assert gap_verb._next_lines(result, 'my gap') == [
+        "the surrogate: pam simulate sine_quarter_hz --rig 'my gap/surrogate_model.yaml' "
+        '--out runs/surrogate']
+
+
 @pytest.fixture(scope='module')
 def run():
     return recorded(nominal(), voltages(4.0))
