@@ -34,11 +34,11 @@ if TYPE_CHECKING:
 SCHEMA = 1
 # What gap.json of the last round says of all recordings.
 _OF_THE_LAST = ('verdict', 'reason', 'effects', 'parameters', 'ambiguity_set', 'subsystems',
-                'signals', 'unexplained_fraction', 'proposal', 'next_experiment')
+                'signals', 'unexplained_fraction', 'proposal', 'surrogate', 'next_experiment')
 _NOTHING: dict[str, Any] = {
     'verdict': None, 'reason': '', 'effects': [], 'parameters': [], 'ambiguity_set': [],
     'subsystems': {}, 'signals': {}, 'unexplained_fraction': None, 'proposal': None,
-    'next_experiment': None}
+    'surrogate': None, 'next_experiment': None}
 TUNED = 'tuned.yaml'         # that pam tune would write
 MAY_GO_ON = (ROUNDS, MINUTES, DECLINED, FAILED, IMPOSSIBLE)
 
@@ -87,12 +87,20 @@ class Outcome:
         found: dict[str, Any] | None = self.rounds[-1].gap['proposal'] if self.rounds else None
         return found
 
+    @property
+    def surrogate(self) -> dict[str, Any] | None:
+        """Return the model without a name that the last round found, None without one."""
+        found: dict[str, Any] | None = (
+            self.rounds[-1].gap.get('surrogate') if self.rounds else None)
+        return found
+
     def to_dict(self) -> dict[str, Any]:
         """Return what investigation.json holds; paths are told as seen from its folder."""
         last = self.rounds[-1].gap if self.rounds else _NOTHING
         return {
             'schema': SCHEMA, 'ended': self.ended, 'because': self.because,
-            **{key: last[key] for key in _OF_THE_LAST},
+            # A round of an earlier version may lack what has come since.
+            **{key: last.get(key, _NOTHING[key]) for key in _OF_THE_LAST},
             'rounds': [one.to_dict() for one in self.rounds],
             'model': MODEL if self.has_model else None,
             'next_command': self.next_command('.'), 'question': self.question}
@@ -117,6 +125,9 @@ class Outcome:
             if self.proposal:
                 lines.append(f'proposed: {self.proposal["equation"]}; file '
                              f'{os.path.join(folder, self.proposal["file"])}')
+            if self.surrogate:
+                lines.append(f'surrogate: {", ".join(self.surrogate["names"])}; file '
+                             f'{os.path.join(folder, self.surrogate["file"])}')
         lines.append(f'page: {os.path.join(folder, PAGE)}')
         if self.has_model:
             lines.append(f'model: {os.path.join(folder, MODEL)}')
@@ -133,6 +144,8 @@ class Outcome:
             model, names = '', [MODEL] * self.has_model
             if self.proposal:
                 names += [os.path.basename(self.proposal['file']), MODEL_FILE]
+            if self.surrogate:
+                names += [os.path.basename(self.surrogate['file'])]
             for name in names:
                 file = store.rounds / str(self.rounds[-1].number) / name
                 if file.is_file():

@@ -90,6 +90,11 @@ def _answer(outcome: 'Outcome') -> Section:
                 'A term without a name was found from the data, and holds on the proof: '
                 f'{last.gap["proposal"]["equation"]}. Its file is '
                 f'{last.gap["proposal"]["file"]} beside this page.')
+        if outcome.surrogate:
+            body += paragraph(
+                f'A model with {", ".join(outcome.surrogate["names"])} follows the proof better. '
+                'It is a surrogate for simulation and tuning: none of these is shown to be the '
+                f'cause. It is {outcome.surrogate["file"]} beside this page.')
     return Section('answer', 'Answer', body)
 
 

@@ -34,5 +34,5 @@ def investigation_schema() -> dict[str, Any]:
     schema['$defs'] = {**schema['$defs'], **{
         name: shared[name] for name in (
             'interval', 'quantity', 'effect', 'parameter', 'subsystem', 'signal', 'proposal',
-            'next_experiment')}}
+            'surrogate', 'next_experiment')}}
     return schema

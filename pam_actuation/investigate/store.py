@@ -33,12 +33,14 @@ from pam_actuation.kept_folders import kept_folder, only_one
 from pam_sim.errors import InputError
 from pam_sim.files import check_folder, make_folder, StrPath, write_json
 from pam_sim.gap.propose.proposal import EFFECT_FILE, MODEL_FILE
+from pam_sim.gap.propose.surrogate import FILE as SURROGATE_FILE
 
 QUESTION, TIMES = 'question.json', 'times.csv'
 RECORDINGS, ROUNDS, BAG = 'recordings', 'rounds', 'bag'
 STOPPED, REFUSED = '_stopped', '_refused'      # after the number, of recordings put aside
 PAGE, RESULT, MODEL = 'report.html', 'investigation.json', 'model.yaml'
-OPTIONAL = (MODEL, EFFECT_FILE, MODEL_FILE)    # of the results, those that may be missing
+# Of the results, those that may be missing.
+OPTIONAL = (MODEL, EFFECT_FILE, MODEL_FILE, SURROGATE_FILE)
 RESULTS = (PAGE, RESULT, *OPTIONAL)
 # What tells another question: each key of question.json with a word for people.
 _ASKED = {'model': 'model', 'experiment': 'first experiment', 'recorder': 'rig',

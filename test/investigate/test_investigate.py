@@ -308,6 +308,30 @@ def test_a_proposed_term_lies_beside_the_model(small, done, tmp_path):
     assert not (out / 'proposed_effect.py').exists() and (out / 'model.yaml').is_file()
 
 
+def test_a_surrogate_lies_beside_the_model(small, done, tmp_path):
+    bag, out = done / 'recordings' / '1' / 'bag', tmp_path / 'out'
+    small(['unknown'], given=[bag])
+    round_1 = out / 'rounds' / '1'
+    gap = json.loads((round_1 / 'gap.json').read_text())
+    gap['surrogate'] = {
+        'names': ['flow_limit'], 'file': 'surrogate_model.yaml', 'explained': 0.6,
+        'signals': {'pressure': {'rmse_refit': 2e3, 'rmse_surrogate': 1e3}}}
+    (round_1 / 'gap.json').write_text(json.dumps(gap))
+    (round_1 / 'surrogate_model.yaml').write_text('rig: a\n')
+    outcome, _ = small([], given=[bag])
+    assert 'surrogate: flow_limit; file' in outcome.text('x')
+    assert 'A model with flow_limit follows' in (out / 'report.html').read_text()
+    Draft202012Validator(investigation_schema()).validate(
+        json.loads((out / 'investigation.json').read_text()))
+    assert (out / 'surrogate_model.yaml').read_text() == 'rig: a\n'
+    # As an earlier version wrote it.
+    del gap['surrogate']
+    (round_1 / 'gap.json').write_text(json.dumps(gap))
+    small([], given=[bag])
+    assert not (out / 'surrogate_model.yaml').exists()
+    assert json.loads((out / 'investigation.json').read_text())['surrogate'] is None
+
+
 def test_what_follows_a_round():
     wide = load_experiment(EXPERIMENT)
 
