@@ -182,9 +182,9 @@ class Description:
             self._add('T_m', nominal['T_m'], LAG_TOLERANCE,
                       'not stated: that of the nominal regulator, yours may differ by half')
 
-    def _zero_tolerance(self, low_pa: float, high_pa: float) -> Tolerance:
+    def _zero_tolerance(self, low_pa: float, high_pa: float) -> Tolerance | None:
         """
-        Return how well the zero of the regulator is known.
+        Return how well the zero of the regulator is known, None where it is exact.
 
         A zero of the pressure sensor acts on what is read as it does. Where that one is unknown,
         the regulator is the only reference there is.
@@ -194,7 +194,7 @@ class Description:
         sensor = self.numbers.get('pressure_zero_pa')
         if sensor is None or sensor.tolerance != UNKNOWN:
             begin_pa = max(begin_pa, ZERO_SHARE * (high_pa - low_pa))
-        return AbsoluteSd(begin_pa)
+        return AbsoluteSd(begin_pa) if begin_pa > 0.0 else None
 
     def _add(self, name: str, value: float, tolerance: Tolerance | None, note: str) -> None:
         """Add a number that follows from others; how well it is known may be said beside it."""

@@ -71,7 +71,8 @@ def settled_zero(rig: Rig, valve: SubsystemProblem) -> tuple[float, Interval] | 
         and where the pressure at the lowest input is not known exactly.
 
     """
-    if rig.valve != 'ppr' or rig.tolerance.get('ppr_zero_pa', 0.0) != 0.0:
+    if rig.valve != 'ppr' or (
+            'ppr_zero_pa' in rig.tolerance and rig.prior_sd('ppr_zero_pa') > 0.0):
         return None
     points = np.array([one for index, recording in enumerate(valve.recordings)
                        for one in _holds(valve, index, recording)])

@@ -200,6 +200,12 @@ def test_a_data_sheet_gives_the_pressures_and_asks_for_what_it_lacks(name, capsy
     assert rig.prior_sd('ppr_zero_pa') == sheet.lowest_gauge_pa
 
 
+def test_a_regulator_is_the_exact_reference_of_an_unknown_zero(folder):
+    rig = new('--regulator-kpa', '0:600', '--unknown', 'pressure_zero_pa')
+    assert rig.tolerance['ppr_zero_pa'] == 0.0
+    assert new('--regulator-kpa', '0:600', '--overwrite').prior_sd('ppr_zero_pa') == 12e3
+
+
 @pytest.mark.parametrize('options, said', [
     (['--known', 'mass_kg=-3'], '0.1 to 500 kg'),
     (['--known', 'mass_kg=nan'], '0.1 to 500 kg'),

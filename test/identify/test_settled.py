@@ -26,7 +26,7 @@ from pam_sim.identify.profile import Interval, straight_end
 from pam_sim.identify.records import offer_of, problems_of
 from pam_sim.identify.result import Found
 from pam_sim.identify.settled import beside_settled_zero, settled_zero
-from pam_sim.tolerance import UNKNOWN
+from pam_sim.tolerance import AbsoluteSd, UNKNOWN
 import pytest
 
 ZERO_PA = -20e3
@@ -57,6 +57,8 @@ def test_holds_tell_the_zero(steps):
     assert wider.high - wider.low > interval.high - interval.low
     # The regulator's own zero looks the same.
     assert settled_zero(GIVEN.with_(tolerance={'ppr_zero_pa': UNKNOWN}), valve) is None
+    exact = GIVEN.with_(tolerance={'ppr_zero_pa': AbsoluteSd(0.0)})
+    assert settled_zero(exact, valve) == (zero, interval)
     moving = record(RIG, voltage=1.0 + np.sin(np.arange(4000) / 300.0))
     (valve, _) = problems_of(GIVEN, [offer_of(moving, GIVEN)])
     assert settled_zero(GIVEN, valve) is None
