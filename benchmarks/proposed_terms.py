@@ -246,15 +246,24 @@ def base_model(result):
 
 def removed(recording, before, after):
     """Return the share of the squared gap that a model removes against another in a free run."""
-    first, second = (free_run(rig, recording) for rig in (before, after))
-    gaps = [0.0, 0.0]
+    return removed_of(*(squared_errors(recording, rig) for rig in (before, after)))
+
+
+def removed_of(before, after):
+    """Return the same from the squared errors of both."""
+    first, second = (sum(max(square - 1.0, 0.0) for square in squares.values())
+                     for squares in (before, after))
+    return 1.0 - second / max(first, 1e-12)
+
+
+def squared_errors(recording, rig):
+    """Return the mean squared error of a free run by signal, in deviations of its sensor."""
+    run, found = free_run(rig, recording), {}
     for s in recording.signals:
         noise = noise_of(recording.time_s[s], recording.measured[s]).sd
-        chosen = recording.time_s[s] > SETTLE_S
-        for place, run in enumerate((first, second)):
-            error = (run[s] - recording.measured[s])[chosen]
-            gaps[place] += max(float(np.mean(error ** 2)) / noise ** 2 - 1.0, 0.0)
-    return 1.0 - gaps[1] / max(gaps[0], 1e-12)
+        error = (run[s] - recording.measured[s])[recording.time_s[s] > SETTLE_S]
+        found[s] = float(np.mean(error ** 2)) / noise ** 2
+    return found
 
 
 def worse(result):
