@@ -22,6 +22,7 @@ from pam_actuation.report.page import paragraph, plot, render, Section, table, t
 from pam_actuation.report.pages import FOOTER
 from pam_actuation.report.sections.gap import interval, percent, quantity, size, VERDICT_TEXT
 from pam_actuation.report.sections.replay import SHOWN
+from pam_sim.gap.propose.surrogate import in_words
 
 if TYPE_CHECKING:
     from pam_actuation.investigate.outcome import Outcome
@@ -91,10 +92,8 @@ def _answer(outcome: 'Outcome') -> Section:
                 f'{last.gap["proposal"]["equation"]}. Its file is '
                 f'{last.gap["proposal"]["file"]} beside this page.')
         if outcome.surrogate:
-            body += paragraph(
-                f'A model with {", ".join(outcome.surrogate["names"])} follows the proof better. '
-                'It is a surrogate for simulation and tuning: none of these is shown to be the '
-                f'cause. It is {outcome.surrogate["file"]} beside this page.')
+            body += paragraph(f'{in_words(outcome.surrogate)} It is '
+                              f'{outcome.surrogate["file"]} beside this page.')
     return Section('answer', 'Answer', body)
 
 

@@ -35,7 +35,7 @@ def without_repeats(recording: Recording) -> Recording:
 
     A logger that writes a row each 10 ms repeats a load cell that answers each 90 ms nine times.
     Taken for readings, the repeats are a signal that stands still and jumps. Such a signal is
-    known by its quick changes: where it moves by several steps of its resolution from row to row,
+    known by its quick changes. Where it moves by several steps of its resolution from row to row,
     a fresh reading never equals the one before. Of a signal at rest one row in as many as a
     reading lasts is kept.
 

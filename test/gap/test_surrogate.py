@@ -23,7 +23,7 @@ from pam_actuation.report.gap import save_gap
 from pam_sim import load_rig
 from pam_sim.effects.unnamed import terms
 from pam_sim.gap import find_gap
-from pam_sim.gap.propose.surrogate import FILE
+from pam_sim.gap.propose.surrogate import FILE, in_words
 import pytest
 
 # A regulator that swings over, as none of the library does.
@@ -60,7 +60,7 @@ def test_a_better_model_without_a_name_is_written(found, swinging, tmp_path):
     surrogate = found.surrogate
     assert found.verdict == 'unknown' and not found.effects
     assert surrogate.names and set(surrogate.names) <= {*NAMES, 'T_m', 'K_m'}
-    assert surrogate.sentence in found.remarks
+    assert in_words(surrogate.to_dict()) in found.remarks
     assert_form(found)
     save_gap(found, second, tmp_path)
     calibrated, better = (load_rig(tmp_path / name) for name in ('model.yaml', FILE))

@@ -22,7 +22,9 @@ load are added, as long as the select part prefers it. With them the certify dat
 better. Their sizes are those of a fit, and no causes.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from pam_sim.effects.registry import get_effect
@@ -34,7 +36,6 @@ from pam_sim.gap.result import GapResult
 from pam_sim.gap.select.comparison import gap, preference
 from pam_sim.gap.select.context import SearchContext
 from pam_sim.gap.select.ranking import Ranking
-from pam_sim.gap.select.rival import Rival
 from pam_sim.gap.select.rivals import rivals_of
 from pam_sim.gap.subsystems.effects import acts_on
 from pam_sim.gap.subsystems.problem import SubsystemProblem
@@ -68,22 +69,23 @@ class Surrogate:
     proof: dict[str, tuple[float, float]]
     model_yaml: str
 
-    @property
-    def sentence(self) -> str:
-        """Return it in two sentences."""
-        shown = []
-        for signal, (before, after) in self.proof.items():
-            factor, unit = READABLE[signal]
-            shown.append(f'{signal} {before * factor:.3g} to {after * factor:.3g} {unit}')
-        return (f'A model with {", ".join(self.names)} follows the proof better: '
-                f'{", ".join(shown)} rms. It is a surrogate for simulation and tuning: none of '
-                'these is shown to be the cause.')
-
-    def to_dict(self) -> dict[str, object]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the entry of gap.json."""
         return {'names': list(self.names), 'file': FILE, 'explained': self.explained,
                 'signals': {s: {'rmse_refit': before, 'rmse_surrogate': after}
                             for s, (before, after) in self.proof.items()}}
+
+
+def in_words(surrogate: Mapping[str, Any]) -> str:
+    """Return the entry of gap.json in two sentences."""
+    shown = []
+    for signal, errors in surrogate['signals'].items():
+        factor, unit = READABLE[signal]
+        shown.append(f'{signal} {errors["rmse_refit"] * factor:.3g} to '
+                     f'{errors["rmse_surrogate"] * factor:.3g} {unit}')
+    return (f'A model with {", ".join(surrogate["names"])} follows the proof better: '
+            f'{", ".join(shown)} rms. It is a surrogate for simulation and tuning: none of '
+            'these is shown to be the cause.')
 
 
 def add_surrogate(result: GapResult, context: SearchContext, base: Fit, held_out: Recording,
@@ -133,7 +135,7 @@ def add_surrogate(result: GapResult, context: SearchContext, base: Fit, held_out
         current.hypothesis.names, float(1.0 - validation.unexplained()),
         {s: (g.rmse_refit, g.rmse_after) for s, g in validation.signals().items()},
         model_of(both, current).to_yaml())
-    result.remarks.append(result.surrogate.sentence)
+    result.remarks.append(in_words(result.surrogate.to_dict()))
 
 
 def _is_proved(validation: Validation, problem: SubsystemProblem) -> bool:
@@ -171,11 +173,7 @@ def _selected(context: SearchContext, problem: SubsystemProblem) -> Fit:
 def _better(context: SearchContext, problem: SubsystemProblem, current: Fit) -> Fit | None:
     """Return the fit with the best effect more, None where the select part wants none."""
     rivals, _ = rivals_of(context, current, [problem])
-
-    def share(rival: Rival) -> float:
-        return rival.share[problem.subsystem]
-
-    for rival in sorted(rivals, key=share, reverse=True)[:TRIED]:
+    for rival in sorted(rivals, key=lambda r: -r.share[problem.subsystem])[:TRIED]:
         found = context.estimator.polish(rival.found)
         if _is_preferred(context, problem, current, found):
             return found
