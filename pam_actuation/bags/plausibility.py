@@ -39,6 +39,7 @@ GAP_LIMIT_S = 0.05                     # half of what makes a measurement invali
 FUTURE_LIMIT_NS = 20_000_000           # a measurement stamped further ahead is invalid
 LATE_LIMIT_NS = 100_000_000            # and one older than this
 ATMOSPHERE_MARGIN_PA = 5e3             # sensor offset and weather
+MOST_ZERO_PA = 20e3                    # the zero of a sensor of 10 bar, 2 % of its range
 MUSCLE_LENGTH_M = 0.300                # DMSP-5-300
 MAX_CONTRACTION = 0.25                 # of the length, data sheet limit
 CONTRACTION_MARGIN_M = 1e-3
@@ -56,6 +57,7 @@ LEAST_LIMIT_M = 0.02                   # any muscle may shorten by this
 MOST_M = 0.5                           # and none of the usual ones by this
 MOST_N = 1e5
 SHARE_HINT = ' A share of the length? Multiply it by the length then; the topic is in m.'
+GAUGE_HINT = ' If it was not, is it gauge pressure? Add 101325 Pa then.'
 # Of which only the times are looked at.
 _WITHOUT_VALUES = {row.type_name for row in OF_A_RUN.values() if row.numeric is None}
 
@@ -274,7 +276,8 @@ def _pressure(finite: FloatArray, low: float, high: float, length_m: Length) -> 
         return _unit(low, high, 'Pa absolute', likely,
                      f'{fix}, and add 101325 Pa if they are gauge; the topic is absolute, in Pa.')
     below = int((finite < P_ATM_PA - ATMOSPHERE_MARGIN_PA).sum())
-    if usual < P_ATM_PA:
+    # A muscle may be vented most of the time, and its sensor have a zero.
+    if usual < P_ATM_PA and not (low >= P_ATM_PA - MOST_ZERO_PA and largest > P_ATM_PA):
         return (
             f'mostly below atmospheric pressure (median {1e-3 * usual:.1f} kPa): is it gauge '
             'pressure? Add 101325 Pa then; the topic is absolute, in Pa.'), True
@@ -283,7 +286,7 @@ def _pressure(finite: FloatArray, low: float, high: float, length_m: Length) -> 
             'No muscle is evacuated so far. Is it gauge pressure? Add 101325 Pa then; or did the '
             'sensor drop out?' if low < 0.5 * P_ATM_PA else
             'If the muscle was vented then, the sensor has a zero: state '
-            '`pressure_zero_pa: unknown` in the rig file.')
+            '`pressure_zero_pa: unknown` in the rig file.' + GAUGE_HINT)
     return (f'{below} values below atmospheric pressure, down to {gauge_kpa(low):.1f} kPa '
             f'gauge. {hint}'), is_gauge
 

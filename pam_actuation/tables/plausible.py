@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from pam_actuation.bags.plausibility import (
-    Implausible, MAX_CONTRACTION, SHARE_HINT, value_findings)
+    GAUGE_HINT, Implausible, MAX_CONTRACTION, SHARE_HINT, value_findings)
 from pam_actuation.tables.mapping import ColumnMap
 from pam_actuation.tables.signals import BY_NAME, of_muscles, Signal
 from pam_actuation.tables.units import (
@@ -161,9 +161,11 @@ def _of_values(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: 
     certain = _apart(mapped, finite) or _impossible(signal, mapped, finite, length_m, wrong)
     if certain is not None:
         return [certain]
-    no_hint = SHARE_HINT if mapped.unit.factor != 1.0 else ''      # so it is no share
-    found = [Doubt(one.sentence.partition(': ')[2].removesuffix(no_hint).rstrip('.'))
-             for one in wrong]
+    # What the stated unit rules out.
+    no_hint = SHARE_HINT if mapped.unit.factor != 1.0 else ''
+    no_gauge = GAUGE_HINT if mapped.unit.name.endswith(GAUGE) else ''
+    found = [Doubt(one.sentence.partition(': ')[2].removesuffix(no_hint).removesuffix(
+        no_gauge).rstrip('.')) for one in wrong]
     if finite.min() == finite.max():
         return [*found, Doubt(f'the value never changes ({_shown(signal, float(finite.min()))}): '
                               'is the sensor connected?')]
@@ -228,11 +230,15 @@ def _pushes(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: flo
 def _moves_no_muscle(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: float
                      ) -> Doubt | None:
     high = float(finite.max())
-    if signal.quantity != PRESSURE or _moves_too_little(signal, finite) or not (
-            P_ATM_PA < high < P_ATM_PA + SMALL_GAUGE_PA):
+    if _moves_too_little(signal, finite) or not _is_too_low(signal, high):
         return None
     return Doubt(f'it reaches {_shown(signal, high)} only, at which no muscle moves'
                  f'{_fix(signal, mapped, finite, length_m)}')
+
+
+def _is_too_low(signal: Signal, highest: float) -> bool:
+    """Return whether a pressure reaches atmosphere, and no muscle moves by it."""
+    return signal.quantity == PRESSURE and P_ATM_PA < highest < P_ATM_PA + SMALL_GAUGE_PA
 
 
 def _gauge_or_absolute(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: float
@@ -307,7 +313,8 @@ def _fix(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: float)
         values = unit.to_si(raw)
         moved = float(values.max() - values.min())
         if not value_findings('', signal.field, values, lambda: length_m) and (
-                moved >= 10.0 * LEAST_MOVE.get(signal.quantity, 0.0)):
+                moved >= 10.0 * LEAST_MOVE.get(signal.quantity, 0.0)) and (
+                not _is_too_low(signal, float(values.max()))):
             fitting.append(replace(mapped, unit=unit))
     usual = [one for one in fitting if not one.unit.name.startswith(
         ('hPa', 'mbar', 'atm', 'mmHg', 'kgf/cm2', 'um', 'gf', 'cm'))] or fitting

@@ -279,3 +279,32 @@ def test_how_to_begin_with_names_that_nobody_knows():
     assert not found.mapping.signals and how_to_begin(tables, found) == (
         '--map pressure="Piezo_P_(mA):kPa_gauge:zero=4:gain=62.5" '
         '--map contraction="V_dist_(mA):mm:zero=4:gain=6.25"')
+
+
+def of_pressure(gauge_pa):
+    """Return the doubts on a pressure that a person gave as gauge."""
+    mapped = column_of_text('pressure', 'p:kPa_gauge', '--map')
+    return doubts({'pressure': (np.arange(gauge_pa.size), P_ATM_PA + gauge_pa)},
+                  {'pressure': mapped}, 0.3)
+
+
+@pytest.mark.parametrize('highest_pa', [1.4e5, 5e5])
+def test_a_muscle_mostly_vented_may_have_a_sensor_with_a_zero(highest_pa):
+    doubt, = of_pressure(np.repeat([-11.7e3, highest_pa], [40, 20]))
+    assert not doubt.is_wrong
+    assert 'the sensor has a zero' in doubt.sentence
+    # It was said to be gauge.
+    assert 'Add 101325' not in doubt.sentence
+
+
+@pytest.mark.parametrize('gauge_pa', [
+    np.repeat([-60e3, 5e5], [40, 20]),              # absolute, and said to be gauge
+    np.repeat([-11.7e3, -9e3], 30)])                # no muscle was filled
+def test_a_pressure_below_atmosphere_beyond_a_zero_is_refused(gauge_pa):
+    doubt, = of_pressure(gauge_pa)
+    assert doubt.is_wrong
+
+
+def test_no_unit_is_proposed_in_which_no_muscle_moves():
+    doubt, = of_pressure(np.repeat([-60e3, 90e3], [40, 20]))
+    assert doubt.is_wrong and 'hPa' not in doubt.sentence
