@@ -32,7 +32,7 @@ import numpy as np
 from pam_sim.characterise.beyond import beyond, LEAST_LENGTHS
 from pam_sim.errors import InputError
 from pam_sim.muscle.fit import CASES, fit_law, judge
-from pam_sim.muscle.force_maps import ForceMap, read_force_map
+from pam_sim.muscle.force_maps import ForceMap, read_force_map, some_points
 from pam_sim.muscle.registry import laws, make_law
 import results_page
 
@@ -95,12 +95,6 @@ def unfitted(points):
             for name, law in laws().items() for chosen in law.SETS if 'dmsp_10' in chosen}
 
 
-def some(points, chosen):
-    """Return the ForceMap of some of the points."""
-    return ForceMap(points.name, points.length_m, points.pressure_gauge_pa[chosen],
-                    points.strain[chosen], points.force_n[chosen], points.censored[chosen])
-
-
 def left_out(points):
     """
     Return {label: ((rms, worst), …)} [% of the largest force], one pair for each length.
@@ -113,8 +107,8 @@ def left_out(points):
         for strain in np.unique(points.strain):
             left = points.strain == strain
             try:
-                fit = judge(fit_law(law, some(points, ~left), muscle, fixed).law,
-                            some(points, left))
+                fit = judge(fit_law(law, some_points(points, ~left), muscle, fixed).law,
+                            some_points(points, left))
             except InputError:
                 found[label].append(None)
                 continue
@@ -137,7 +131,7 @@ def print_bounds(records):
     for points, own in records:
         strains = np.unique(points.strain)
         for count in range(1, len(strains) - LEAST_LENGTHS + 1):
-            kept = some(points, points.strain >= strains[count] - 1e-9)
+            kept = some_points(points, points.strain >= strains[count] - 1e-9)
             for strain in strains[:count]:
                 there = beyond(kept, float(strain), own)
                 if there is None:

@@ -35,7 +35,8 @@ EXAMPLE = 'pam characterise --simulate dmsp_5_300_realistic --out surfaces'
 def add_arguments(parser: Parser) -> None:
     """Declare the options of the verb."""
     parser.add_argument('source', type=source, nargs='*', metavar='BAG|CSV',
-                        help='bags, one fixed load each, or one table measured by others')
+                        help='bags, one fixed load or one held length each, or one table '
+                             'measured by others')
     parser.add_argument('--out', type=out_path, required=True, metavar='DIR',
                         help='folder for the results')
     parser.add_argument('--simulate', type=source, metavar='RIG', default=None,
@@ -52,6 +53,10 @@ def add_arguments(parser: Parser) -> None:
                         metavar='N',
                         help='loads, one per bag in their order, instead of the measured ones; '
                              'with --simulate the loads to hang on')
+    parser.add_argument('--held-mm', type=number(0.0, 5e3, 'mm'), nargs='+', default=None,
+                        metavar='MM',
+                        help='the bags are of a muscle held at one length each: its '
+                             'contractions, one per bag in their order')
     parser.add_argument('--load-step-n', type=number(0.01, 1e3, 'N'), default=None, metavar='N',
                         help='spacing of loads in the table (default: as measured)')
     parser.add_argument('--length-m', type=number(0.01, 20.0, 'm'), default=None, metavar='M',
@@ -110,11 +115,14 @@ def _characterised(args: argparse.Namespace, sources: list[str]) -> 'Characteris
     """Return the Characterisation of bags or of one table."""
     from pam_actuation.bags.ending import early_sentences
     from pam_actuation.bags.load import load_run
-    from pam_sim.characterise import characterise_runs, characterise_table
+    from pam_sim.characterise import characterise_held, characterise_runs, characterise_table
     from pam_sim.characterise.tables import read_measured_table
     from pam_sim.errors import InputError
     if not sources:
         raise InputError('give bags, a CSV table, or --simulate RIG')
+    if args.held_mm is not None and (args.simulate or args.load_n):
+        raise InputError('goes with recordings of held lengths; a fixed load is another record',
+                         '--held-mm')
     tables = [path for path in sources if str(path).lower().endswith('.csv')]
     if not tables:
         runs = []
@@ -123,11 +131,17 @@ def _characterised(args: argparse.Namespace, sources: list[str]) -> 'Characteris
                 runs.append(load_run(path, args.namespace, recover=args.recover))
                 bar.update()
         note_implausible(args, runs, must_be_right=True)
-        # Simulated loads are read off the load cell like any others.
-        loads = None if args.simulate else args.load_n
-        result = characterise_runs(runs, _dimensions(args, runs), loads, args.load_step_n)
+        if args.held_mm is not None:
+            result = characterise_held(
+                runs, [1e-3 * mm for mm in args.held_mm], _dimensions(args, runs))
+        else:
+            # Simulated loads are read off the load cell like any others.
+            loads = None if args.simulate else args.load_n
+            result = characterise_runs(runs, _dimensions(args, runs), loads, args.load_step_n)
         result.remarks += early_sentences(runs)
         return result
+    if args.held_mm is not None:
+        raise InputError('goes with bags; a table says its lengths itself', '--held-mm')
     if len(sources) > 1:
         raise InputError('a table comes alone; give either one CSV file or bags', tables[0])
     dimensions = _dimensions(args, [])

@@ -106,7 +106,7 @@ def _new(args: argparse.Namespace) -> int:
     described = _described(args)
     if _nothing_said(args) and not args.json and sys.stdin.isatty() and sys.stdout.isatty():
         described = ask_description(_read_line, print)
-    with _force_map(args) as table:
+    with _force_map(args) as (table, remarks):
         described.force_map = table or described.force_map
         if table is not None and args.muscle is None and not described.dimensions:
             described.dimensions.update(size_in_table(table))
@@ -115,17 +115,19 @@ def _new(args: argparse.Namespace) -> int:
         write_text(args.out, text)
     following = _following(rig, args.out)
     lines = [f'rig file: {args.out}', *_numbers_text(rig), *_law_text(rig),
-             f'next: {following}']
-    emit(args, {'file': args.out, **_numbers(rig), 'next': following}, '\n'.join(lines))
+             *remarks, f'next: {following}']
+    emit(args, {'file': args.out, **_numbers(rig), 'remarks': remarks, 'next': following},
+         '\n'.join(lines))
     return EXIT_DONE
 
 
-def _force_map(args: argparse.Namespace) -> 'AbstractContextManager[str | None]':
-    """Return the context in which the table of the force map is there, None without one."""
+def _force_map(args: argparse.Namespace
+               ) -> 'AbstractContextManager[tuple[str | None, list[str]]]':
+    """Return the context of (table of the force map or None, what a reader should know)."""
     from contextlib import nullcontext
     from pam_actuation.rig_files.force_map import force_map_of
     if args.force_map is None:
-        return nullcontext(None)
+        return nullcontext((None, []))
     length_m, bore_m = (None if mm is None else round(1e-3 * mm, 12)
                         for mm in (args.length_mm, args.bore_mm))
     return force_map_of(args.force_map, length_m, bore_m, args.out, args.overwrite)

@@ -40,9 +40,9 @@ def size_in_table(path: str) -> dict[str, float]:
 
 @contextmanager
 def force_map_of(path: str, length_m: float | None, bore_m: float | None, out: str,
-                 overwrite: bool) -> Iterator[str]:
+                 overwrite: bool) -> Iterator[tuple[str, list[str]]]:
     """
-    Give the path of the table the muscle law ``lookup`` reads.
+    Give (path of the table the muscle law ``lookup`` reads, what a reader should know of it).
 
     A table of another form (force over pressure and length, for instance) is characterised. The
     result stands beside the rig file, and is removed if the block fails.
@@ -67,7 +67,7 @@ def force_map_of(path: str, length_m: float | None, bore_m: float | None, out: s
     rows, _ = read_commented_csv(path)
     if rows and tuple(rows[0]) == COLUMNS:
         read_table(path)
-        yield path
+        yield path, []
         return
     # Slow to import, and most rig files need no table.
     from pam_sim.characterise import characterise_table
@@ -79,11 +79,11 @@ def force_map_of(path: str, length_m: float | None, bore_m: float | None, out: s
                          'the muscle at rest', path)
     table_path = f'{os.path.splitext(out)[0]}_force_map.csv'
     check_file(table_path, overwrite)
-    table = characterise_table(measured, Dimensions(length_m, bore_m)).table()
+    found = characterise_table(measured, Dimensions(length_m, bore_m))
     there = os.path.exists(table_path)
-    table.write_csv(check_file(table_path, overwrite))
+    found.table().write_csv(check_file(table_path, overwrite))
     try:
-        yield table_path
+        yield table_path, found.remarks
     except BaseException:
         if not there:
             os.remove(table_path)

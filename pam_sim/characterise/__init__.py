@@ -15,13 +15,14 @@
 """
 The chapter's empirical model from measurements (section 4.3).
 
-Fixed-load, stepped-pressure recordings or static tables in; surfaces P(m_air,
+Fixed-load or held-length recordings under stepped pressure, or static tables in; surfaces P(m_air,
 load), eps(P, load) and F(eps, P) with uncertainty out.
 """
 
 from pam_sim.characterise.characterise import (
     against_rig, Characterisation, characterise_runs, characterise_table)
 from pam_sim.characterise.dimensions import Dimensions
+from pam_sim.characterise.held import characterise_held
 
-__all__ = ['Characterisation', 'Dimensions', 'against_rig', 'characterise_runs',
-           'characterise_table']
+__all__ = ['Characterisation', 'Dimensions', 'against_rig', 'characterise_held',
+           'characterise_runs', 'characterise_table']

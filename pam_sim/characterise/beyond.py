@@ -30,7 +30,6 @@ from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.muscle.fit import CASES, fit_law, residuals_n
 from pam_sim.muscle.force_maps import ForceMap
-from pam_sim.muscle.law import MuscleLaw
 from pam_sim.muscle.registry import make_law
 from scipy.optimize import least_squares
 
@@ -119,11 +118,9 @@ def _fitted(points: ForceMap, apart_from: str) -> list[Formula]:
     for label in LAWS:
         name, muscle, fixed = CASES[label]
         try:
-            law = fit_law(name, points, muscle, fixed).law
+            found.append(fit_law(name, points, muscle, fixed).law._tension_n)
         except InputError:           # its best fit is no muscle
             continue
-        assert isinstance(law, MuscleLaw)
-        found.append(law._tension_n)
     return found + [scaled_shape(shape, points) for shape in SHAPES if shape != apart_from]
 
 

@@ -24,6 +24,7 @@ from pam_sim.characterise.beyond import beyond
 from pam_sim.characterise.dimensions import Dimensions
 from pam_sim.characterise.fixed_load import fixed_load, FixedLoad
 from pam_sim.characterise.points import points_of, without_stuck
+from pam_sim.characterise.scattered import Smoothed, smoothed
 from pam_sim.characterise.surfaces import build_surfaces, Surfaces
 from pam_sim.characterise.tables import (
     loads_of_table, map_of, MeasuredTable, points_of_map)
@@ -107,8 +108,8 @@ def characterise_runs(
     """
     if loads_n and len(loads_n) != len(runs):
         raise InputError(f'has {len(loads_n)} loads for {len(runs)} recordings', '--load-n')
-    rigs = [_rig_of(run) for run in runs]
-    size = _one_muscle(runs, rigs, dimensions)
+    rigs = [rig_of(run) for run in runs]
+    size = one_muscle(runs, rigs, dimensions)
     loads = [fixed_load(run, size.length_m, loads_n[k] if loads_n else None, rigs[k])
              for k, run in enumerate(runs)]
     points, stuck = without_stuck(points_of(loads))
@@ -151,11 +152,14 @@ def characterise_table(
     """
     loads: list[FixedLoad] = []
     stuck: list[float] = []
+    smooth: Smoothed | None = None
     if table.kind == 'force map':
         top = float(table.columns['force'].max())
         wanted = None if load_step_n is None else load_step_n * np.arange(
             int(top / load_step_n + 0.02) + 1)
-        points = points_of_map(table, dimensions.length_m, wanted)
+        smooth = smoothed(table, dimensions.length_m)
+        points = points_of_map(smooth.table if smooth else table, dimensions.length_m, wanted)
+        points = smooth.doubted(points) if smooth else points
         load_step_n = load_step_n or float(points.load_n[1])
     else:
         loads = loads_of_table(table, dimensions.length_m)
@@ -166,9 +170,9 @@ def characterise_table(
         [f'from a {table.kind}'] + [line for line in table.source.splitlines() if line])
     result.remarks += _stuck_words(stuck)
     if table.kind == 'force map':
-        result.remarks.append(
+        result.remarks.append(smooth.text() if smooth else (
             'A force map has one branch and states no noise: the uncertainty given is only '
-            'that of the contraction at which the force vanishes.')
+            'that of the contraction at which the force vanishes.'))
         longer = beyond(map_of(table, dimensions.length_m))
         if longer is not None:
             result.remarks.append(longer.text(dimensions.length_m))
@@ -181,7 +185,7 @@ def _stuck_words(loads: Sequence[float]) -> list[str]:
             f'(friction holds it); it was left out.' for load in loads]
 
 
-def _rig_of(run: Run) -> Rig | None:
+def rig_of(run: Run) -> Rig | None:
     """Return the rig in the metadata of a run, None where there is none that can be read."""
     text = (run.metadata or {}).get('rig')
     if not text:
@@ -198,10 +202,18 @@ def _simulated(run: Run) -> bool:
     return bool(run.metadata.get('seed')) and run.metadata.get('origin') != 'live'
 
 
-def _one_muscle(
+def one_muscle(
         runs: Sequence[Run], rigs: Sequence[Rig | None],
         given: Dimensions | None) -> Dimensions:
-    """Return the Dimensions all runs share."""
+    """
+    Return the Dimensions all runs share.
+
+    Raises
+    ------
+    InputError
+        No run, one that says nothing of its muscle, or runs of different muscles.
+
+    """
     if not runs:
         raise InputError('no recording given', 'characterise')
     seen: dict[tuple[Dimensions, str, float], str] = {}

@@ -92,14 +92,14 @@ def find_holds(run: Run, length_m: float) -> list[Hold]:
 
     """
     origin = int(np.min(run.require('pressure').stamp_ns))
-    pressure_t, pressure = _samples(run, 'pressure', 'pressure_pa', origin)
-    contraction = _samples(run, 'contraction', 'contraction_m', origin)
-    force = _samples(run, 'force', 'force_n', origin) if 'force' in run else (
+    pressure_t, pressure = samples_of(run, 'pressure', 'pressure_pa', origin)
+    contraction = samples_of(run, 'contraction', 'contraction_m', origin)
+    force = samples_of(run, 'force', 'force_n', origin) if 'force' in run else (
         np.zeros(0), np.zeros(0))
     if pressure_t[-1] - pressure_t[0] < SHORTEST_S:
         raise InputError(f'is shorter than one hold of {SHORTEST_S:g} s', run.path)
     holds: list[Hold] = []
-    for begin, end in _still_spans(pressure_t, pressure):
+    for begin, end in still_spans(pressure_t, pressure):
         # The last bin already feels the next increment.
         stop = end - 0.5 * BIN_S
         start = stop - min(0.5 * (end - begin), LONGEST_WINDOW_S)
@@ -109,7 +109,7 @@ def find_holds(run: Run, length_m: float) -> list[Hold]:
     return holds
 
 
-def _samples(run: Run, topic: str, key: str, origin_ns: int) -> tuple[FloatArray, FloatArray]:
+def samples_of(run: Run, topic: str, key: str, origin_ns: int) -> tuple[FloatArray, FloatArray]:
     """Return (time [s], value) of the finite samples of one topic, times ascending."""
     series = run.require(topic)
     value = np.asarray(series.values[key], dtype=float)
@@ -121,9 +121,10 @@ def _samples(run: Run, topic: str, key: str, origin_ns: int) -> tuple[FloatArray
     return time[order], value[good][order]
 
 
-def _still_spans(time: FloatArray, pressure: FloatArray) -> list[tuple[float, float]]:
+def still_spans(time: FloatArray, pressure: FloatArray, bin_s: float = BIN_S,
+                shortest_s: float = SHORTEST_S) -> list[tuple[float, float]]:
     """Return (begin, end) [s] of every stretch of at least a hold without pressure change."""
-    index = np.floor((time - time[0]) / BIN_S).astype(int)
+    index = np.floor((time - time[0]) / bin_s).astype(int)
     count = np.bincount(index)
     with np.errstate(invalid='ignore'):
         mean = np.bincount(index, pressure) / count
@@ -141,8 +142,8 @@ def _still_spans(time: FloatArray, pressure: FloatArray) -> list[tuple[float, fl
             before[1] = end
         else:
             joined.append([begin, end])
-    return [(time[0] + BIN_S * a, time[0] + BIN_S * b) for a, b in joined
-            if BIN_S * (b - a) >= SHORTEST_S - 1e-9]
+    return [(time[0] + bin_s * a, time[0] + bin_s * b) for a, b in joined
+            if bin_s * (b - a) >= shortest_s - 1e-9]
 
 
 def _blocks(

@@ -71,7 +71,7 @@ class Fit:
 
     """
 
-    law: object
+    law: MuscleLaw
     rmse_n: float
     max_error_n: float
     false_force_n: float

@@ -56,6 +56,12 @@ class ForceMap:
     censored: np.ndarray
 
 
+def some_points(points: ForceMap, chosen: np.ndarray) -> ForceMap:
+    """Return the ForceMap of some of the points, by a mask or by their places."""
+    return ForceMap(points.name, points.length_m, points.pressure_gauge_pa[chosen],
+                    points.strain[chosen], points.force_n[chosen], points.censored[chosen])
+
+
 def read_force_map(name: str) -> ForceMap:
     """
     Return a measured map; ``dmsp_10_250`` or ``dmsp_20_300``.

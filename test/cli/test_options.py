@@ -52,6 +52,7 @@ NUMBERS = {
     ('characterise', '--seed'): '0 to 4294967295', ('characterise', '--jobs'): '1 to 64',
     ('characterise', '--load-n'): '0 to 10000 N',
     ('characterise', '--load-step-n'): '0.01 to 1000 N',
+    ('characterise', '--held-mm'): '0 to 5000 mm',
     ('characterise', '--length-m'): '0.01 to 20 m',
     ('characterise', '--bore-m'): '0.0001 to 0.2 m',
     ('characterise', '--dead-volume-m3'): '0 to 1 m^3',

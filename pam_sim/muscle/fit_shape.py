@@ -1,0 +1,129 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Fit a force law to few lengths: near the shape of another measured muscle.
+
+Static points at three or four lengths do not determine the six coefficients of the law ``sarosi``.
+A free fit follows them, and may be anywhere at a length that was not measured. Here force and
+contraction of a measured map are scaled freely. Each coefficient may leave that shape by about a
+half, as far as the points ask for it. ``benchmarks/held_lengths.py`` holds it against free fits.
+"""
+
+import math
+
+import numpy as np
+from pam_sim.annotations import FloatArray
+from pam_sim.errors import InputError
+from pam_sim.muscle.fit import Fit, judge, residuals_n
+from pam_sim.muscle.force_maps import ForceMap, some_points
+from pam_sim.muscle.law import Validity
+from pam_sim.muscle.laws.sarosi import Sarosi
+from scipy.optimize import least_squares
+
+SHAPE = 'dmsp_10_250_map'
+LEAST_LENGTHS = 2            # below, force and contraction cannot both be scaled
+# Standard deviations: of the logarithm of a coefficient, and of the points of a length as a share
+# of the largest force. They are off together, so that more of them tell no more.
+COEFFICIENT_SD, LENGTH_SD = 0.5, 0.04
+SCALE_SD = 1.0               # of the logarithms of force and contraction: nearly free
+STIFFER = 1.0, 4.0, 16.0     # times, until the coefficients make a muscle
+
+
+def fit_near_shape(points: ForceMap, shape: str = SHAPE) -> Fit:
+    """
+    Return the Fit of the law ``sarosi`` near the shape of a measured map; deterministic.
+
+    Parameters
+    ----------
+    points : ForceMap
+        Static points at two lengths or more.
+    shape : str
+        A set of the law.
+
+    Raises
+    ------
+    InputError
+        Fewer lengths, no force, or coefficients that make no muscle.
+
+    """
+    pulls = ~points.censored
+    lengths = np.unique(points.strain[pulls]).size
+    if lengths < LEAST_LENGTHS:
+        raise InputError(f'holds forces at {lengths} lengths; {LEAST_LENGTHS} or more are needed',
+                         points.name)
+    base = np.array(list(Sarosi.SETS[shape].values.values()))
+    largest_n = float(points.force_n.max())
+    at_most = Sarosi(None, shape).formula_n(points.pressure_gauge_pa, points.strain)
+    begin = math.log(largest_n / max(float(np.max(at_most)), 1e-3 * largest_n))
+    refusal = InputError('no coefficients', points.name)
+    for times in STIFFER:
+        law = _fitted(points, base, begin, largest_n, COEFFICIENT_SD / times)
+        try:
+            return judge(_checked(law, points), points)
+        except InputError as error:
+            refusal = error
+    raise refusal
+
+
+def left_out_percent(points: ForceMap, shape: str = SHAPE) -> list[float]:
+    """
+    Return for every length, by contraction, how far a fit to the others is off there.
+
+    Root mean square over its points that pull, in percent of the largest force of all. Not a
+    number at a length without one, and where the other lengths determine no law.
+    """
+    largest_n, found = float(points.force_n.max()), []
+    for strain in np.unique(points.strain):
+        left = points.strain == strain
+        pulled = some_points(points, left & ~points.censored)
+        try:
+            law = fit_near_shape(some_points(points, ~left), shape).law
+        except InputError:           # the others determine none
+            pulled = some_points(points, np.zeros_like(left))
+        found.append(100.0 / largest_n * judge(law, pulled).rmse_n if pulled.force_n.size
+                     else math.nan)
+    return found
+
+
+def _fitted(points: ForceMap, base: FloatArray, begin: float, largest_n: float,
+            coefficient_sd: float) -> FloatArray:
+    """Return the coefficients of the best fit."""
+    share = math.sqrt(np.unique(points.strain).size / points.force_n.size) / (
+        largest_n * LENGTH_SD)
+
+    def coefficients(x: FloatArray) -> FloatArray:
+        a1, a2, a3, a4, a5, a6 = base * np.exp(x[2:])
+        force, contraction = np.exp(x[:2])
+        return np.array([force * a1, force * a2, contraction * a3, force * contraction * a4,
+                         force * a5, force * a6])
+
+    def errors(x: FloatArray) -> FloatArray:
+        a1, a2, a3, a4, a5, a6 = coefficients(x)
+        pressure, strain = points.pressure_gauge_pa, points.strain
+        force = (a1 * pressure + a2) * np.exp(a3 * strain) + (a4 * strain + a5) * pressure + a6
+        return np.concatenate([share * residuals_n(force, points), [(x[0] - begin) / SCALE_SD],
+                               [x[1] / SCALE_SD], x[2:] / coefficient_sd])
+
+    return coefficients(least_squares(errors, [begin, *np.zeros(7)]).x)
+
+
+def _checked(coefficients: FloatArray, points: ForceMap) -> Sarosi:
+    """Return the law, valid where there are points; InputError where it makes no muscle."""
+    law = Sarosi(dict(zip((p.name for p in Sarosi.PARAMETERS), coefficients.tolist())))
+    law.validity = Validity(
+        (float(points.pressure_gauge_pa.min()), float(points.pressure_gauge_pa.max())),
+        (float(points.strain.min()), float(points.strain.max())))
+    law._check(f'fit to {points.name}')
+    return law
