@@ -16,6 +16,8 @@
 
 import json
 from pathlib import Path
+import struct
+import warnings
 
 import numpy as np
 from pam_actuation import messages
@@ -193,6 +195,33 @@ def test_a_struct_of_matlab(tmp_path, capsys):
     run = load_run(tmp_path / 'bag')
     np.testing.assert_allclose(run['pressure']['pressure_pa'], 301_325.0 + 1e5 * time_s)
     np.testing.assert_allclose(run['contraction']['contraction_m'], 5e-3 + 1e-3 * time_s)
+
+
+def object_of_matlab():
+    """Return an element of a MAT file as MATLAB writes a table: only MATLAB knows its content."""
+    def element(kind, data):
+        return struct.pack('<II', kind, len(data)) + data + bytes(-len(data) % 8)
+
+    names = b''.join(element(1, name) for name in (b'log', b'MCOS', b'table'))
+    place = element(14, element(6, struct.pack('<II', 13, 0)) + element(
+        5, struct.pack('<ii', 1, 1)) + element(1, b'') + element(6, struct.pack('<I', 1)))
+    return element(14, element(6, struct.pack('<II', 17, 0)) + names + place)
+
+
+def test_objects_of_matlab_are_told_and_arrays_beside_them_read(tmp_path, capsys):
+    path, time_s = tmp_path / 'run.mat', np.arange(300) * 0.002
+    savemat(path, {'t': time_s, 'p': 2.0 + time_s})
+    path.write_bytes(path.read_bytes() + 2 * object_of_matlab())
+    with warnings.catch_warnings():
+        warnings.simplefilter('error')
+        assert main(['import', str(path), '--out', str(tmp_path / 'bag'), '--map', 'time=t:s',
+                     '--map', 'pressure=p:bar_gauge']) == 1
+    assert 'run.mat: it holds objects of MATLAB' in capsys.readouterr().out
+    assert len(load_run(tmp_path / 'bag')['pressure'].stamp_ns) == 300
+    savemat(path, {})
+    path.write_bytes(path.read_bytes() + object_of_matlab())
+    assert main(['import', str(path), '--out', str(tmp_path / 'none')]) == 2
+    assert 'objects of MATLAB' in capsys.readouterr().err
 
 
 def test_topics_of_a_foreign_bag(tmp_path):

@@ -16,6 +16,7 @@
 
 from collections.abc import Callable, Collection, Iterator
 from typing import Any, TYPE_CHECKING
+import warnings
 
 import numpy as np
 from pam_actuation.tables.formats import hdf5
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _DEEPEST = 6
+OBJECTS = ('it holds objects of MATLAB, such as a table, which only MATLAB reads; write them '
+           'there with writetable, or as arrays with table2array')
 
 
 def read(path: str, every: int, wanted: Collection[str] | None,
@@ -34,13 +37,22 @@ def read(path: str, every: int, wanted: Collection[str] | None,
     """Return the tables of a MAT file; see ``formats.read_tables``."""
     from scipy.io import loadmat, matlab
     try:
-        content = loadmat(path, squeeze_me=True, struct_as_record=False)
+        with warnings.catch_warnings():
+            # Objects have no name of their own; no array is lost.
+            warnings.filterwarnings('ignore', 'Duplicate variable name "None"')
+            content = loadmat(path, squeeze_me=True, struct_as_record=False)
     except NotImplementedError:
         return hdf5.read(path, every, wanted, progress)
     except (matlab.MatReadError, ValueError, TypeError, IndexError, OSError, KeyError) as error:
         raise InputError(f'is no readable MAT file: {error}', path) from None
-    return tables_of(path, _arrays({name: value for name, value in content.items()
-                                    if not name.startswith('__')}), every)
+    found = tables_of(path, _arrays({name: value for name, value in content.items()
+                                     if not name.startswith('__')}), every)
+    if any(isinstance(value, matlab.MatlabOpaque) for value in content.values()):
+        if not found:
+            raise InputError(f'has no array; {OBJECTS}', path)
+        for table in found:
+            table.remarks.append(OBJECTS)
+    return found
 
 
 def _arrays(content: dict[str, Any], prefix: str = '', depth: int = 0
