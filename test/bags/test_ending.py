@@ -40,6 +40,13 @@ segments:
   - sine: {center_m: 0.010, amplitude_m: 0.005, frequency_hz: 0.5, cycles: 7}
 """
 LONG = 'name: long\ndomain: pressure\nsegments:\n  - rest: {duration_s: 900.0}\n'
+INCREMENTS = """
+name: few_increments
+domain: pressure
+segments:
+  - rest: {duration_s: 2.0}
+  - increments: {to_pa: 701325.0, steps: 6, move_s: 0.7, hold_s: 1.8}
+"""
 OLDER = Path(__file__).resolve().parents[1] / 'replay' / 'older' / 'pid_ppr.mcap'
 
 
@@ -105,22 +112,22 @@ def test_every_verb_says_that_the_run_stopped_early(stopped, tmp_path, capsys):
 def test_characterise_says_it_too(tmp_path, capsys):
     from pam_actuation.experiments.load_series import simulate_loads, with_sensor_noise
     rig = with_sensor_noise(load_rig('dmsp_5_300_hanging_mass'))
-    text = load_experiment('pressure_increments').to_dict()
-    (tmp_path / 'short.yaml').write_text(json.dumps({**text, 'stop_after_s': 70.0}))
+    short = tmp_path / 'short.yaml'
+    short.write_text(INCREMENTS)
     bags = simulate_loads(rig, tmp_path / 'bags', loads_n=(0.0, 40.0, 80.0), jobs=1,
-                          experiment=str(tmp_path / 'short.yaml'))
+                          experiment=str(short))
     assert all(ending_of(load_run(bag).metadata).ended == 'complete' for bag in bags)
 
     def stop(done_s):
-        if done_s >= 65:
+        if done_s >= 14:
             raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt, match=r'holds 65\.0 of 70\.0 s'):
-        simulate_experiment(load_experiment(tmp_path / 'short.yaml'), rig, None,
-                            tmp_path / 'bags' / 'cut', progress=stop)
+    with pytest.raises(KeyboardInterrupt, match=r'holds 14\.0 of 17\.0 s'):
+        simulate_experiment(load_experiment(short), rig, None, tmp_path / 'bags' / 'cut',
+                            progress=stop)
     assert main(['characterise', *bags, str(tmp_path / 'bags' / 'cut'), '--load-n', '0', '40',
                  '80', '81', '--out', str(tmp_path / 'out')]) == 0
-    words = 'cut: Stopped early after 65.0 s of 70.0 s planned: interrupted.'
+    words = 'cut: Stopped early after 14.0 s of 17.0 s planned: interrupted.'
     assert words in capsys.readouterr().out
     assert words in (tmp_path / 'out' / 'report.html').read_text()
 
