@@ -43,6 +43,7 @@ from pam_sim.effects.unnamed.reading import with_terms
 from pam_sim.effects.valve_dead_zone_gradual import mean_openings_with_lift
 from pam_sim.gap.propose.response import follow
 from pam_sim.joint import load_joint
+from pam_sim.muscle.registry import make_law
 from pam_sim.valve import VALVES
 
 RIG = 'dmsp_5_300_realistic'
@@ -87,6 +88,7 @@ def rollouts() -> None:
         {'name': 'force_reading_term', 'parameters': {'first_of_1': 1.0}}]).effects
     with_terms(found.outputs, 'force', reading.parameters, rig.parameters)
     follow(*np.zeros((3, ROWS)))
+    make_law('lookup').formula_n(3e5, 0.1)
     mean_openings_with_lift(np.zeros(ROWS), 0.01, 0.0, 0.0, 0.0, 0.0, np.empty(ROWS))
     # As a report does, which finds the dead time of a recorded valve.
     DelayEstimator(RATE_HZ).steps(*np.zeros((2, ROWS)))

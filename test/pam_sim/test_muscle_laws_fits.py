@@ -20,9 +20,11 @@ from pam_sim.muscle import geometry
 from pam_sim.muscle.fit import fit_law, fit_table, residuals_n
 from pam_sim.muscle.force_maps import read_force_map
 from pam_sim.muscle.law import ExtrapolationWarning
+from pam_sim.muscle.laws.lookup import STRAIN_POINTS
 from pam_sim.muscle.lookup_table import LookupTable, read_table, table_from_law
 from pam_sim.muscle.registry import make_law
 import pytest
+from scipy.interpolate import RegularGridInterpolator
 
 # Upper bounds of the fitted RMSE in percent of the largest force: DMSP-10-250, DMSP-20-300.
 LIMITS = {
@@ -98,6 +100,21 @@ def test_lookup_returns_the_law_its_table_came_from(table):
     mass = law.air_mass_kg(pressure, load)
     assert law.pressure_gauge_pa(mass, load) == pytest.approx(pressure, abs=2e3)
     assert 5e-6 < mass.min() < mass.max() < 2e-4
+
+
+def test_lookup_gives_the_surface_of_scipy_through_its_points(table):
+    law = make_law('lookup', table)
+    isobars = law.pack()['isobars']
+    strain = np.linspace(0.0, law.validity.strain[1], STRAIN_POINTS)
+    pressure, force = isobars[:, 0], isobars[:, 1:1 + STRAIN_POINTS]
+    surface = RegularGridInterpolator((pressure, strain), force, 'pchip')
+    random = np.random.default_rng(4)
+    at = np.column_stack([random.uniform(pressure[0], pressure[-1], 500),
+                          random.uniform(0.0, strain[-1], 500)])
+    np.testing.assert_allclose(law.formula_n(*at.T), surface(at), rtol=0.0, atol=1e-9)
+    # Of any shape, and one number as well.
+    assert law.formula_n(at[:6, 0].reshape(2, 3), 0.05).shape == (2, 3)
+    assert law.formula_n(3e5, 0.05) == pytest.approx(float(surface([3e5, 0.05])[0]), abs=1e-9)
 
 
 def test_lookup_flags_and_refuses_what_lies_outside_the_table(table):

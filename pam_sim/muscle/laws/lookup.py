@@ -22,19 +22,21 @@ of the overshoot that would make a muscle lengthen under rising pressure.
 compute one from another law.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+import functools
 from pathlib import Path
+import sys
 from typing import Any, TYPE_CHECKING
 import warnings
 
 import numpy as np
 from numpy.typing import ArrayLike
 from pam_sim.annotations import FloatArray
-from pam_sim.compiled import compiled
+from pam_sim.compiled import compiled, entry_point, source_key
 from pam_sim.errors import InputError
 from pam_sim.muscle.law import ExtrapolationWarning, MuscleLaw, OUTSIDE, ParameterSet, Validity
 from pam_sim.muscle.lookup_table import LookupTable, read_table
-from pam_sim.records import part, record, size_of
+from pam_sim.records import part, record, size_of, values_of
 
 if TYPE_CHECKING:
     from scipy.interpolate._rgi import RegularGridInterpolator
@@ -136,6 +138,23 @@ def tension_n(gauge_pa: float, strain: float, par: np.record) -> float:
     return hermite(y0, y1, slope0, slope1, h, (pressure - low.pressure_pa) / h)
 
 
+@functools.cache
+def _entry() -> Callable[[FloatArray, FloatArray, FloatArray, FloatArray], None]:
+    """Return the loop over points as a unit of compiled code; made where a table is used."""
+    key = source_key(sys.modules[__name__])
+
+    @entry_point
+    def fill_tension(gauge_pa: FloatArray, strain: FloatArray, values: FloatArray,
+                     force_n: FloatArray) -> None:
+        """Fill in F(eps, P) [N] of each point; ``values`` are those of ``Lookup.pack``."""
+        if key < 0:         # never; makes the key part of what is stored
+            return
+        par = part(values, 0, HEAD)
+        for i in range(force_n.size):
+            force_n[i] = tension_n(gauge_pa[i], strain[i], par)
+    return fill_tension
+
+
 def _isobar(strain: FloatArray, load: FloatArray) -> tuple[FloatArray, FloatArray]:
     """
     Return (strain ascending, load) of the points on which the muscle moves at one pressure.
@@ -221,7 +240,7 @@ class Lookup(MuscleLaw):
         self._packed = {
             'pressures': pressure.size, 'points_per_strain': (STRAIN_POINTS - 1) / limit,
             'isobars': np.column_stack([pressure, force, slope])}
-        self._force = RegularGridInterpolator((pressure, strain), force, 'pchip')
+        self._values = values_of(self.PACKED, self._packed)
 
     def pack(self) -> dict[str, Any]:
         """Return the head, then pressures, forces and their slopes along contraction."""
@@ -238,9 +257,12 @@ class Lookup(MuscleLaw):
         return np.where(strain > eps[-1], 0.0, PchipInterpolator(eps, pull[first])(inside))
 
     def _tension_n(self, pressure: FloatArray, strain: FloatArray) -> FloatArray:
-        low, high = self.validity.pressure_gauge_pa
-        return self._at(self._force, np.clip(pressure, low, high),
-                        np.clip(strain, 0.0, self.validity.strain[1]))
+        pressure, strain = np.broadcast_arrays(pressure, strain)
+        force = np.empty(pressure.size)
+        # A rig asks thousands of times for few points, to which SciPy's surface is slow.
+        _entry()(pressure.astype(float).ravel(), strain.astype(float).ravel(), self._values,
+                 force)
+        return force.reshape(pressure.shape)
 
     @staticmethod
     def _at(surface: 'RegularGridInterpolator', first: FloatArray,
