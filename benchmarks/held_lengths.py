@@ -40,7 +40,7 @@ from pam_sim.characterise.scattered import with_slack
 from pam_sim.characterise.tables import map_of
 from pam_sim.errors import InputError
 from pam_sim.muscle.fit import fit_law, judge
-from pam_sim.muscle.fit_shape import fit_near_shape, left_out_percent
+from pam_sim.muscle.fit_shape import left_out_percent, near_shape
 from pam_sim.muscle.force_maps import some_points
 from pam_sim.run import Run, Series
 from pam_sim.units import P_ATM_PA
@@ -183,15 +183,15 @@ def show(args):
         return 2
     methods = {'straight lines between lengths': lambda points: by_length(points, of_lines),
                '`sarosi`, free fit': lambda points: by_length(points, of_free_fit),
-               '`sarosi`, near the shape of a DMSP-10-250': left_out_percent}
+               'near the shape of a DMSP-10-250': left_out_percent}
     found = {name: [method(points) for points in maps.values()]
              for name, method in methods.items()}
-    print('| muscle | contractions held, % | largest force, N | fit to all, rms % | '
+    print('| muscle | contractions held, % | largest force, N | all lengths known, rms % | '
           + ' | '.join(methods) + ' |\n' + '|---' * (4 + len(methods)) + '|')
     for k, (name, points) in enumerate(maps.items()):
         held = ', '.join(f'{100.0 * one:.1f}' for one in np.unique(points.strain))
         print(f'| {name} | {held} | {points.force_n.max():.0f} '
-              f'| {fit_near_shape(points).rmse_percent:.1f} | '
+              f'| {near_shape(points).rmse_percent:.1f} | '
               + ' | '.join(shown(rows[k]) for rows in found.values()) + ' |')
     print('\n| median, worst, within 5 % | full length | between others | shortest |\n'
           '|---|---|---|---|')

@@ -26,8 +26,7 @@ import numpy as np
 from pam_sim.annotations import FloatArray
 from pam_sim.characterise.points import Points, SAME_PA
 from pam_sim.characterise.tables import map_of, MeasuredTable
-from pam_sim.muscle.fit import Fit
-from pam_sim.muscle.fit_shape import fit_near_shape, left_out_percent
+from pam_sim.muscle.fit_shape import left_out_percent, near_shape, NearShape
 from pam_sim.muscle.force_maps import ForceMap
 
 LENGTHS = 3                  # of an isobar that can be read
@@ -46,23 +45,23 @@ class Smoothed:
     ----------
     table : MeasuredTable
         The law on isobars, from no pressure to the highest measured one.
-    fit : Fit
-        The law, and how far the points are off it.
+    fit : NearShape
+        The corrected law, and how far the points are off it.
     left_out_percent : list of float
         By contraction: how far a fit to all other lengths is off, of the largest force.
 
     """
 
     table: MeasuredTable
-    fit: Fit
+    fit: NearShape
     left_out_percent: list[float]
 
     def text(self) -> str:
         """Return what a reader should know."""
         said = ('The pressures differ from length to length, so the force law `sarosi` was fitted '
-                'near the shape of a measured DMSP-10-250. The points are off it by '
-                f'{self.fit.rmse_n:.1f} N rms, {self.fit.rmse_percent:.1f} % of the largest '
-                'force.')
+                'near the shape of a measured DMSP-10-250, and corrected at each length. The '
+                f'points are off the result by {self.fit.rmse_n:.1f} N rms, '
+                f'{self.fit.rmse_percent:.1f} % of the largest force.')
         inside = [one for one in self.left_out_percent[1:-1] if math.isfinite(one)]
         if inside:
             said += (f' At a length between others that the fit does not know it is off by up to '
@@ -71,12 +70,13 @@ class Smoothed:
 
     def doubted(self, points: Points) -> Points:
         """Return Points with what the fit leaves in the uncertainty of the contraction."""
-        law = self.fit.law
+        # Between lengths the correction is known no better than what it corrects.
+        law, rmse_n = self.fit.fit.law, self.fit.fit.rmse_n
         half = 0.5 * STRAIN_STEP
         pressure = points.pressure_gauge_pa[:, None]
         fall = law._tension_n(pressure, points.strain - half) - law._tension_n(
             pressure, points.strain + half)
-        doubt = self.fit.rmse_n * STRAIN_STEP / np.maximum(fall, 1e-9)
+        doubt = rmse_n * STRAIN_STEP / np.maximum(fall, 1e-9)
         # Below the pressure at which a muscle begins to pull, its contraction is 0 for certain.
         doubt = np.where(points.strain > 0.0, doubt, 0.0)
         return Points(points.pressure_gauge_pa, points.load_n, points.load_u_n, points.strain,
@@ -115,8 +115,7 @@ def smoothed(table: MeasuredTable, length_m: float) -> Smoothed | None:
     measured = with_slack(map_of(table, length_m))
     if not is_scattered(measured.pressure_gauge_pa, measured.strain):
         return None
-    fit = fit_near_shape(measured)
-    law = fit.law
+    fit = near_shape(measured)
     highest_pa = SAME_PA * math.floor(measured.pressure_gauge_pa.max() / SAME_PA)
     # From none on: a rig is vented, and at the edge of a table its muscle would go on pulling.
     levels = np.unique(SAME_PA * np.round(np.linspace(0.0, highest_pa, PRESSURES) / SAME_PA))
@@ -124,7 +123,7 @@ def smoothed(table: MeasuredTable, length_m: float) -> Smoothed | None:
     pressures, strains = (axis.ravel() for axis in np.meshgrid(levels, strain, indexing='ij'))
     on_isobars = MeasuredTable(
         table.kind, {'pressure': pressures, 'strain': strains,
-                     'force': np.maximum(law._tension_n(pressures, strains), 0.0)},
+                     'force': fit.force_n(pressures, strains)},
         [], table.source, table.path)
     left_out = left_out_percent(measured) if (
         np.unique(measured.strain).size >= FEWEST_LEFT_OUT) else []

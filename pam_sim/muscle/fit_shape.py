@@ -18,12 +18,17 @@ Fit a force law to few lengths: near the shape of another measured muscle.
 Static points at three or four lengths do not determine the six coefficients of the law ``sarosi``.
 A free fit follows them, and may be anywhere at a length that was not measured. Here force and
 contraction of a measured map are scaled freely. Each coefficient may leave that shape by about a
-half, as far as the points ask for it. ``benchmarks/held_lengths.py`` holds it against free fits.
+half, as far as the points ask for it. What the points of a length differ from that law is added,
+as a curve over pressure; between lengths it lies on straight lines. ``benchmarks/held_lengths.py``
+holds it against free fits.
 """
+
+from dataclasses import dataclass
 
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.muscle.fit import Fit, judge, residuals_n
@@ -39,6 +44,8 @@ LEAST_LENGTHS = 2            # below, force and contraction cannot both be scale
 COEFFICIENT_SD, LENGTH_SD = 0.5, 0.04
 SCALE_SD = 1.0               # of the logarithms of force and contraction: nearly free
 STIFFER = 1.0, 4.0, 16.0     # times, until the coefficients make a muscle
+POINTS_PER_DEGREE = 4        # of the curve over pressure, which has at most ...
+MOST_DEGREE = 2
 
 
 def fit_near_shape(points: ForceMap, shape: str = SHAPE) -> Fit:
@@ -77,9 +84,84 @@ def fit_near_shape(points: ForceMap, shape: str = SHAPE) -> Fit:
     raise refusal
 
 
+@dataclass(frozen=True)
+class Curve:
+    """
+    What the points of a length differ from a law: a polynomial over pressure.
+
+    Parameters
+    ----------
+    strain : float
+        Contraction at that length.
+    range_pa : tuple of float
+        Lowest and highest gauge pressure of its points; beyond, the ends hold.
+    coefficients : numpy.ndarray
+        Of the polynomial over the pressure in units of the highest, N.
+
+    """
+
+    strain: float
+    range_pa: tuple[float, float]
+    coefficients: FloatArray
+
+    def difference_n(self, gauge_pa: FloatArray) -> FloatArray:
+        """Return the difference [N] at a gauge pressure [Pa]."""
+        low, high = self.range_pa
+        return np.polyval(self.coefficients, np.clip(gauge_pa, low, high) / high)
+
+
+@dataclass(frozen=True)
+class NearShape:
+    """
+    A force law near a measured shape, corrected by what the points differ from it.
+
+    Parameters
+    ----------
+    fit : Fit
+        The law.
+    curves : list of Curve
+        By contraction, of the lengths at which the muscle pulled.
+    rmse_n, rmse_percent : float
+        What the points that pull are off the corrected law, and as a share of the largest force.
+
+    """
+
+    fit: Fit
+    curves: list[Curve]
+    rmse_n: float = math.nan
+    rmse_percent: float = math.nan
+
+    def force_n(self, gauge_pa: ArrayLike, strain: ArrayLike) -> FloatArray:
+        """Return the force [N]; arrays broadcast."""
+        pressure, contraction = np.broadcast_arrays(
+            np.asarray(gauge_pa, float), np.asarray(strain, float))
+        force = self.fit.law._tension_n(pressure, contraction)
+        at = np.array([curve.strain for curve in self.curves])
+        # Share of each length at a point: straight lines between neighbours.
+        for curve, own in zip(self.curves, np.eye(at.size)):
+            force = force + np.interp(contraction, at, own) * curve.difference_n(pressure)
+        return np.maximum(force, 0.0)
+
+
+def near_shape(points: ForceMap, shape: str = SHAPE) -> NearShape:
+    """Return the NearShape of static points; arguments and errors as of ``fit_near_shape``."""
+    fit = fit_near_shape(points, shape)
+    curves = []
+    for strain in np.unique(points.strain[~points.censored]):
+        own = some_points(points, (points.strain == strain) & ~points.censored)
+        gauge, high = own.pressure_gauge_pa, float(own.pressure_gauge_pa.max())
+        degree = min(gauge.size // POINTS_PER_DEGREE, MOST_DEGREE, np.unique(gauge).size - 1)
+        left = own.force_n - fit.law._tension_n(gauge, own.strain)
+        curves.append(Curve(float(strain), (float(gauge.min()), high),
+                            np.polyfit(gauge / high, left, degree)))
+    pulled = some_points(points, ~points.censored)
+    rmse_n = _off_n(NearShape(fit, curves), pulled)
+    return NearShape(fit, curves, rmse_n, 100.0 * rmse_n / float(points.force_n.max()))
+
+
 def left_out_percent(points: ForceMap, shape: str = SHAPE) -> list[float]:
     """
-    Return for every length, by contraction, how far a fit to the others is off there.
+    Return for every length, by contraction, how far ``near_shape`` of the others is off there.
 
     Root mean square over its points that pull, in percent of the largest force of all. Not a
     number at a length without one, and where the other lengths determine no law.
@@ -89,12 +171,19 @@ def left_out_percent(points: ForceMap, shape: str = SHAPE) -> list[float]:
         left = points.strain == strain
         pulled = some_points(points, left & ~points.censored)
         try:
-            law = fit_near_shape(some_points(points, ~left), shape).law
-        except InputError:           # the others determine none
-            pulled = some_points(points, np.zeros_like(left))
-        found.append(100.0 / largest_n * judge(law, pulled).rmse_n if pulled.force_n.size
+            others = near_shape(some_points(points, ~left), shape)
+        except InputError:           # they determine none
+            found.append(math.nan)
+            continue
+        found.append(100.0 * _off_n(others, pulled) / largest_n if pulled.force_n.size
                      else math.nan)
     return found
+
+
+def _off_n(found: NearShape, points: ForceMap) -> float:
+    """Return how far points are off, rms [N]."""
+    error = found.force_n(points.pressure_gauge_pa, points.strain) - points.force_n
+    return float(np.sqrt(np.mean(error ** 2)))
 
 
 def _fitted(points: ForceMap, base: FloatArray, begin: float, largest_n: float,
