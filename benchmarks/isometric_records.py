@@ -32,6 +32,7 @@ import numpy as np
 from pam_sim.characterise.beyond import beyond, LEAST_LENGTHS
 from pam_sim.errors import InputError
 from pam_sim.muscle.fit import CASES, fit_law, judge
+from pam_sim.muscle.fit_shape import left_out_percent
 from pam_sim.muscle.force_maps import ForceMap, read_force_map, some_points
 from pam_sim.muscle.registry import laws, make_law
 import results_page
@@ -177,6 +178,8 @@ def show(args):
     for label, pairs in left_out(points).items():
         cells = ('refused' if one is None else f'{one[0]:.1f} ({one[1]:.1f})' for one in pairs)
         print(f'| {label} | ' + ' | '.join(cells) + ' |')
+    print('| near the shape of a DMSP-10-250, rms | '
+          + ' | '.join(f'{one:.1f}' for one in left_out_percent(points)) + ' |')
     print_bounds([(points, ''), (read_force_map('dmsp_10_250'), 'dmsp_10_250_map'),
                   (read_force_map('dmsp_20_300'), 'dmsp_20_300_map')])
     return 0
