@@ -117,6 +117,14 @@ def ruff(*arguments):
     return json.loads(done.stdout)
 
 
+def statements(node):
+    """Return all statements within a node; expressions, most of a module, hold none."""
+    for name in ('body', 'orelse', 'finalbody', 'handlers', 'cases'):
+        for one in getattr(node, name, ()):
+            yield one
+            yield from statements(one)
+
+
 def out_of_order(file, style):
     """Return the mistakes in the order of the imports of a file, as ament_flake8 names them."""
     from flake8_import_order.checker import ImportOrderChecker
@@ -137,7 +145,7 @@ def shadowed(file):
     """Return the lines on which a class gives a method or an attribute the name of a builtin."""
     text = file.read_text(encoding='utf-8')
     meant = {number for number, line in enumerate(text.splitlines(), 1) if 'noqa: A003' in line}
-    of_classes = (one for node in ast.walk(ast.parse(text))
+    of_classes = (one for node in statements(ast.parse(text))
                   if isinstance(node, ast.ClassDef) for one in node.body)
     named = ((one.lineno, name) for one in of_classes for name in (
         [one.name] if isinstance(one, (ast.FunctionDef, ast.AsyncFunctionDef))
