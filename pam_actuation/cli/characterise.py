@@ -132,8 +132,8 @@ def _characterised(args: argparse.Namespace, sources: list[str]) -> 'Characteris
                 bar.update()
         note_implausible(args, runs, must_be_right=True)
         if args.held_mm is not None:
-            result = characterise_held(
-                runs, [1e-3 * mm for mm in args.held_mm], _dimensions(args, runs))
+            result = characterise_held(runs, [1e-3 * mm for mm in args.held_mm],
+                                       _dimensions(args, runs), args.load_step_n)
         else:
             # Simulated loads are read off the load cell like any others.
             loads = None if args.simulate else args.load_n

@@ -102,7 +102,8 @@ def held_table(runs: Sequence[Run], held_m: Sequence[float]) -> tuple[MeasuredTa
 
 
 def characterise_held(runs: Sequence[Run], held_m: Sequence[float],
-                      dimensions: Dimensions | None = None) -> Characterisation:
+                      dimensions: Dimensions | None = None,
+                      load_step_n: float | None = None) -> Characterisation:
     """
     Return the Characterisation of recordings at held lengths.
 
@@ -112,6 +113,8 @@ def characterise_held(runs: Sequence[Run], held_m: Sequence[float],
         As of ``held_table``.
     dimensions : Dimensions, optional
         Instead of those of the rig in the metadata of the runs.
+    load_step_n : float, optional
+        Grid of loads.
 
     Raises
     ------
@@ -121,7 +124,7 @@ def characterise_held(runs: Sequence[Run], held_m: Sequence[float],
     """
     size = one_muscle(runs, [rig_of(run) for run in runs], dimensions)
     table, remarks = held_table(runs, held_m)
-    result = characterise_table(table, size)
+    result = characterise_table(table, size, load_step_n)
     result.paths = [run.path for run in runs]
     result.remarks += remarks
     return result

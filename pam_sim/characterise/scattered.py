@@ -79,9 +79,7 @@ class Smoothed:
         doubt = rmse_n * STRAIN_STEP / np.maximum(fall, 1e-9)
         # Below the pressure at which a muscle begins to pull, its contraction is 0 for certain.
         doubt = np.where(points.strain > 0.0, doubt, 0.0)
-        return Points(points.pressure_gauge_pa, points.load_n, points.load_u_n, points.strain,
-                      points.half_distance, points.noise, points.settling,
-                      np.hypot(points.reading, doubt))
+        return replace(points, reading=np.hypot(points.reading, doubt))
 
 
 def is_scattered(pressure: FloatArray, strain: FloatArray) -> bool:

@@ -44,8 +44,9 @@ LEAST_LENGTHS = 2            # below, force and contraction cannot both be scale
 COEFFICIENT_SD, LENGTH_SD = 0.5, 0.04
 SCALE_SD = 1.0               # of the logarithms of force and contraction: nearly free
 STIFFER = 1.0, 4.0, 16.0     # times, until the coefficients make a muscle
-POINTS_PER_DEGREE = 4        # of the curve over pressure, which has at most ...
-MOST_DEGREE = 2
+# Of the curve over pressure: points for each degree, the highest degree, and to how many digits
+# of the highest pressure points count as one.
+POINTS_PER_DEGREE, MOST_DEGREE, APART = 4, 2, 2
 
 
 def fit_near_shape(points: ForceMap, shape: str = SHAPE) -> Fit:
@@ -149,8 +150,9 @@ def near_shape(points: ForceMap, shape: str = SHAPE) -> NearShape:
     curves = []
     for strain in np.unique(points.strain[~points.censored]):
         own = some_points(points, (points.strain == strain) & ~points.censored)
-        gauge, high = own.pressure_gauge_pa, float(own.pressure_gauge_pa.max())
-        degree = min(gauge.size // POINTS_PER_DEGREE, MOST_DEGREE, np.unique(gauge).size - 1)
+        gauge, high = own.pressure_gauge_pa, max(float(own.pressure_gauge_pa.max()), 1.0)
+        apart = np.unique(np.round(gauge / high, APART)).size
+        degree = min(gauge.size // POINTS_PER_DEGREE, MOST_DEGREE, apart - 1)
         left = own.force_n - fit.law._tension_n(gauge, own.strain)
         curves.append(Curve(float(strain), (float(gauge.min()), high),
                             np.polyfit(gauge / high, left, degree)))

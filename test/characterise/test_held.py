@@ -117,6 +117,10 @@ def test_recordings_at_held_lengths_make_a_table():
                               Dimensions(LENGTH_M, BORE_M))
     assert off_percent(found) < 1.5
     assert found.paths == [run.path for run in runs]
+    assert found.surfaces.load_n.size == 16
+    stepped = characterise_held(runs, [LENGTH_M * strain for strain in HELD],
+                                Dimensions(LENGTH_M, BORE_M), load_step_n=200.0)
+    assert stepped.surfaces.load_n[1] == 200.0
     told = [one for one in found.remarks if one.startswith('held ')]
     assert sum('does not push' in one for one in told) == 3
     assert sum('not evacuated' in one for one in told) == 4

@@ -14,6 +14,9 @@
 
 """A force law from few lengths: what it foretells of lengths that it does not know."""
 
+from dataclasses import replace
+import warnings
+
 import numpy as np
 from pam_sim.errors import InputError
 from pam_sim.muscle.fit import fit_law
@@ -90,6 +93,15 @@ def test_two_lengths_suffice_and_one_does_not():
     assert np.isnan(left_out_percent(points)).all()
     with pytest.raises(InputError, match='made: holds forces at 1 lengths; 2 or more'):
         fit_near_shape(some_points(points, points.strain < 0.1))
+
+
+def test_points_at_one_pressure_make_no_curve_over_it():
+    points = held((0.02, 0.06, 0.11))
+    with warnings.catch_warnings():
+        warnings.simplefilter('error')
+        for pressure_pa in (0.0, 4e5):
+            at_one = replace(points, pressure_gauge_pa=np.full(points.strain.size, pressure_pa))
+            assert np.isfinite(near_shape(at_one).force_n(3e5, 0.05))
 
 
 def test_points_of_no_muscle_still_make_one():
