@@ -216,12 +216,28 @@ def test_objects_of_matlab_are_told_and_arrays_beside_them_read(tmp_path, capsys
         warnings.simplefilter('error')
         assert main(['import', str(path), '--out', str(tmp_path / 'bag'), '--map', 'time=t:s',
                      '--map', 'pressure=p:bar_gauge']) == 1
-    assert 'run.mat: it holds objects of MATLAB' in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert 'run.mat: it holds objects of MATLAB' in said and 'more than once' not in said
     assert len(load_run(tmp_path / 'bag')['pressure'].stamp_ns) == 300
     savemat(path, {})
     path.write_bytes(path.read_bytes() + object_of_matlab())
     assert main(['import', str(path), '--out', str(tmp_path / 'none')]) == 2
     assert 'objects of MATLAB' in capsys.readouterr().err
+
+
+def test_an_array_that_was_saved_twice_is_told(tmp_path, capsys):
+    path, time_s = tmp_path / 'run.mat', np.arange(300) * 0.002
+    savemat(path, {'t': time_s, 'p': 2.0 + time_s})
+    first = path.read_bytes()
+    savemat(path, {'p': 3.0 + time_s})
+    path.write_bytes(first + path.read_bytes()[128:])           # behind the head of the file
+    with warnings.catch_warnings():
+        warnings.simplefilter('error')
+        assert main(['import', str(path), '--out', str(tmp_path / 'bag'), '--map', 'time=t:s',
+                     '--map', 'pressure=p:bar_gauge']) == 1
+    assert '`p` stands more than once' in capsys.readouterr().out
+    read = load_run(tmp_path / 'bag')['pressure']['pressure_pa']
+    np.testing.assert_allclose(read, 401_325.0 + 1e5 * time_s)
 
 
 def test_topics_of_a_foreign_bag(tmp_path):

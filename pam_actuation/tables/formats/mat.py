@@ -15,6 +15,7 @@
 """MAT files of MATLAB and GNU Octave, up to version 7; 7.3 is HDF5."""
 
 from collections.abc import Callable, Collection, Iterator
+import re
 from typing import Any, TYPE_CHECKING
 import warnings
 
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _DEEPEST = 6
+_TWICE = re.compile('Duplicate variable name "(.*?)"')       # what SciPy warns of
 OBJECTS = ('it holds objects of MATLAB, such as a table, which only MATLAB reads; write them '
            'there with writetable, or as arrays with table2array')
 
@@ -37,9 +39,8 @@ def read(path: str, every: int, wanted: Collection[str] | None,
     """Return the tables of a MAT file; see ``formats.read_tables``."""
     from scipy.io import loadmat, matlab
     try:
-        with warnings.catch_warnings():
-            # Objects have no name of their own; no array is lost.
-            warnings.filterwarnings('ignore', 'Duplicate variable name "None"')
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter('always', matlab.MatReadWarning)
             content = loadmat(path, squeeze_me=True, struct_as_record=False)
     except NotImplementedError:
         return hdf5.read(path, every, wanted, progress)
@@ -47,11 +48,15 @@ def read(path: str, every: int, wanted: Collection[str] | None,
         raise InputError(f'is no readable MAT file: {error}', path) from None
     found = tables_of(path, _arrays({name: value for name, value in content.items()
                                      if not name.startswith('__')}), every)
-    if any(isinstance(value, matlab.MatlabOpaque) for value in content.values()):
-        if not found:
-            raise InputError(f'has no array; {OBJECTS}', path)
-        for table in found:
-            table.remarks.append(OBJECTS)
+    objects = {name for name, value in content.items() if isinstance(value, matlab.MatlabOpaque)}
+    if objects and not found:
+        raise InputError(f'has no array; {OBJECTS}', path)
+    twice = {name for one in told for name in _TWICE.findall(str(one.message))} - objects
+    remarks = [OBJECTS] if objects else []
+    remarks += [f'`{name}` stands more than once in it; the last one was taken'
+                for name in sorted(twice)]
+    for table in found:
+        table.remarks += remarks
     return found
 
 
