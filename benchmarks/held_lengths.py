@@ -29,6 +29,7 @@ largest force.
 
 import argparse
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 import sys
 from typing import NamedTuple
@@ -41,7 +42,6 @@ from pam_sim.characterise.tables import map_of
 from pam_sim.errors import InputError
 from pam_sim.muscle.fit import fit_law, judge
 from pam_sim.muscle.fit_shape import left_out_percent, near_shape
-from pam_sim.muscle.force_maps import some_points
 from pam_sim.run import Run, Series
 from pam_sim.units import P_ATM_PA
 import results_page
@@ -53,7 +53,7 @@ BAR_PERCENT = 5.0
 
 
 class Muscle(NamedTuple):
-    """A muscle: bore, name and length [mm] at rest, and {kink in the file names: held length}."""
+    """A muscle: bore, length in its file names, length at rest, {kink in them: held length}."""
 
     bore_mm: int
     cut_cm: int
@@ -124,20 +124,6 @@ def straight(points, pressure, strain):
     return np.array([np.interp(e, lengths, column) for e, column in zip(strain, at_length.T)])
 
 
-def by_length(points, foretell):
-    """Return the error [%] at every length, left out; not a number where it is refused."""
-    found = []
-    for strain in np.unique(points.strain):
-        left = points.strain == strain
-        there = some_points(points, left & ~points.censored)
-        try:
-            error = foretell(some_points(points, ~left), there)
-        except InputError:
-            error = np.nan
-        found.append(100.0 * error / float(points.force_n.max()))
-    return found
-
-
 def of_lines(others, there):
     """Return the error [N] of straight lines."""
     return float(np.sqrt(np.mean((straight(
@@ -181,8 +167,8 @@ def show(args):
     except InputError as mistake:
         print(f'held_lengths: {mistake}', file=sys.stderr)
         return 2
-    methods = {'straight lines between lengths': lambda points: by_length(points, of_lines),
-               '`sarosi`, free fit': lambda points: by_length(points, of_free_fit),
+    methods = {'straight lines between lengths': partial(left_out_percent, off_n=of_lines),
+               '`sarosi`, free fit': partial(left_out_percent, off_n=of_free_fit),
                'near the shape of a DMSP-10-250': left_out_percent}
     found = {name: [method(points) for points in maps.values()]
              for name, method in methods.items()}

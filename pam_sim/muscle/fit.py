@@ -132,7 +132,7 @@ def fit_law(name: str, points: ForceMap, muscle: str | None = None,
     start = {**kind(None, muscle).values, **fixed}
     if 'shortest_length_m' in names:      # keep the start between no and full length
         start['shortest_length_m'] = 0.8 * points.length_m
-    law = _Unchecked(kind, start, muscle)
+    law = UncheckedLaw(kind, start, muscle)
     lower = np.array([bounds[key].lower for key in names])
     upper = np.array([bounds[key].upper for key in names])
     first = np.clip([start[key] for key in names], lower, upper)
@@ -146,12 +146,16 @@ def fit_law(name: str, points: ForceMap, muscle: str | None = None,
     done = least_squares(errors, inner, bounds=(lower / scale, upper / scale),
                          x_scale='jac', max_nfev=2000, xtol=1e-12, ftol=1e-12)
     fitted = dict(zip(names, np.clip(done.x * scale, lower, upper).tolist()))
-    result = kind({**fixed, **fitted}, muscle)
-    result.validity = Validity(
+    return checked(kind({**fixed, **fitted}, muscle), points)
+
+
+def checked(law: MuscleLaw, points: ForceMap) -> Fit:
+    """Return the Fit of a fitted law, valid where there are points; InputError if no muscle."""
+    law.validity = Validity(
         (float(points.pressure_gauge_pa.min()), float(points.pressure_gauge_pa.max())),
         (float(points.strain.min()), float(points.strain.max())))
-    result._check(f'fit to {points.name}')
-    return judge(result, points)
+    law._check(f'fit to {points.name}')
+    return judge(law, points)
 
 
 def fit_table() -> dict[str, dict[str, Fit]]:
@@ -160,7 +164,7 @@ def fit_table() -> dict[str, dict[str, Fit]]:
                    for label, (law, muscle, fixed) in CASES.items()} for name in LENGTH_M}
 
 
-class _Unchecked:
+class UncheckedLaw:
     """A law whose values may change under way; only the end result must be a muscle."""
 
     def __init__(self, kind: type[MuscleLaw], values: dict[str, float],
@@ -170,4 +174,5 @@ class _Unchecked:
         self.values = self._law.values = dict(values)
 
     def tension_n(self, points: ForceMap) -> FloatArray:
+        """Return the value of the formula at points [N]."""
         return self._law._tension_n(points.pressure_gauge_pa, points.strain)

@@ -23,17 +23,17 @@ as a curve over pressure; between lengths it lies on straight lines. ``benchmark
 holds it against free fits.
 """
 
+from collections.abc import Callable
+import contextlib
 from dataclasses import dataclass
-
 import math
 
 import numpy as np
 from numpy.typing import ArrayLike
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
-from pam_sim.muscle.fit import Fit, judge, residuals_n
+from pam_sim.muscle.fit import checked, Fit, residuals_n, UncheckedLaw
 from pam_sim.muscle.force_maps import ForceMap, some_points
-from pam_sim.muscle.law import Validity
 from pam_sim.muscle.laws.sarosi import Sarosi
 from scipy.optimize import least_squares
 
@@ -77,9 +77,9 @@ def fit_near_shape(points: ForceMap, shape: str = SHAPE) -> Fit:
     begin = math.log(largest_n / max(float(np.max(at_most)), 1e-3 * largest_n))
     refusal = InputError('no coefficients', points.name)
     for times in STIFFER:
-        law = _fitted(points, base, begin, largest_n, COEFFICIENT_SD / times)
+        fitted = _fitted(points, base, begin, largest_n, COEFFICIENT_SD / times)
         try:
-            return judge(_checked(law, points), points)
+            return checked(Sarosi(fitted), points)
         except InputError as error:
             refusal = error
     raise refusal
@@ -161,24 +161,36 @@ def near_shape(points: ForceMap, shape: str = SHAPE) -> NearShape:
     return NearShape(fit, curves, rmse_n, 100.0 * rmse_n / float(points.force_n.max()))
 
 
-def left_out_percent(points: ForceMap, shape: str = SHAPE) -> list[float]:
+def off_near_shape_n(others: ForceMap, points: ForceMap) -> float:
+    """Return how far points are off ``near_shape`` of others, rms [N]; errors as of that."""
+    return _off_n(near_shape(others), points)
+
+
+def left_out_percent(points: ForceMap, off_n: Callable[[ForceMap, ForceMap], float] =
+                     off_near_shape_n) -> list[float]:
     """
-    Return for every length, by contraction, how far ``near_shape`` of the others is off there.
+    Return for every length, by contraction, how far what is fitted to the others is off there.
 
     Root mean square over its points that pull, in percent of the largest force of all. Not a
     number at a length without one, and where the other lengths determine no law.
+
+    Parameters
+    ----------
+    points : ForceMap
+        Static points.
+    off_n : callable
+        Takes the points of the other lengths and of this one, and returns the error (rms) [N].
+
     """
     largest_n, found = float(points.force_n.max()), []
     for strain in np.unique(points.strain):
         left = points.strain == strain
         pulled = some_points(points, left & ~points.censored)
-        try:
-            others = near_shape(some_points(points, ~left), shape)
-        except InputError:           # they determine none
-            found.append(math.nan)
-            continue
-        found.append(100.0 * _off_n(others, pulled) / largest_n if pulled.force_n.size
-                     else math.nan)
+        error_n = math.nan
+        if pulled.force_n.size:
+            with contextlib.suppress(InputError):       # the others determine none
+                error_n = off_n(some_points(points, ~left), pulled)
+        found.append(100.0 * error_n / largest_n)
     return found
 
 
@@ -189,32 +201,23 @@ def _off_n(found: NearShape, points: ForceMap) -> float:
 
 
 def _fitted(points: ForceMap, base: FloatArray, begin: float, largest_n: float,
-            coefficient_sd: float) -> FloatArray:
-    """Return the coefficients of the best fit."""
+            coefficient_sd: float) -> dict[str, float]:
+    """Return the coefficients of the best fit by their names."""
+    names = [p.name for p in Sarosi.PARAMETERS]
+    law = UncheckedLaw(Sarosi, dict(zip(names, base.tolist())), None)
     share = math.sqrt(np.unique(points.strain).size / points.force_n.size) / (
         largest_n * LENGTH_SD)
 
-    def coefficients(x: FloatArray) -> FloatArray:
-        a1, a2, a3, a4, a5, a6 = base * np.exp(x[2:])
-        force, contraction = np.exp(x[:2])
-        return np.array([force * a1, force * a2, contraction * a3, force * contraction * a4,
-                         force * a5, force * a6])
+    def coefficients(x: FloatArray) -> dict[str, float]:
+        a1, a2, a3, a4, a5, a6 = (base * np.exp(x[2:])).tolist()
+        force, contraction = np.exp(x[:2]).tolist()
+        return dict(zip(names, (force * a1, force * a2, contraction * a3,
+                                force * contraction * a4, force * a5, force * a6)))
 
     def errors(x: FloatArray) -> FloatArray:
-        a1, a2, a3, a4, a5, a6 = coefficients(x)
-        pressure, strain = points.pressure_gauge_pa, points.strain
-        force = (a1 * pressure + a2) * np.exp(a3 * strain) + (a4 * strain + a5) * pressure + a6
-        return np.concatenate([share * residuals_n(force, points), [(x[0] - begin) / SCALE_SD],
-                               [x[1] / SCALE_SD], x[2:] / coefficient_sd])
+        law.values.update(coefficients(x))
+        return np.concatenate([
+            share * residuals_n(law.tension_n(points), points), [(x[0] - begin) / SCALE_SD],
+            [x[1] / SCALE_SD], x[2:] / coefficient_sd])
 
     return coefficients(least_squares(errors, [begin, *np.zeros(7)]).x)
-
-
-def _checked(coefficients: FloatArray, points: ForceMap) -> Sarosi:
-    """Return the law, valid where there are points; InputError where it makes no muscle."""
-    law = Sarosi(dict(zip((p.name for p in Sarosi.PARAMETERS), coefficients.tolist())))
-    law.validity = Validity(
-        (float(points.pressure_gauge_pa.min()), float(points.pressure_gauge_pa.max())),
-        (float(points.strain.min()), float(points.strain.max())))
-    law._check(f'fit to {points.name}')
-    return law

@@ -159,9 +159,8 @@ def _isobar(strain: FloatArray, load: FloatArray) -> tuple[FloatArray, FloatArra
     """
     Return (strain ascending, load) of the points on which the muscle moves at one pressure.
 
-    Where it lies at rest under the larger loads, the load of lift-off is
-    extrapolated from the last two moving points and kept below the first load
-    that was not lifted.
+    Where it lies at rest under the larger loads, the load of lift-off is extrapolated from the
+    last two moving points. It is kept below the first load that was not lifted.
     """
     moving = strain > _SMALL
     count = np.count_nonzero(moving)
