@@ -118,8 +118,8 @@ def test_report_is_one_file_without_network(bags, tmp_path):
 
 
 def test_gap_writes_its_folder(bags, tmp_path):
-    done = pam('gap', bags / 'ppr', '--model', 'dmsp_5_300_hanging_mass', '--out',
-               tmp_path / 'gap', '--json')
+    done = pam('gap', bags / 'ppr', '--model', 'dmsp_5_300_hanging_mass', '--effects',
+               'hysteresis,creep', '--out', tmp_path / 'gap', '--json')
     assert done.returncode == 0, done.stderr          # the realistic rig differs: an answer
     assert json.loads(done.stdout)['signals']['contraction']['rmse_before'] > 1e-4
     made = {path.name for path in (tmp_path / 'gap').iterdir()}
