@@ -25,7 +25,8 @@ from pam_sim.gap.data.health import check_for
 from pam_sim.gap.data.recording import held_mean, Recording
 from pam_sim.gap.data.split import CERTIFY, FIT, long_split, SELECT, UNUSED
 from pam_sim.gap.result import SignalGap
-from pam_sim.gap.subsystems.simulation import free_run
+from pam_sim.gap.subsystems.simulation import free_run, start_contraction_m
+from pam_sim.units import P_ATM_PA
 import pytest
 
 
@@ -174,6 +175,24 @@ def test_equal_inputs_give_equal_results():
     first, second = (find_gap(run, nominal()).to_dict() for _ in range(2))
     assert first['effects'][0]['name'] == 'valve_hysteresis'
     assert {**second, 'runtime_s': 0} == {**first, 'runtime_s': 0}
+
+
+@pytest.mark.parametrize('read_m', [2e-6, 0.2e-3])
+def test_a_load_read_just_above_the_stop_it_rests_on_does_not_fall(read_m):
+    run = recorded(nominal(), np.zeros(200), initial_pressure_pa=P_ATM_PA, noise=0.0)
+    run.topics['contraction'].values['contraction_m'][:] = read_m
+    recording = Recording(run, 'ppr')
+    force = free_run(nominal(), recording)['force']
+    np.testing.assert_allclose(force, recording.measured['force'], atol=0.01)
+
+
+def test_a_load_that_its_muscle_holds_starts_where_it_is_read():
+    rig = nominal()
+    held_pa = P_ATM_PA + 300e3
+    assert start_contraction_m(rig, 2e-4, held_pa) == 2e-4
+    assert start_contraction_m(rig, 5e-3, P_ATM_PA) == 5e-3         # friction may hold it
+    assert start_contraction_m(rig, -1e-3, held_pa) == 0.0
+    assert start_contraction_m(rig, 1.0, held_pa) == rig.muscle.stroke_m
 
 
 def test_a_free_run_of_the_true_model_follows_the_recording():

@@ -25,7 +25,8 @@ from pam_sim.gap.data.recording import GRID_S, Recording, smoothed
 from pam_sim.gap.subsystems.effects import sensor_changes, SensorChanges, true_value, undone
 from pam_sim.gap.subsystems.known import Known, known_numbers, of_run, SKEW_MAX_S, SKEW_SD_S
 from pam_sim.gap.subsystems.problem import KEPT, SubsystemProblem
-from pam_sim.gap.subsystems.simulation import pressure_driven, pressure_input, simulate_driven
+from pam_sim.gap.subsystems.simulation import (
+    pressure_driven, pressure_input, simulate_driven, start_contraction_m)
 from pam_sim.response import Response
 from pam_sim.rig import Rig
 from pam_sim.units import P_ATM_PA
@@ -96,7 +97,7 @@ class MechanicsProblem(SubsystemProblem):
         x = true_value('contraction', rig, self._start[index]['contraction'], 0.0)
         return rig.simulate(
             command, external_force_n=recording.external_force_n, initial_pressure_pa=start,
-            initial_contraction_m=min(max(x, 0.0), rig.muscle.stroke_m), dt_s=GRID_S)
+            initial_contraction_m=start_contraction_m(rig, x, start), dt_s=GRID_S)
 
     def _command_of(self, index: int, skew_s: float, changes: SensorChanges) -> FloatArray:
         """Return the voltage at which the stand-in for the valve gives the measured pressure."""

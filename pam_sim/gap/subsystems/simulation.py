@@ -30,6 +30,7 @@ from pam_sim.effects.registry import get_effect
 from pam_sim.gap.data.recording import GRID_S, Recording, smoothed
 from pam_sim.gap.subsystems.effects import sensor_changes, true_value, undone
 from pam_sim.gap.subsystems.pulses import on_openings, pulses_of
+from pam_sim.load import LOADS
 from pam_sim.response import Response
 from pam_sim.rig import Rig
 from pam_sim.units import P_ATM_PA
@@ -38,6 +39,8 @@ from pam_sim.valve.ppr import MAX_VOLTAGE_V
 # Feeding a measured pressure: a regulator this fast follows it exactly enough.
 FAST_T_S = 0.001
 FAST_GAIN_PA_PER_V = 200e3   # so that 6 V reach 1.2 MPa gauge
+# A load read so little above the lower stop, that its muscle cannot hold, lies on it.
+NEAR_STOP_M = 0.5e-3
 HIGHEST_INPUT_V = 6.0
 
 
@@ -151,14 +154,29 @@ def pressure_driven(rig: Rig) -> Rig:
         'ppr_highest_v': MAX_VOLTAGE_V, 'ppr_zero_pa': 0.0})
 
 
+def start_contraction_m(rig: Rig, read_m: float, pressure_pa: float) -> float:
+    """
+    Return the contraction [m] that a run starts from, within the stroke.
+
+    It is 0 where a free load is read a little above the lower stop, by noise, and rests on the
+    stop. From where it is read the load would fall, and its load cell would show no force.
+    """
+    contraction_m = min(max(read_m, 0.0), rig.muscle.stroke_m)
+    if (0.0 < contraction_m < NEAR_STOP_M and LOADS[rig.load].MOVES_FREELY
+            and rig.static_contraction_m(pressure_pa) == 0.0):
+        return 0.0
+    return contraction_m
+
+
 def simulate(rig: Rig, recording: Recording, valve_signal: FloatArray, start_error_pa: float = 0.0
              ) -> Response:
     """Run the rig on the recording's grid from the recorded start; return its Response."""
     # What the sensors add is not in the muscle: a closed volume would keep it.
-    p = true_value('pressure', rig, recording.start('pressure') + start_error_pa, 0.0)
+    p = max(true_value('pressure', rig, recording.start('pressure') + start_error_pa, 0.0),
+            P_ATM_PA)
     if recording.driven:
         return simulate_driven(rig, recording, recording.given_contraction_m, valve_signal, p)
     x = true_value('contraction', rig, recording.start('contraction'), 0.0)
     return rig.simulate(
         valve_signal, external_force_n=recording.external_force_n,
-        initial_pressure_pa=max(p, P_ATM_PA), initial_contraction_m=max(x, 0.0), dt_s=GRID_S)
+        initial_pressure_pa=p, initial_contraction_m=start_contraction_m(rig, x, p), dt_s=GRID_S)
