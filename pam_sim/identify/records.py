@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from pam_sim.errors import InputError
 from pam_sim.gap.data.health import missed_pulses
+from pam_sim.gap.data.holes import stretches
 from pam_sim.gap.data.noise import noise_of
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.resting import Rest, rest_of
@@ -35,6 +36,8 @@ from pam_sim.run import Run
 LEAST_SAMPLES = 20
 LEAST_DURATION_S = 1.0
 STILL_SHARE = 0.003          # of the stroke; a contraction that moves less is held by something
+ONE_LENGTH = ('the rig states one length, so the recordings without a contraction count as held '
+              'at the same one; pam characterise --held-mm takes several lengths')
 MOVING_PA = 20e3             # a pressure that moves more would move a free muscle
 
 
@@ -94,6 +97,39 @@ class LoadedMechanics(MechanicsProblem):
         if added:
             rig = rig.with_(parameters={'mass_kg': rig.parameters['mass_kg'] + added})
         return super()._simulate(rig, index, numbers)
+
+
+def offers_of(runs: Sequence[Run], rig: Rig, added_kg: Sequence[float]
+              ) -> tuple[list[Offer], list[str]]:
+    """
+    Return (offers, remarks) of recordings; each stretch between holes is an offer of its own.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        Recordings.
+    rig : pam_sim.Rig
+        Its valve and load say which topics matter.
+    added_kg : sequence of float
+        Known mass on the load in addition, for each recording.
+
+    Raises
+    ------
+    InputError
+        As of ``offer_of``, and where holes leave no stretch.
+
+    """
+    offers, remarks = [], []
+    for run, mass in zip(runs, added_kg):
+        parts, text = stretches(run, LEAST_DURATION_S, rig.is_driven)
+        if not parts:
+            raise InputError(text, run.path or 'recording')
+        offers += [offer_of(one, rig, mass) for one in parts]
+        remarks += [text] if text else []
+    lengths_unseen = [run for run in runs if 'contraction' not in run]
+    if rig.load == 'isometric' and len(lengths_unseen) > 1:
+        remarks.append(ONE_LENGTH)
+    return offers, remarks
 
 
 def offer_of(run: Run, rig: Rig, added_kg: float = 0.0) -> Offer:

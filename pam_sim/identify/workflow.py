@@ -37,7 +37,7 @@ from pam_sim.identify.numbers import (
 from pam_sim.identify.possible import (
     counted_in, in_other_forms, is_incomplete, possible_effects, SEEN_FLOORS2)
 from pam_sim.identify.profile import Interval, profile
-from pam_sim.identify.records import offer_of, problems_of
+from pam_sim.identify.records import offers_of, problems_of
 from pam_sim.identify.result import Found, half_width, Identification
 from pam_sim.identify.secant import settle, solve_from
 from pam_sim.identify.settled import beside_settled_zero, with_settled_zero
@@ -107,8 +107,8 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
         raise InputError('no number is unknown: state `unknown` in `tolerance`, or name numbers',
                          rig.name)
     runs, remarks = commanded(runs, rig)
-    offers = [offer_of(run, rig, mass) for run, mass in zip(
-        runs, added_kg or [0.0] * len(runs))]
+    offers, holes = offers_of(runs, rig, added_kg or [0.0] * len(runs))
+    remarks += holes
     problems = problems_of(rig, offers, spare_certify)
     acting = [n for n in wanted if any(n.acts_in(p) for p in problems)]
     numbers = [*acting, *known_numbers_of(problems, acting)]

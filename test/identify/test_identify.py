@@ -21,7 +21,7 @@ import numpy as np
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.identify import identify
-from pam_sim.identify.records import offer_of
+from pam_sim.identify.records import offer_of, offers_of, ONE_LENGTH
 from pam_sim.run import Run, Series
 import pytest
 
@@ -128,6 +128,14 @@ def test_the_held_length_may_be_unknown_and_beyond_the_stroke_is_no_length():
     run = record(rig, keep=('pressure', 'force'), command=False)
     found = identify(run, load_rig('dmsp_5_300_isometric'), ['contraction_m'], advise=False)
     assert found['contraction_m'].value == pytest.approx(0.03, rel=0.02)
+
+
+def test_recordings_at_several_held_lengths_are_told_to_count_as_one():
+    rig = load_rig('dmsp_5_300_isometric').with_(parameters={'contraction_m': 0.02})
+    runs = [record(rig, keep=keep, command=False) for keep in (
+        ('pressure', 'force'), ('pressure', 'force'), ('pressure', 'contraction', 'force'))]
+    assert ONE_LENGTH in offers_of(runs, rig, [0.0] * 3)[1]
+    assert not offers_of(runs[1:], rig, [0.0] * 2)[1]
 
 
 def test_a_missing_effect_widens_the_intervals_and_is_said():
