@@ -18,14 +18,11 @@ from collections.abc import Iterable
 
 from generate.command_line import BAR, plain
 from pam_actuation.control import config, made_for
-from pam_actuation.control.ilc import SETTINGS as ILC_SETTINGS
-from pam_actuation.control.lqi import SETTINGS as LQI_SETTINGS
+from pam_actuation.control.inverse_files import INVERSE_KEYS
+from pam_actuation.control.laws import LAWS
 from pam_actuation.control.lqi_files import MODEL_KEYS
 from pam_actuation.control.modes import force, force_surface, joint as joint_mode
-from pam_actuation.control.mpc import SETTINGS as MPC_SETTINGS
-from pam_actuation.control.pid import SETTINGS as PID_SETTINGS
 from pam_actuation.control.sofc.persistence import FILE_KEYS
-from pam_actuation.control.sofc.settings import SETTINGS as SOFC_SETTINGS
 from pam_actuation.drivers.config import DRIVER_PARAMETERS
 from pam_actuation.experiments import experiment
 from pam_actuation.experiments.chain import DOMAINS, FORCE
@@ -146,15 +143,13 @@ def controller_page():
         'Modes and reactions: [Controllers](../controllers.md). `pam tune` writes such a file.',
         _yaml('controller: sofc', 'settings: {lead_s: 0.12}', 'rules: learned.json'),
         '## Keys', keys(config.KEYS)]
-    for kind, own in config.OWN_KEYS.items():
-        parts += [f'Only of `controller: {kind}`:', keys(own)]
-    for kind, settings in (('sofc', SOFC_SETTINGS), ('pid', PID_SETTINGS),
-                           ('lqi', LQI_SETTINGS), ('ilc', ILC_SETTINGS),
-                           ('mpc', MPC_SETTINGS)):
-        parts += [f'## `settings` of {kind}', parameters(settings)]
+    for kind, law in LAWS.items():
+        parts += [f'Only of `controller: {kind}`:', keys(law.keys)]
+    for kind, law in LAWS.items():
+        parts += [f'## `settings` of {kind}', parameters(law.settings)]
     for name, block in (
             ('force', force.KEYS), ('joint', joint_mode.KEYS), ('made_for', made_for.KEYS),
-            ('static_inverse', config.INVERSE_KEYS), ('surface', force_surface.KEYS),
+            ('static_inverse', INVERSE_KEYS), ('surface', force_surface.KEYS),
             ('model', MODEL_KEYS)):
         parts += [f'## `{name}`', keys(block)]
     parts += [

@@ -14,7 +14,7 @@
 
 """What all control laws have in common: the arrays of a compiled step function."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 import math
 from typing import Any, TYPE_CHECKING
 
@@ -101,7 +101,8 @@ class CompiledController:
             Time between the measurements of this and the former tick; NaN: one period.
         pressure_pa, force_n : float
             Measured absolute pressure [Pa] and force [N]; NaN where not known. Used for the
-            bumpless start and for freezing the learning only.
+            bumpless start, for freezing the learning, for the lag and dead time of the valve,
+            and for the model of the muscle.
         held_back : float
             0 while the driver follows the command. While it vents or limits it, one of the
             codes of ``following``: integral and rules stay as they are then, since the error
@@ -140,6 +141,26 @@ class CompiledController:
     def state_values(self) -> tuple[float, ...]:
         """Return the values of ``state_names`` of the last tick as a tuple of floats."""
         return tuple(self._told.tolist())
+
+    def with_settings(self, settings: Mapping[str, object], rules: 'RuleBase | None' = None
+                      ) -> 'CompiledController':
+        """
+        Return a fresh controller of the same law and rig with other settings.
+
+        Parameters
+        ----------
+        settings : mapping of str
+            All settings.
+        rules : RuleBase, optional
+            Rules to start from; by default its own, where the settings leave them their meaning.
+
+        Raises
+        ------
+        InputError
+            Settings that make no controller.
+
+        """
+        raise NotImplementedError
 
     def learning_reason(self) -> str:
         """Return in words whether the last tick learned, or why not."""

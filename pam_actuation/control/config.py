@@ -17,7 +17,7 @@ Controllers from YAML: a preset name, a file, or the text a recording carries.
 
 ::
 
-    controller: sofc              # or pid, lqi, ilc, mpc
+    controller: sofc              # or another of ``laws.LAWS``
     settings:                     # only what differs from the defaults
       lead_s: 0.1
       index_form: linear          # or table
@@ -39,35 +39,25 @@ from typing import Any, TYPE_CHECKING
 
 from pam_actuation.control.compiled_controller import CompiledController
 from pam_actuation.control.controller_text import INDEX_FORMS
-from pam_actuation.control.ilc import IlcController
-from pam_actuation.control.lqi_files import KEYS as LQI_KEYS, lqi_from_tree
+from pam_actuation.control.laws import Asked, LAWS
 from pam_actuation.control.made_for import check_made_for, read_facts
 from pam_actuation.control.modes.files import KEYS as MODE_KEYS, read_mode
 from pam_actuation.control.modes.force import ForceController
 from pam_actuation.control.modes.joint import JointController
-from pam_actuation.control.mpc_files import KEYS as MPC_KEYS, mpc_from_tree
-from pam_actuation.control.pid import PidController
-from pam_actuation.control.sofc.controller import SelfOrganizingFuzzyController
-from pam_actuation.control.sofc.persistence import load_rules, rules_from_mapping
-from pam_actuation.control.static_inverse import (
-    static_inverse, tabulate_static_inverse)
+from pam_actuation.control.sofc.persistence import load_rules
 from pam_actuation.drivers.asked import asked_in
-from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.joint.rig import JointRig
 from pam_sim.keys import Key, names_of
 from pam_sim.located_yaml import load_yaml, Located
 
 if TYPE_CHECKING:
-    from pam_actuation.control.modes.force import ForceMode
-    from pam_actuation.control.modes.joint import JointMode
     from pam_sim.rig import Rig
 
 Controller = CompiledController | ForceController | JointController
 
-_KINDS = ('sofc', 'pid', 'lqi', 'ilc', 'mpc')
 KEYS = (
-    Key('controller', str, 'Which control law.', required=True, choices=_KINDS),
+    Key('controller', str, 'Which control law.', required=True, choices=tuple(LAWS)),
     Key('rig', str, 'Name and valve of the rig that its rules belong to.',
         otherwise='the rig it runs on'),
     Key('made_for', dict, 'What of a rig matters to it; a rig that differs is refused.',
@@ -77,28 +67,9 @@ KEYS = (
     Key('driver', dict, 'Numbers of the law of the valve driver that it asks for, by name.',
         otherwise='what the rig tells'),
     *MODE_KEYS)
-_INVERSE = Key('static_inverse', dict, 'Pressure over contraction at rest, as a recording '
-               'keeps it.', otherwise='from the rig')
-OWN_KEYS = {
-    'sofc': (_INVERSE,
-             Key('rules', str, 'Rule file to start from, path relative to this file.',
-                 otherwise='blank rules'),
-             Key('initial_rules', dict, 'Content of a rule file, as a recording keeps it.',
-                 otherwise='blank rules')),
-    'pid': (_INVERSE,),
-    'ilc': (_INVERSE,),
-    'lqi': LQI_KEYS,
-    'mpc': (_INVERSE, *MPC_KEYS)}
-INVERSE_KEYS = (
-    Key('lower_m', float, 'Contraction of the first pressure.', required=True, unit='m',
-        lower=-0.1, upper=0.3),
-    Key('step_m', float, 'Contraction between two pressures.', required=True, unit='m',
-        lower=1e-6, upper=0.1),
-    Key('pressure_pa', list, 'Absolute pressures, two or more.', required=True, unit='Pa',
-        lower=0.0, upper=1e7),
-)
 _NAMES = names_of(KEYS)
-_ALL_NAMES = _NAMES + names_of(OWN_KEYS['sofc'] + OWN_KEYS['lqi'])
+_ALL_NAMES = _NAMES + names_of(tuple(dict.fromkeys(
+    key for law in LAWS.values() for key in law.keys)))
 
 
 def rig_identity(rig: 'JointRig | Rig') -> str:
@@ -172,35 +143,19 @@ def controller_from_tree(tree: Located, rig: 'JointRig | Rig | None' = None, fol
 
 def _built(tree: Located, rig: 'JointRig | Rig | None', folder: str) -> Controller:
     """Return the controller that a file asks for, by its kind."""
-    kind = tree.require('controller', str, choices=_KINDS)
+    kind = tree.require('controller', str, choices=tuple(LAWS))
+    law = LAWS[kind]
     for key in tree:
-        if key not in _NAMES + names_of(OWN_KEYS[kind]):
+        if key not in _NAMES + names_of(law.keys):
             raise tree.error(f'a {kind} controller has no `{key}`', key)
     settings, where = _settings(tree, kind)
-    mode = read_mode(tree, rig)
-    identity = tree.get('rig', str, default=rig_identity(rig) if rig is not None else '')
-    if kind in ('lqi', 'mpc') and isinstance(rig, JointRig):
+    if isinstance(rig, JointRig) and not law.wrapped:
         raise InputError(f'{rig.name} is a joint, which has no {kind} controller', tree.where())
-    if kind == 'lqi':
-        assert not isinstance(rig, JointRig)
-        return lqi_from_tree(tree, rig, settings, identity, where)
-    inverse = _static_inverse(tree, rig, mode)
+    mode = read_mode(tree, rig, law.wrapped)
+    identity = tree.get('rig', str, default=rig_identity(rig) if rig is not None else '')
     if mode is not None:
         identity = mode.identity(identity)
-    if kind == 'ilc':
-        return IlcController(inverse, settings, identity, where)
-    if kind == 'mpc':
-        assert not isinstance(rig, JointRig)
-        return mpc_from_tree(tree, rig, inverse, settings, identity, where)
-    controller: PidController | SelfOrganizingFuzzyController
-    if kind == 'pid':
-        controller = PidController(inverse, settings, identity, where)
-    else:
-        controller = SelfOrganizingFuzzyController(
-            inverse, settings, rig_name=identity, where=where)
-        if mode is not None:
-            controller.rules.scaling.update(mode.rule_scaling())
-        _give_rules(controller, tree, folder)
+    controller = law.build(Asked(tree, rig, mode, settings, where, identity, folder))
     return controller if mode is None else mode.wrap(controller)
 
 
@@ -214,40 +169,3 @@ def _settings(tree: Located, kind: str) -> tuple[dict[str, Any], Callable[..., s
         form = located.require('index_form', str, choices=INDEX_FORMS)
         settings['index_form'] = float(INDEX_FORMS.index(form))
     return settings, located.where
-
-
-def _give_rules(controller: SelfOrganizingFuzzyController, tree: Located, folder: str) -> None:
-    """Give a controller the rules of its file, if there are any."""
-    if 'rules' in tree and 'initial_rules' in tree:
-        raise tree.error('give either `rules` or `initial_rules`, not both', 'rules')
-    if 'rules' in tree:
-        path = os.path.join(folder, os.path.expanduser(tree.require('rules', str)))
-        controller.take_rules(load_rules(path, controller.rules))
-    elif 'initial_rules' in tree:
-        mapping = tree.require('initial_rules', dict).plain()
-        controller.rules.assign(
-            rules_from_mapping(mapping, tree.where('initial_rules'), controller.rules))
-
-
-def _static_inverse(tree: Located, rig: 'JointRig | Rig | None',
-                    mode: 'ForceMode | JointMode | None') -> FloatArray:
-    """Return the table of the file, else that of the mode or the rig."""
-    if 'static_inverse' in tree:
-        table = tree.require('static_inverse', dict)
-        table.check_keys(names_of(INVERSE_KEYS))
-        lower_m, step_m = INVERSE_KEYS[0].read(table), INVERSE_KEYS[1].read(table)
-        pressures = INVERSE_KEYS[2]
-        nodes = table.require(pressures.name, list)
-        if len(nodes) < 2:
-            raise table.error('`pressure_pa` needs at least two values', 'pressure_pa')
-        values = [nodes.require(i, float, lower=pressures.lower, upper=pressures.upper,
-                                unit=pressures.unit) for i in range(len(nodes))]
-        return static_inverse(lower_m, step_m, values)
-    if mode is not None:
-        return mode.blank_inverse()
-    if rig is None:
-        raise InputError(
-            'without a rig the controller text must bring its `static_inverse`', tree.where())
-    if isinstance(rig, JointRig):
-        raise InputError(f'{rig.name} is a joint: it has no `static_inverse`', tree.where())
-    return tabulate_static_inverse(rig)

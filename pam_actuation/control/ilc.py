@@ -29,19 +29,22 @@ muscle.
 
 from collections.abc import Callable, Mapping
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pam_actuation.control.fixed_law import FixedLawController
 from pam_actuation.control.inputs import INPUT
 from pam_actuation.control.law_parts import first_command_pa
 from pam_actuation.control.pid import command_of, tracking_error
-from pam_actuation.control.settings import parameter_record, setting
+from pam_actuation.control.settings import checked_settings, parameter_record, setting
 from pam_actuation.control.static_inverse import inverse_pressure_pa
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import Compiled, compiled, entry_point, source_key
-from pam_sim.parameters import check_parameters
 from pam_sim.records import part, record
 from pam_sim.units import P_ATM_PA
+
+if TYPE_CHECKING:
+    from pam_actuation.control.sofc.rule_table import RuleBase
 
 SETTINGS = (
     setting('rate_hz', 'Hz', 200.0, 20.0, 1000.0, 'control rate'),
@@ -252,11 +255,16 @@ class IlcController(FixedLawController):
 
     def __init__(self, static_inverse: FloatArray, settings: Mapping[str, object] | None = None,
                  rig_name: str = '', where: Callable[[str], str] | None = None) -> None:
-        checked = check_parameters(SETTINGS, settings or {}, 'setting', where or '')
+        checked = checked_settings(SETTINGS, settings, where)
         self.static_inverse = np.ascontiguousarray(static_inverse, dtype=float)
         self._memory = np.zeros((3, MEMORY_SIZE))
         super().__init__(ilc_step, checked, self.static_inverse, PARAMETERS, STATE, rig_name,
                          self._memory)
+
+    def with_settings(self, settings: Mapping[str, object], rules: 'RuleBase | None' = None
+                      ) -> 'IlcController':
+        """Return a fresh controller with other settings; see ``CompiledController``."""
+        return IlcController(self.static_inverse, settings, self.rig_name)
 
     def learning_reason(self) -> str:
         """Return in words whether the last tick learned, or why not."""

@@ -24,6 +24,7 @@ rules to learn.
 """
 
 from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pam_actuation.control.fixed_law import FixedLawController
@@ -32,13 +33,15 @@ from pam_actuation.control.law_parts import (
     faded_offset, first_command_pa, held_offset, integral_growth, limited)
 from pam_actuation.control.lqi_gains import MAX_DELAY_TICKS, MAX_ORDER, MODEL, pack, used_numbers
 from pam_actuation.control.lqi_model import LinearModel
-from pam_actuation.control.settings import parameter_record, setting
+from pam_actuation.control.settings import checked_settings, parameter_record, setting
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import Compiled, compiled, entry_point, source_key
 from pam_sim.errors import InputError
-from pam_sim.parameters import check_parameters
 from pam_sim.records import part, record
 from pam_sim.units import P_ATM_PA
+
+if TYPE_CHECKING:
+    from pam_actuation.control.sofc.rule_table import RuleBase
 
 SETTINGS = (
     setting('rate_hz', 'Hz', 200.0, 20.0, 1000.0, 'control rate'),
@@ -249,7 +252,7 @@ class LqiController(FixedLawController):
 
     def __init__(self, model: LinearModel, settings: Mapping[str, object] | None = None,
                  rig_name: str = '', where: Callable[[str], str] | None = None) -> None:
-        checked = check_parameters(SETTINGS, settings or {}, 'setting', where or '')
+        checked = checked_settings(SETTINGS, settings, where)
         if model.rate_hz != checked['rate_hz']:
             raise InputError(
                 f'the linear model is of {model.rate_hz:g} Hz, the controller runs at '
@@ -257,6 +260,11 @@ class LqiController(FixedLawController):
         self.model = model
         self.gains = pack(model, checked)
         super().__init__(lqi_step, checked, self.gains, PARAMETERS, STATE, rig_name)
+
+    def with_settings(self, settings: Mapping[str, object], rules: 'RuleBase | None' = None
+                      ) -> 'LqiController':
+        """Return a fresh controller with other settings; see ``CompiledController``."""
+        return LqiController(self.model, settings, self.rig_name)
 
     def file_entries(self) -> dict[str, object]:
         """Return linear model and gains; an LQI controller has no static inverse."""

@@ -26,6 +26,7 @@ Beyond it goes on at its rate.
 """
 
 from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pam_actuation.control.fixed_law import FixedLawController
@@ -34,14 +35,16 @@ from pam_actuation.control.law_parts import faded_offset, first_command_pa, held
 from pam_actuation.control.lqi_gains import MAX_DELAY_TICKS, MAX_ORDER
 from pam_actuation.control.lqi_model import LinearModel
 from pam_actuation.control.mpc_gains import HORIZON, MODEL, MOVES, pack
-from pam_actuation.control.settings import parameter_record, setting
+from pam_actuation.control.settings import checked_settings, parameter_record, setting
 from pam_actuation.control.static_inverse import inverse_pressure_pa, inverse_to_mapping
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import Compiled, compiled, entry_point, source_key
 from pam_sim.errors import InputError
-from pam_sim.parameters import check_parameters
 from pam_sim.records import part, record
 from pam_sim.units import P_ATM_PA
+
+if TYPE_CHECKING:
+    from pam_actuation.control.sofc.rule_table import RuleBase
 
 PREVIEW_SIZE = 500
 SETTINGS = (
@@ -306,7 +309,7 @@ class MpcController(FixedLawController):
     def __init__(self, model: LinearModel, static_inverse: FloatArray,
                  settings: Mapping[str, object] | None = None, rig_name: str = '',
                  where: Callable[[str], str] | None = None) -> None:
-        checked = check_parameters(SETTINGS, settings or {}, 'setting', where or '')
+        checked = checked_settings(SETTINGS, settings, where)
         if model.rate_hz != checked['rate_hz']:
             raise InputError(
                 f'the linear model is of {model.rate_hz:g} Hz, the controller runs at '
@@ -316,6 +319,11 @@ class MpcController(FixedLawController):
         self.gains = pack(model, self.static_inverse, checked)
         super().__init__(mpc_step, checked, self.gains, PARAMETERS, STATE, rig_name,
                          self.static_inverse)
+
+    def with_settings(self, settings: Mapping[str, object], rules: 'RuleBase | None' = None
+                      ) -> 'MpcController':
+        """Return a fresh controller with other settings; see ``CompiledController``."""
+        return MpcController(self.model, self.static_inverse, settings, self.rig_name)
 
     def file_entries(self) -> dict[str, object]:
         """Return linear model, gains and static inverse."""

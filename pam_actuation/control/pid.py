@@ -21,6 +21,7 @@ self-organizing controller; it has no rules to learn.
 """
 
 from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pam_actuation.control.fixed_law import FixedLawController
@@ -28,13 +29,15 @@ from pam_actuation.control.inputs import INPUT
 from pam_actuation.control.law_parts import (
     faded_offset, filtered_change, first_command_pa, held_offset, integral_growth, limited,
     settled_part)
-from pam_actuation.control.settings import parameter_record, setting
+from pam_actuation.control.settings import checked_settings, parameter_record, setting
 from pam_actuation.control.static_inverse import inverse_pressure_pa
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import Compiled, compiled, entry_point, source_key
-from pam_sim.parameters import check_parameters
 from pam_sim.records import part, record
 from pam_sim.units import P_ATM_PA
+
+if TYPE_CHECKING:
+    from pam_actuation.control.sofc.rule_table import RuleBase
 
 SETTINGS = (
     setting('rate_hz', 'Hz', 200.0, 20.0, 1000.0, 'control rate'),
@@ -235,6 +238,11 @@ class PidController(FixedLawController):
                  rig_name: str = '', where: Callable[[str], str] | None = None) -> None:
         self.static_inverse = np.ascontiguousarray(static_inverse, dtype=float)
         super().__init__(
-            pid_step, check_parameters(SETTINGS, settings or {}, 'setting', where or ''),
+            pid_step, checked_settings(SETTINGS, settings, where),
             self.static_inverse,
             PARAMETERS, STATE, rig_name)
+
+    def with_settings(self, settings: Mapping[str, object], rules: 'RuleBase | None' = None
+                      ) -> 'PidController':
+        """Return a fresh controller with other settings; see ``CompiledController``."""
+        return PidController(self.static_inverse, settings, self.rig_name)

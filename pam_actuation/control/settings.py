@@ -14,11 +14,14 @@
 
 """Settings of a controller: named numbers with unit, default and allowed range."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-from pam_sim.parameters import Parameter
+from pam_sim.errors import InputError
+from pam_sim.parameters import check_parameters, Parameter
 from pam_sim.records import record
+
+LIMITS = 'min_pressure_gauge_pa', 'max_pressure_gauge_pa'      # of the command of every law
 
 
 def setting(name: str, unit: str, default: float, lower: float, upper: float,
@@ -42,3 +45,32 @@ def parameter_record(
 
     """
     return record(*(one.name for one in specification), *derived)
+
+
+def checked_settings(
+        specification: Sequence[Parameter], given: Mapping[str, object] | None,
+        where: Callable[[str], str] | None = None) -> dict[str, float]:
+    """
+    Return all settings of a law, from those that differ from its defaults.
+
+    Parameters
+    ----------
+    specification : sequence of Parameter
+        The settings of the law.
+    given : mapping of str, optional
+        What differs.
+    where : callable, optional
+        Place of a setting for errors.
+
+    Raises
+    ------
+    InputError
+        A setting is unknown or out of range, or the lowest pressure is not below the highest.
+
+    """
+    settings = check_parameters(specification, given or {}, 'setting', where or '')
+    lowest, highest = LIMITS
+    if lowest in settings and settings[highest] <= settings[lowest]:
+        raise InputError(f'{highest} must be larger than {lowest}',
+                         where(highest) if where else highest)
+    return settings

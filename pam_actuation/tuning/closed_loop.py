@@ -22,6 +22,7 @@ controller on it. The same compiled steps as in the live nodes are used
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+import importlib
 import math
 from typing import Any, TYPE_CHECKING
 
@@ -47,6 +48,10 @@ if TYPE_CHECKING:
     from pam_actuation.drivers.config import DriverConfig
     from pam_actuation.experiments.experiment import Experiment
     from pam_sim.rig import Rig
+
+# The module with ``KIND_rollout``, the compiled loop of a law.
+ROLLOUTS = {'sofc': 'rollouts', 'pid': 'rollouts', 'lqi': 'rollouts',
+            'ilc': 'baseline_rollouts', 'mpc': 'baseline_rollouts'}
 
 Course = Callable[[float], float]        # of the time [s]
 
@@ -251,9 +256,18 @@ class ClosedLoop(MuscleLoop):
 
 
 def _rollout_of(kind: str) -> Callable[..., None]:
-    """Return the compiled loop of a law, whose module is imported with the first of its kind."""
-    if kind in ('ilc', 'mpc'):
-        from pam_actuation.tuning import baseline_rollouts
-        return getattr(baseline_rollouts, f'{kind}_rollout')
-    from pam_actuation.tuning import rollouts
-    return getattr(rollouts, f'{kind}_rollout')
+    """
+    Return the compiled loop of a law, whose module is imported with the first of its kind.
+
+    Raises
+    ------
+    InputError
+        There is none for this law.
+
+    """
+    if kind not in ROLLOUTS:
+        raise InputError(f'there is no compiled loop of a {kind} controller; there are those of '
+                         f'{", ".join(ROLLOUTS)}', 'controller')
+    module = importlib.import_module(f'pam_actuation.tuning.{ROLLOUTS[kind]}')
+    rollout: Callable[..., None] = getattr(module, f'{kind}_rollout')
+    return rollout

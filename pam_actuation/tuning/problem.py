@@ -19,13 +19,7 @@ from typing import Any, TYPE_CHECKING
 
 import numpy as np
 from pam_actuation.control.compiled_controller import CompiledController
-from pam_actuation.control.ilc import IlcController
-from pam_actuation.control.lqi import LqiController
 from pam_actuation.control.modes.joint import JointController
-from pam_actuation.control.mpc import MpcController
-from pam_actuation.control.pid import PidController
-from pam_actuation.control.sofc.controller import SelfOrganizingFuzzyController
-from pam_actuation.control.sofc.settings import SCALING
 from pam_actuation.tuning.cost import LOST
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
@@ -39,7 +33,6 @@ if TYPE_CHECKING:
     Loop = ClosedLoop | JointLoop
 
 Law = CompiledController | JointController
-OF_THE_MODE = 'tracked_'    # what of the scaling of rules turns metres of the law into radians
 
 
 class Problem:
@@ -131,33 +124,12 @@ def rebuild(controller: Law, settings: dict[str, float],
     It starts from ``rules``, by default from those of ``controller`` where the settings leave
     them their meaning.
     """
-    fresh = _rebuilt(controller, {**controller.settings, **settings}, rules)
+    merged = {**controller.settings, **settings}
+    fresh: Law
+    if isinstance(controller, JointController):
+        fresh = controller.with_law(controller.law.with_settings(merged, rules))
+    else:
+        fresh = controller.with_settings(merged, rules)
     fresh.made_for, fresh.other_rig = controller.made_for, controller.other_rig
     fresh.driver = controller.driver
-    return fresh
-
-
-def _rebuilt(controller: Law, merged: dict[str, float], rules: 'RuleBase | None') -> Any:
-    if isinstance(controller, JointController):
-        return controller.with_law(_rebuilt(controller.law, merged, rules))
-    if isinstance(controller, (PidController, IlcController)):
-        return type(controller)(controller.static_inverse, merged, controller.rig_name)
-    if isinstance(controller, MpcController):
-        return MpcController(
-            controller.model, controller.static_inverse, merged, controller.rig_name)
-    if isinstance(controller, LqiController):
-        return LqiController(controller.model, merged, controller.rig_name)
-    if rules is None and all(merged[name] == controller.settings[name] for name in SCALING):
-        rules = controller.rules
-    assert controller.rules is not None         # of all that is neither PID nor LQI
-    mode = {name: value for name, value in controller.rules.scaling.items()
-            if name.startswith(OF_THE_MODE)}
-    if rules is not None and mode:
-        rules = rules.copy()
-        for name in mode:
-            rules.scaling.pop(name, None)
-    fresh = SelfOrganizingFuzzyController(
-        controller.static_inverse, merged, rules, controller.rig_name)
-    fresh.rules.scaling.update(mode)
-    fresh.freeze_learning = controller.freeze_learning
     return fresh

@@ -14,6 +14,7 @@
 
 """What may be tuned and between which bounds: a named box, logarithmic where apt."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 import math
 from typing import TYPE_CHECKING
@@ -97,19 +98,8 @@ MPC_AXES = (
     Axis('disturbance_pa', 10.0, 3000.0),
 )
 
-AXES_OF = {'lqi': LQI_AXES, 'ilc': ILC_AXES, 'mpc': MPC_AXES}
 
-
-def default_axes(controller: 'Law') -> tuple[Axis, ...]:
-    """
-    Return the axes for a controller.
-
-    Settings that give learned rules their meaning stay fixed once rules have been learned.
-    """
-    if controller.kind in AXES_OF:
-        return AXES_OF[controller.kind]
-    if controller.kind == 'pid':
-        return PID_INVERSE_AXES if controller.settings['use_static_inverse'] else PID_AXES
+def _of_sofc(controller: 'Law') -> tuple[Axis, ...]:
     from pam_actuation.control.sofc.settings import SCALING
     rules = controller.rules
     learned = rules is not None and (
@@ -117,6 +107,33 @@ def default_axes(controller: 'Law') -> tuple[Axis, ...]:
     axes = JOINT_AXES if tracked_by(controller) == JOINT else SOFC_AXES
     return tuple(axis for axis in axes if axis.name in controller.settings
                  and not (learned and axis.name in SCALING))
+
+
+def _of_pid(controller: 'Law') -> tuple[Axis, ...]:
+    return PID_INVERSE_AXES if controller.settings['use_static_inverse'] else PID_AXES
+
+
+AXES_OF: dict[str, Callable[['Law'], tuple[Axis, ...]]] = {
+    'sofc': _of_sofc, 'pid': _of_pid, 'lqi': lambda controller: LQI_AXES,
+    'ilc': lambda controller: ILC_AXES, 'mpc': lambda controller: MPC_AXES}
+
+
+def default_axes(controller: 'Law') -> tuple[Axis, ...]:
+    """
+    Return the axes for a controller.
+
+    Settings that give learned rules their meaning stay fixed once rules have been learned.
+
+    Raises
+    ------
+    InputError
+        Nobody stated axes for this law.
+
+    """
+    if controller.kind not in AXES_OF:
+        raise InputError(f'there are no axes for a {controller.kind} controller; tuned are '
+                         f'{", ".join(AXES_OF)}', 'controller')
+    return AXES_OF[controller.kind](controller)
 
 
 def to_unit(axes: tuple[Axis, ...], settings: dict[str, float]) -> FloatArray:

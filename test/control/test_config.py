@@ -14,8 +14,16 @@
 
 """Controllers from YAML: presets, exact round trip, mistakes with file and line."""
 
+import importlib
+
 import numpy as np
+from pam_actuation import warm_up
 from pam_actuation.control.config import load_controller
+from pam_actuation.control.laws import LAWS
+from pam_actuation.tuning.closed_loop import _rollout_of, ROLLOUTS
+from pam_actuation.tuning.problem import rebuild
+from pam_actuation.tuning.space import AXES_OF, default_axes
+from pam_sim import load_rig
 from pam_sim.errors import InputError
 import pytest
 from straight_rig import StraightRig
@@ -63,6 +71,44 @@ def test_mistakes_name_file_line_and_what_is_allowed(text, line, words, tmp_path
         load_controller(str(path), StraightRig())
     assert caught.value.where == f'{path}:{line}'
     assert words in str(caught.value)
+
+
+@pytest.mark.parametrize('kind', LAWS)
+def test_the_lowest_pressure_of_every_law_is_below_its_highest(kind, tmp_path):
+    path = tmp_path / 'mine.yaml'
+    path.write_text(f'controller: {kind}\nsettings:\n  min_pressure_gauge_pa: 3.0e+5\n'
+                    '  max_pressure_gauge_pa: 1.0e+5\n')
+    with pytest.raises(InputError, match='must be larger than min_pressure_gauge_pa') as caught:
+        load_controller(str(path), load_rig('dmsp_5_300_hanging_mass'))
+    assert caught.value.where == f'{path}:4'
+
+
+@pytest.mark.parametrize('kind', LAWS)
+def test_every_law_may_be_tuned_and_is_compiled_ahead(kind):
+    assert kind in AXES_OF
+    module = importlib.import_module(f'pam_actuation.tuning.{ROLLOUTS[kind]}')
+    assert callable(getattr(module, f'{kind}_rollout'))
+    assert any(preset.partition('_')[0] == kind for preset in warm_up.LAWS)
+
+
+@pytest.mark.parametrize('name', ['sofc_ppr', 'pid', 'lqi', 'ilc_ppr', 'mpc_ppr'])
+def test_a_law_with_the_settings_it_has_is_the_same_to_the_bit(name):
+    first = load_controller(name, load_rig('dmsp_5_300_hanging_mass'))
+    first.step(0.0, 0.01, 0.0, 0.01, 0.0)
+    second = rebuild(first, {})
+    assert type(second) is type(first) and second.to_yaml() == first.to_yaml()
+    first.pause()
+    for _ in range(5):
+        assert first.step(0.002, 0.01, 0.0, 0.01, 0.0) == second.step(0.002, 0.01, 0.0, 0.01, 0.0)
+
+
+def test_a_law_without_axes_or_loop_is_refused_in_a_sentence():
+    controller = load_controller('pid', StraightRig())
+    controller.kind = 'relay'
+    with pytest.raises(InputError, match='no axes for a relay controller; tuned are sofc, pid'):
+        default_axes(controller)
+    with pytest.raises(InputError, match='no compiled loop of a relay controller'):
+        _rollout_of('relay')
 
 
 def test_unknown_preset_lists_the_known_ones():

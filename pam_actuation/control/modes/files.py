@@ -34,7 +34,6 @@ KEYS = (
     Key('force', dict, 'Numbers of mode `force`.', otherwise='from the rig'),
     Key('joint', dict, 'Numbers of mode `joint`.', otherwise='from the joint'),
 )
-KINDS = ('sofc', 'pid')       # laws that can be wrapped
 _MODES: dict[str, type[ForceMode] | type[JointMode]] = {
     FORCE.mode: ForceMode, JOINT.mode: JointMode}
 
@@ -60,9 +59,19 @@ def joint_preset_for(joint: 'JointRig', valve: str) -> str:
     return f'sofc_{joint_size(joint)}_{valve}'
 
 
-def read_mode(tree: 'Located', rig: 'JointRig | Rig | None') -> ForceMode | JointMode | None:
+def read_mode(tree: 'Located', rig: 'JointRig | Rig | None', wrapped: bool
+              ) -> ForceMode | JointMode | None:
     """
     Return the mode a controller file asks for, None for contraction.
+
+    Parameters
+    ----------
+    tree : Located
+        The file.
+    rig : Rig, JointRig or None
+        What it shall run on.
+    wrapped : bool
+        Whether its law may track anything else than a contraction.
 
     Raises
     ------
@@ -87,7 +96,7 @@ def read_mode(tree: 'Located', rig: 'JointRig | Rig | None') -> ForceMode | Join
                 'controller needs `mode: force`', tree.where())
         return None
     kind = tree.require('controller', str)
-    if kind not in KINDS:
+    if not wrapped:
         raise tree.error(f'a {kind} controller has no `mode: {name}`', 'mode')
     if name == FORCE.mode:
         return ForceMode(tree, rig)

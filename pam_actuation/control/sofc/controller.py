@@ -14,13 +14,14 @@
 
 """The self-organizing fuzzy controller as a class: owner of the arrays of ``sofc_step``."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 import math
 from typing import Any
 
 import numpy as np
 from pam_actuation.control.compiled_controller import CompiledController
 from pam_actuation.control.inputs import MAX_AGE_S
+from pam_actuation.control.settings import checked_settings
 from pam_actuation.control.sofc import muscle_model
 from pam_actuation.control.sofc.credit import ring_rows
 from pam_actuation.control.sofc.learning import REASONS
@@ -34,8 +35,9 @@ from pam_actuation.control.sofc.settings import (
 from pam_actuation.control.sofc.step import sofc_step
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
-from pam_sim.parameters import check_parameters
 from pam_sim.records import fields, size_of
+
+OF_THE_MODE = 'tracked_'    # what of the scaling of rules turns metres of the law into radians
 
 
 class SelfOrganizingFuzzyController(CompiledController):
@@ -66,10 +68,10 @@ class SelfOrganizingFuzzyController(CompiledController):
     state_names = OUTPUT.names or ()
     rules: RuleBase
 
-    def __init__(self, static_inverse: FloatArray, settings: dict[str, Any] | None = None,
+    def __init__(self, static_inverse: FloatArray, settings: Mapping[str, object] | None = None,
                  rules: RuleBase | None = None, rig_name: str = '',
                  where: Callable[[str], str] | None = None) -> None:
-        settings = check_parameters(SETTINGS, settings or {}, 'setting', where or '')
+        settings = checked_settings(SETTINGS, settings, where)
         super().__init__(settings, STATE, rig_name)
         if not any(self.settings[name] for name in OF_MODEL):
             self.state_names = self.state_names[:-len(MODEL_OUTPUTS)]
@@ -81,10 +83,6 @@ class SelfOrganizingFuzzyController(CompiledController):
             raise InputError(
                 'reference_upper_m must be larger than reference_lower_m',
                 where('reference_upper_m') if where else 'reference_upper_m')
-        if self.settings['max_pressure_gauge_pa'] <= self.settings['min_pressure_gauge_pa']:
-            raise InputError(
-                'max_pressure_gauge_pa must be larger than min_pressure_gauge_pa',
-                where('max_pressure_gauge_pa') if where else 'max_pressure_gauge_pa')
         self.static_inverse = np.ascontiguousarray(static_inverse, dtype=float)
         scaling: dict[str, Any] = {name: self.settings[name] for name in SCALING}
         scaling['rig'] = rig_name
@@ -122,6 +120,23 @@ class SelfOrganizingFuzzyController(CompiledController):
         self._arguments = (
             self.parameters, self.static_inverse, tables, self._ring, self._state, self._inputs,
             self._outputs)
+
+    def with_settings(self, settings: Mapping[str, object], rules: RuleBase | None = None
+                      ) -> 'SelfOrganizingFuzzyController':
+        """Return a fresh controller with other settings; see ``CompiledController``."""
+        if rules is None and all(settings[name] == self.settings[name] for name in SCALING):
+            rules = self.rules
+        mode = {name: value for name, value in self.rules.scaling.items()
+                if name.startswith(OF_THE_MODE)}
+        if rules is not None and mode:
+            rules = rules.copy()
+            for name in mode:
+                rules.scaling.pop(name, None)
+        fresh = SelfOrganizingFuzzyController(
+            self.static_inverse, settings, rules, self.rig_name)
+        fresh.rules.scaling.update(mode)
+        fresh.freeze_learning = self.freeze_learning
+        return fresh
 
     def learning_reason(self) -> str:
         """Return in words whether the last tick learned, or why not."""
