@@ -33,7 +33,9 @@ LAG_TOLERANCE = 0.5          # of the lag of a regulator that nobody stated
 DAMPING_TOLERANCE = 0.5      # of the damping of a muscle of another bore that nobody stated
 ZERO_SHARE = 0.02            # of the range; by data sheets 1 % each of regulator and sensor
 DAMPING = 'damping_n_s_per_m'
-REGULATOR_NUMBERS = ('K_m', 'ppr_lowest_v', 'ppr_highest_v', 'ppr_zero_pa')
+ZERO = 'ppr_zero_pa'
+NOT_STATED = 'not stated: that of the nominal regulator, yours may differ'
+REGULATOR_NUMBERS = ('K_m', 'ppr_lowest_v', 'ppr_highest_v', ZERO)
 
 
 @dataclass
@@ -168,19 +170,21 @@ class Description:
                                  f'--regulator {self.regulator}')
             if preset.lag_s is not None and 'T_m' not in self.numbers:
                 self._add('T_m', preset.lag_s, None, source)
-        if volts is None and gauge_pa is None:
-            return
         nominal = {p.name: p.default for p in self.parameters}
+        is_stated = volts is not None or gauge_pa is not None
         low_v, high_v = volts or (nominal['ppr_lowest_v'], nominal['ppr_highest_v'])
         low_pa, high_pa = gauge_pa or (0.0, nominal['K_m'] * (nominal['ppr_highest_v']
                                                               - nominal['ppr_lowest_v']))
         gain = float(f'{(high_pa - low_pa) / (high_v - low_v):.9g}')
-        for name, value in zip(REGULATOR_NUMBERS, (gain, low_v, high_v, low_pa)):
-            unsure = self._zero_tolerance(low_pa, high_pa) if name == 'ppr_zero_pa' else None
+        values = dict(zip(REGULATOR_NUMBERS, (gain, low_v, high_v, low_pa)))
+        if not is_stated:       # gain and range stay those of the nominal rig
+            values = {ZERO: low_pa} if ZERO not in self.numbers else {}
+            source = NOT_STATED
+        for name, value in values.items():
+            unsure = self._zero_tolerance(low_pa, high_pa) if name == ZERO else None
             self._add(name, value, unsure, source)
         if 'T_m' not in self.numbers:
-            self._add('T_m', nominal['T_m'], LAG_TOLERANCE,
-                      'not stated: that of the nominal regulator, yours may differ by half')
+            self._add('T_m', nominal['T_m'], LAG_TOLERANCE, NOT_STATED)
 
     def _zero_tolerance(self, low_pa: float, high_pa: float) -> Tolerance | None:
         """

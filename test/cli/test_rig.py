@@ -64,8 +64,9 @@ def test_what_was_said_is_in_the_rig():
 @pytest.mark.parametrize('load', ['hanging_mass', 'isometric', 'driven'])
 def test_without_a_word_it_is_the_nominal_rig_with_its_numbers_in_comments(load, valve):
     rig = new('--load', load, '--valve', valve)
+    unsure = {'T_m': 0.5, 'ppr_zero_pa': AbsoluteSd(12e3)} if valve == 'ppr' else {}
     assert rig == load_rig(f'dmsp_5_300_{load}', valve=valve).with_(
-        name='made', tolerance={'force_map_gain': 0.15})
+        name='made', tolerance={'force_map_gain': 0.15, **unsure})
     text = open('made.yaml', encoding='utf-8').read()
     other = {'K_m', 'T_m'} if valve == 'hsv' else {'C', 'b', 'V_dead', 'supply_pa'}
     for parameter in rig.parameter_list:
@@ -73,7 +74,7 @@ def test_without_a_word_it_is_the_nominal_rig_with_its_numbers_in_comments(load,
             continue
         if parameter.name == 'pwm_period_s' and valve == 'ppr':
             continue
-        sign = '' if parameter.name == 'force_map_gain' else '# '
+        sign = '' if parameter.name in ('force_map_gain', *unsure) else '# '
         row = re.search(rf'^  {sign}{parameter.name}: (\S+) .*# (.*)$', text, re.M)
         assert row and float(row[1]) == parameter.default and parameter.allowed in row[2]
     # Without the comment sign each line states the same number.
