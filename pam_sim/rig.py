@@ -344,6 +344,15 @@ class Rig:
         return (self.tension_n(contraction_m + half)
                 - self.tension_n(contraction_m - half)) / (2.0 * half)
 
+    def load_damping_n_s_per_m(self, contraction_m: float, speed_m_per_s: float) -> float:
+        """Return by how much the force of a free load rises with speed, up to one, N s/m."""
+        load = LOADS[self.load]
+        if not has_force(load):
+            return 0.0
+        up, down = (load_force_n(load, self.parameters, contraction_m, speed)
+                    for speed in (speed_m_per_s, -speed_m_per_s))
+        return (up - down) / (2.0 * speed_m_per_s)
+
     def _rest_against_load_m(self, pressure_pa: FloatArray | float) -> FloatArray | float:
         """Return the contraction at rest where the load's force changes with it, by bisection."""
         given_pa = np.asarray(pressure_pa, float)

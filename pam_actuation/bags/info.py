@@ -58,8 +58,8 @@ class TopicInfo:
     """
     One topic of a bag; times by header stamp where the message has one.
 
-    ``rate_hz``, ``max_gap_s`` and ``stamp_jitter_s`` (rms difference of the stamp
-    intervals from their median) are None with fewer than three messages.
+    ``rate_hz`` (between gaps), ``max_gap_s`` and ``stamp_jitter_s`` (rms difference of the
+    stamp intervals from their median) are None with fewer than three messages.
     ``published`` is None where no node reports it. ``lost`` is the larger of
     what the recorder missed by sequence numbers and what published counts say,
     None where neither is known.
@@ -244,10 +244,11 @@ def _topic_info(topic: TopicData,
     if len(stamp_ns) > 2 and topic.name != '/diagnostics':
         steps_s: FloatArray = np.multiply(np.diff(np.sort(stamp_ns)), 1e-9)
         usual_s = float(np.median(steps_s))
-        span_s = float(steps_s.sum())
-        info.rate_hz = len(steps_s) / span_s if span_s > 0 else None
+        gaps = steps_s > GAP_FACTOR * usual_s if usual_s > 0 else np.zeros(steps_s.size, bool)
+        span_s = float(steps_s[~gaps].sum())
+        info.rate_hz = int((~gaps).sum()) / span_s if span_s > 0 else None
         info.max_gap_s = float(steps_s.max())
-        info.gaps = int((steps_s > GAP_FACTOR * usual_s).sum()) if usual_s > 0 else 0
+        info.gaps = int(gaps.sum())
         info.stamp_jitter_s = float(np.sqrt(np.mean((steps_s - usual_s)**2)))
     for name, column in values.items():
         finite = column[np.isfinite(column)]

@@ -38,6 +38,7 @@ _UNKNOWN_SWING_HZ = 5.9
 _DEAD_TIME_MARGIN_S = 0.003      # the way of a reading to the signal
 _GAIN, _GAIN_AT_ONCE = HsvConfig.gain, 0.7
 _SLOPE_OVER_M = 1e-3
+_SWING_M_PER_S = 0.05            # a speed of a load that swings on its muscle
 _GAUGES_PA = np.arange(10e3, 601e3, 10e3)
 
 
@@ -131,7 +132,8 @@ def _load(rig: 'Rig') -> dict[str, float]:
         'hsv.swing_hz': highest_hz,
         'hsv.swing_lowest_hz': lowest_hz,
         'hsv.swing_lowest_gauge_pa': lowest_at,
-        'hsv.swing_damping': rig.parameters['damping_n_s_per_m'] / (
+        'hsv.swing_damping': (rig.parameters['damping_n_s_per_m']
+                              + rig.load_damping_n_s_per_m(0.5 * full_m, _SWING_M_PER_S)) / (
             4.0 * math.pi * rig.parameters['mass_kg'] * math.sqrt(highest_hz * lowest_hz)),
     }
 

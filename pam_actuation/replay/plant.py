@@ -28,6 +28,7 @@ from pam_sim import load_rig
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.errors import InputError
 from pam_sim.gap.data.commanded import commanded
+from pam_sim.gap.data.holes import holes_of
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.signals import FIELD, recorded_valve
 from pam_sim.gap.subsystems.simulation import free_run
@@ -41,6 +42,8 @@ MIN_DURATION_S = 0.1         # the start is read from half of it
 # By whether the pressure is given, and whether a command stands for the valve signal.
 INPUTS = {(False, False): 'recorded valve signal', (False, True): 'recorded pressure command',
           (True, False): 'measured pressure'}
+HOLES = ('  {}: the model goes on with its last input, so errors from there on may be those of '
+         'the recording')
 UNITS = {'pressure': 'Pa', 'contraction': 'm', 'force': 'N'}
 
 
@@ -52,7 +55,7 @@ class PlantReplay:
 
     ``stamp_ns``, ``time_s``, ``recorded`` and ``simulated`` map signal name to arrays of equal
     length, SI; ``start_ns`` is the first stamp of the recording. ``input`` is what drives the
-    model.
+    model. ``holes`` says where the recording is silent, '' for nowhere.
     """
 
     rig: str
@@ -62,6 +65,7 @@ class PlantReplay:
     stamp_ns: dict[str, IntArray]
     start_ns: int
     input: str = INPUTS[False, False]
+    holes: str = ''
 
     @property
     def differences(self) -> list[Difference]:
@@ -77,7 +81,8 @@ class PlantReplay:
     def lines(self) -> list[str]:
         """Return one line a signal, for people."""
         return [f'plant: {self.rig}, free run on the {self.input} (without sensor noise)',
-                *(one.line() for one in self.differences)]
+                *(one.line() for one in self.differences),
+                *([HOLES.format(self.holes)] if self.holes else [])]
 
     def arrays(self) -> dict[str, FloatArray]:
         """Return all arrays by name, for saving."""
@@ -112,7 +117,7 @@ def replay_plant(run: 'Run') -> PlantReplay:
         rig.name, {s: recording.time_s[s] for s in recording.signals},
         {s: np.asarray(recording.measured[s]) for s in recording.signals}, simulated,
         {s: recording.stamp_ns[s] for s in recording.signals}, run.start_ns,
-        INPUTS[recording.pressure_given, run is not given])
+        INPUTS[recording.pressure_given, run is not given], holes_of(run, rig.is_driven))
 
 
 def _check(run: 'Run', rig: 'Rig') -> None:

@@ -40,13 +40,15 @@ NEEDS_CONTRACTION = False
 PARAMETERS = (
     Parameter('mass_kg', 'kg', 5.0, 0.1, 500.0, 0.02, 'Mass.', 'test'),
     Parameter('wall_n_per_m', 'N/m', 400.0, 0.0, 1e6, 0.02, 'Stiffness of the wall.', 'test'),
-    Parameter('gap_m', 'm', 0.0, 0.0, 1.0, 0.0, 'Way to the wall.', 'test'))
+    Parameter('gap_m', 'm', 0.0, 0.0, 1.0, 0.0, 'Way to the wall.', 'test'),
+    Parameter('oil_n_s_per_m', 'N s/m', 0.0, 0.0, 1e3, 0.0, 'Damping of the guide.', 'test'))
 
 
 @compiled
 def load_force_n(contraction_m, velocity_m_per_s, par):
-    # weight and wall
-    return par.mass_kg * 9.80665 + par.wall_n_per_m * max(contraction_m - par.gap_m, 0.0)
+    # weight, wall and guide
+    wall = par.wall_n_per_m * max(contraction_m - par.gap_m, 0.0)
+    return par.mass_kg * 9.80665 + wall + par.oil_n_s_per_m * velocity_m_per_s
 """
 USE = """
 import numpy as np
@@ -73,6 +75,11 @@ motion = np.array([0.01, 0.021]), np.zeros(2), np.array([1.0, 0.0])
 np.testing.assert_allclose(gap.force_of_motion_n(*motion), [5.0 * 10.80665, 49.03325 + 20.0])
 tuned, usual = (driver_config(rig).as_parameters() for rig in (wall, same))
 assert all(abs(tuned[name] - usual[name]) <= 1e-6 * abs(usual[name]) for name in usual)
+damping = 40.0 + same.parameters['damping_n_s_per_m']
+swings = [driver_config(rig.with_(parameters=numbers)).as_parameters()['hsv.swing_damping']
+          for rig, numbers in ((wall, {'oil_n_s_per_m': 40.0}),
+                               (same, {'damping_n_s_per_m': damping}))]
+assert swings[0] > 2.0 * usual['hsv.swing_damping'] and abs(swings[0] / swings[1] - 1.0) < 1e-6
 assert load_rig(gap.to_yaml()) == gap and not gap.is_driven
 print(find(catalogue(), 'wall')[0]['sentence'])
 """

@@ -236,3 +236,16 @@ def test_a_difference_says_how_large_and_where():
     assert same.identical and same.at_s is None and 'identical' in same.line()
     assert not difference('a', 'Pa', stamps, [0.0], [-0.0], 0).identical
     assert difference('a', 'Pa', stamps, [1.0], [np.nan], 0).largest == np.inf
+
+
+def test_a_hole_in_the_recording_is_told_beside_the_free_run(runs):
+    run = runs[next(case for case in CASES if 'ppr' in case)]
+    assert not replay_plant(run).holes
+    begin_ns = run.start_ns + 300_000_000
+    pressure = run.topics['pressure']
+    inside = (pressure.stamp_ns < begin_ns) | (pressure.stamp_ns > begin_ns + 400_000_000)
+    holed = Run({**run.topics, 'pressure': Series(
+        pressure.stamp_ns[inside], {'pressure_pa': pressure['pressure_pa'][inside]})},
+        run.metadata, run.namespace, run.path)
+    result = replay_plant(holed)
+    assert result.lines()[-1].strip().startswith('no pressure for 0.4 s from 0.3 s on: the model')

@@ -52,13 +52,10 @@ def stretches(run: Run, least_s: float, driven: bool = False) -> tuple[list[Run]
         Whether the contraction is given, as in an isometric rig or a joint.
 
     """
-    topics = [topic for topic in ('pressure', 'contraction')[:1 + driven] if topic in run]
-    found = {topic: holes_in(run.topics[topic].stamp_ns) for topic in topics}
+    found, told = _holes_of(run, driven)
     every = sorted((begin, end) for one in found.values() for begin, end in one)
     if not every:
         return [run], ''
-    told = ' and '.join(_sentence(topic, own, run.start_ns) for topic, own in found.items()
-                        if len(own))
     begins = [run.start_ns, *(end for _, end in every)]
     ends = [*(begin for begin, _ in every), run.end_ns]
     kept = [(begin, end) for begin, end in zip(begins, ends) if end - begin >= least_s * 1e9]
@@ -99,6 +96,19 @@ def cut_at_holes(runs: Sequence[Run], certify: Run | None, least_s: float, drive
     last = found.pop() if certify is not None else []
     kept = [one for parts in found for one in parts]
     return kept, last[0] if last else None, remarks, refusals
+
+
+def holes_of(run: Run, driven: bool = False) -> str:
+    """Return which holes a run has in what drives a model, '' for none; as of ``stretches``."""
+    return _holes_of(run, driven)[1]
+
+
+def _holes_of(run: Run, driven: bool) -> tuple[dict[str, IntArray], str]:
+    """Return (holes by topic, how many there are in words)."""
+    topics = [topic for topic in ('pressure', 'contraction')[:1 + driven] if topic in run]
+    found = {topic: holes_in(run.topics[topic].stamp_ns) for topic in topics}
+    return found, ' and '.join(_sentence(topic, own, run.start_ns)
+                               for topic, own in found.items() if len(own))
 
 
 def holes_in(stamp_ns: IntArray) -> IntArray:
