@@ -37,7 +37,6 @@ from typing import NamedTuple
 from isometric_records import print_bounds
 import numpy as np
 from pam_sim.characterise.held import held_table
-from pam_sim.characterise.scattered import with_slack
 from pam_sim.characterise.tables import map_of
 from pam_sim.errors import InputError
 from pam_sim.muscle.fit import fit_law, judge
@@ -109,7 +108,7 @@ def points_of(folder, muscle):
             runs.append(recording(paths[0]))
             held_m.append(1e-3 * (muscle.length_mm - held_mm))
     table, _ = held_table(runs, held_m)
-    return with_slack(map_of(table, 1e-3 * muscle.length_mm))
+    return map_of(table, 1e-3 * muscle.length_mm)
 
 
 def straight(points, pressure, strain):

@@ -27,10 +27,8 @@ from pam_sim.annotations import FloatArray
 from pam_sim.characterise.points import Points, SAME_PA
 from pam_sim.characterise.tables import map_of, MeasuredTable
 from pam_sim.muscle.fit_shape import left_out_percent, near_shape, NearShape
-from pam_sim.muscle.force_maps import ForceMap
 
 LENGTHS = 3                  # of an isobar that can be read
-SLACK = 0.01                 # of the largest force: no pull, but the zero of the load cell
 PRESSURES = 16               # isobars the law is read on
 STRAIN_STEP, MOST_STRAIN = 0.005, 0.4
 FEWEST_LEFT_OUT = 3          # lengths, so that two are left to be fitted
@@ -88,11 +86,6 @@ def is_scattered(pressure: FloatArray, strain: FloatArray) -> bool:
     return float(np.median(own)) < min(LENGTHS, max(np.unique(strain).size, 2))
 
 
-def with_slack(points: ForceMap) -> ForceMap:
-    """Return a force map in which small forces say no more than that the muscle is slack."""
-    return replace(points, censored=points.force_n <= SLACK * points.force_n.max())
-
-
 def smoothed(table: MeasuredTable, length_m: float) -> Smoothed | None:
     """
     Return a force map on isobars, None where its own pressures are some.
@@ -110,7 +103,7 @@ def smoothed(table: MeasuredTable, length_m: float) -> Smoothed | None:
         The points determine no force law.
 
     """
-    measured = with_slack(map_of(table, length_m))
+    measured = map_of(table, length_m)
     if not is_scattered(measured.pressure_gauge_pa, measured.strain):
         return None
     fit = near_shape(measured)

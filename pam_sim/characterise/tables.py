@@ -15,8 +15,8 @@
 """
 Static points measured by others, from a CSV file.
 
-Two kinds. A force map: gauge pressure, length (or contraction) and force; zeros
-of force are censored, they say that the muscle did not pull. A contraction
+Two kinds. A force map: gauge pressure, length (or contraction) and force; forces of
+a slack muscle are censored, they say that it did not pull. A contraction
 table: gauge pressure, load and contraction. Lines that begin with ``#`` are
 kept as the source.
 """
@@ -24,10 +24,11 @@ kept as the source.
 from dataclasses import dataclass
 
 import numpy as np
-from pam_sim.annotations import FloatArray
+from pam_sim.annotations import BoolArray, FloatArray
 from pam_sim.characterise.fixed_load import FixedLoad
 from pam_sim.characterise.holds import Hold
 from pam_sim.characterise.points import Points
+from pam_sim.characterise.slack import slack_points
 from pam_sim.errors import InputError
 from pam_sim.files import StrPath
 from pam_sim.muscle.force_maps import ForceMap
@@ -133,8 +134,9 @@ def strain_of(table: MeasuredTable, length_m: float) -> FloatArray:
 def map_of(table: MeasuredTable, length_m: float) -> ForceMap:
     """Return the ForceMap of a table of kind ``force map``, for a length at rest [m]."""
     force = table.columns['force']
-    return ForceMap(table.path, length_m, table.columns['pressure'], strain_of(table, length_m),
-                    force, force <= 0.0)
+    pressure, strain = table.columns['pressure'], strain_of(table, length_m)
+    return ForceMap(table.path, length_m, pressure, strain, force,
+                    slack_points(pressure, strain, force))
 
 
 def loads_of_table(table: MeasuredTable, length_m: float) -> list[FixedLoad]:
@@ -180,29 +182,30 @@ def points_of_map(
         Fewer than 3 pressures, or no force.
 
     """
-    pressure, force = table.columns['pressure'], table.columns['force']
-    strain = strain_of(table, length_m)
+    measured = map_of(table, length_m)
+    pressure, strain, force = measured.pressure_gauge_pa, measured.strain, measured.force_n
+    pulling = np.count_nonzero(~measured.censored)
     levels = np.unique(pressure)
-    if levels.size < 3 or not np.any(force > 0.0):
-        raise InputError(f'has {levels.size} pressures and {np.count_nonzero(force > 0)} points '
-                         f'with a force; 3 pressures or more are needed', table.path)
+    if levels.size < 3 or not pulling:
+        raise InputError(f'has {levels.size} pressures and {pulling} points with a force; '
+                         '3 pressures or more are needed', table.path)
     if loads_n is None:
         loads_n = np.linspace(0.0, force.max(), MAP_LOADS)
-    read = [_isobar(strain[pressure == level], force[pressure == level], loads_n)
-            for level in levels]
+    read = [_isobar(strain[rows], force[rows], measured.censored[rows], loads_n)
+            for rows in (pressure == level for level in levels)]
     eps, doubt = (np.array(part) for part in zip(*read))
     nothing = np.zeros_like(eps)
     return Points(levels, np.asarray(loads_n, dtype=float), np.zeros(len(loads_n)), eps,
                   np.full_like(eps, np.nan), nothing, nothing, doubt)
 
 
-def _isobar(
-        strain: FloatArray, force: FloatArray, loads: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _isobar(strain: FloatArray, force: FloatArray, slack: BoolArray,
+            loads: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return (contraction, uncertainty) under each load, from one measured isobar."""
     order = np.argsort(strain)
     strain, force = strain[order], np.minimum.accumulate(force[order])
-    pulls = force > 0.0
-    count = np.count_nonzero(pulls)
+    # Shorter than at the first slack point the muscle is slack too, whatever the load cell reads.
+    count = np.count_nonzero(~np.logical_or.accumulate(slack[order]))
     if count == 0:
         return np.zeros(loads.size), np.zeros(loads.size)
     last = strain[count - 1]
