@@ -51,6 +51,8 @@ class Description:
         Those of ``DIMENSIONS`` that differ, SI.
     force_map : str or None
         Path of a table that ``pam characterise`` wrote.
+    force_map_off : float
+        How far it is off the points it was made from, as a fraction of the largest force.
     load, valve : str
         As in a rig.
     regulator : str or None
@@ -71,6 +73,7 @@ class Description:
     muscle: str | None = None
     dimensions: dict[str, float] = field(default_factory=dict)
     force_map: str | None = None
+    force_map_off: float = 0.0
     load: str = 'hanging_mass'
     valve: str = 'ppr'
     regulator: str | None = None
@@ -137,8 +140,12 @@ class Description:
                   f'(bore / bore of {self.muscle})^2: a first guess, measure it')
 
     def _doubt_force_map(self) -> None:
-        """State how well the force map of a type is known, unless its coefficients are unknown."""
+        """State how well a force map is known, unless coefficients of its law are unknown."""
         name = 'force_map_gain'
+        usual = next(p for p in self.parameters if p.name == name).tolerance
+        if self.force_map and name not in self.numbers and self.force_map_off > usual:
+            self._add(name, 1.0, round(self.force_map_off, 4),
+                      'what the table is off at the points it was made from, rms')
         if not (self.force_map or self.unknown_law or name in self.numbers):
             self._add(name, 1.0, TYPE_TOLERANCE, 'of the type, not measured on this muscle: '
                       'muscles of a type differ by 10 to 20 %')

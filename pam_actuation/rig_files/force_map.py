@@ -26,6 +26,8 @@ from pam_sim.muscle.lookup_table import COLUMNS, read_commented_csv, read_table
 
 _SIZE = re.compile(r'^muscle of length (\d+(?:\.\d+)?) mm(?:, bore (\d+(?:\.\d+)?) mm)?', re.M)
 
+_OFF = re.compile(r'^force of the table off at the measured points: ([\d.e+-]+) %', re.M)
+
 
 def size_in_table(path: str) -> dict[str, float]:
     """
@@ -36,6 +38,16 @@ def size_in_table(path: str) -> dict[str, float]:
     found = _SIZE.search(read_commented_csv(path)[1])
     sizes = zip(('length_m', 'bore_m'), found.groups() if found else ())
     return {name: round(1e-3 * float(mm), 12) for name, mm in sizes if mm is not None}
+
+
+def off_in_table(path: str) -> float:
+    """
+    Return how far a table is off its points, as a fraction of the largest force.
+
+    ``pam characterise`` writes it into the comments; of a table of another source it is 0.
+    """
+    found = _OFF.search(read_commented_csv(path)[1])
+    return 0.01 * float(found[1]) if found else 0.0
 
 
 @contextmanager

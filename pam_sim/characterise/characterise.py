@@ -20,14 +20,12 @@ from typing import Any
 
 import numpy as np
 from pam_sim.annotations import FloatArray
-from pam_sim.characterise.beyond import beyond
 from pam_sim.characterise.dimensions import Dimensions
 from pam_sim.characterise.fixed_load import fixed_load, FixedLoad
+from pam_sim.characterise.force_map import surfaces_of_map
 from pam_sim.characterise.points import points_of, without_stuck
-from pam_sim.characterise.scattered import Smoothed, smoothed
 from pam_sim.characterise.surfaces import build_surfaces, Surfaces
-from pam_sim.characterise.tables import (
-    loads_of_table, map_of, MeasuredTable, points_of_map)
+from pam_sim.characterise.tables import loads_of_table, MeasuredTable
 from pam_sim.errors import InputError
 from pam_sim.model_file import load_rig
 from pam_sim.muscle.lookup_table import LookupTable
@@ -150,32 +148,16 @@ def characterise_table(
         Too few pressures or loads.
 
     """
-    loads: list[FixedLoad] = []
-    stuck: list[float] = []
-    smooth: Smoothed | None = None
+    source = [f'from a {table.kind}'] + [line for line in table.source.splitlines() if line]
     if table.kind == 'force map':
-        top = float(table.columns['force'].max())
-        wanted = None if load_step_n is None else load_step_n * np.arange(
-            int(top / load_step_n + 0.02) + 1)
-        smooth = smoothed(table, dimensions.length_m)
-        points = points_of_map(smooth.table if smooth else table, dimensions.length_m, wanted)
-        points = smooth.doubted(points) if smooth else points
-        load_step_n = load_step_n or float(points.load_n[1])
+        surfaces, error, remarks = surfaces_of_map(table, dimensions, load_step_n)
+        result = Characterisation(surfaces, dimensions, table.kind, [], [table.path],
+                                  source + [error.source()], remarks)
     else:
         loads = loads_of_table(table, dimensions.length_m)
         points, stuck = without_stuck(points_of(loads))
-    surfaces = build_surfaces(points, dimensions, load_step_n)
-    result = Characterisation(
-        surfaces, dimensions, table.kind, loads, [table.path],
-        [f'from a {table.kind}'] + [line for line in table.source.splitlines() if line])
-    result.remarks += _stuck_words(stuck)
-    if table.kind == 'force map':
-        result.remarks.append(smooth.text() if smooth else (
-            'A force map has one branch and states no noise: the uncertainty given is only '
-            'that of the contraction at which the force vanishes.'))
-        longer = beyond(map_of(table, dimensions.length_m))
-        if longer is not None:
-            result.remarks.append(longer.text(dimensions.length_m))
+        result = Characterisation(build_surfaces(points, dimensions, load_step_n), dimensions,
+                                  table.kind, loads, [table.path], source, _stuck_words(stuck))
     _finish(result)
     return result
 

@@ -96,7 +96,8 @@ class Surfaces:
 
 
 def build_surfaces(
-        points: Points, dimensions: Dimensions, load_step_n: float | None = None) -> Surfaces:
+        points: Points, dimensions: Dimensions, load_step_n: float | None = None,
+        loads_n: FloatArray | None = None) -> Surfaces:
     """
     Return the Surfaces through measured Points.
 
@@ -108,6 +109,8 @@ def build_surfaces(
         Without a bore, P(m_air, load) is left out.
     load_step_n : float, optional
         Spacing of the grid of loads, see ``load_grid``.
+    loads_n : ndarray, optional
+        The loads themselves, ascending from 0, instead of a grid.
 
     Raises
     ------
@@ -116,7 +119,7 @@ def build_surfaces(
 
     """
     points = with_enough_pressures(with_no_load(points))
-    loads = load_grid(points.load_n, load_step_n)
+    loads = load_grid(points.load_n, load_step_n) if loads_n is None else loads_n
     at = np.clip(loads, points.load_n[0], points.load_n[-1])
 
     def onto(surface: FloatArray) -> FloatArray:

@@ -24,9 +24,10 @@ kept as the source.
 from dataclasses import dataclass
 
 import numpy as np
-from pam_sim.annotations import BoolArray, FloatArray
+from pam_sim.annotations import FloatArray
 from pam_sim.characterise.fixed_load import FixedLoad
 from pam_sim.characterise.holds import Hold
+from pam_sim.characterise.isobars import isobars_of, loads_of
 from pam_sim.characterise.points import Points
 from pam_sim.characterise.slack import slack_points
 from pam_sim.errors import InputError
@@ -34,7 +35,6 @@ from pam_sim.files import StrPath
 from pam_sim.muscle.force_maps import ForceMap
 from pam_sim.muscle.lookup_table import read_commented_csv
 from pam_sim.short_repr import short_repr
-from scipy.interpolate import PchipInterpolator
 
 # Column name in lower case -> (quantity, factor to SI).
 COLUMNS = {
@@ -47,7 +47,6 @@ COLUMNS = {
     'contraction_u_m': ('contraction_u', 1.0), 'contraction_u_mm': ('contraction_u', 1e-3),
     'load_u_n': ('load_u', 1.0), 'drift_m': ('drift', 1.0), 'pressure_u_pa': ('pressure_u', 1.0),
 }
-MAP_LOADS = 16              # loads at which a force map is read
 
 
 @short_repr
@@ -162,10 +161,10 @@ def loads_of_table(table: MeasuredTable, length_m: float) -> list[FixedLoad]:
     return loads
 
 
-def points_of_map(
-        table: MeasuredTable, length_m: float, loads_n: FloatArray | None = None) -> Points:
+def points_of_map(table: MeasuredTable, length_m: float, loads_n: FloatArray | None = None,
+                  all_forces: bool = True) -> Points:
     """
-    Return the Points of a force map: the isobars read at equal loads.
+    Return the Points of a force map: the isobars read at the same loads.
 
     Parameters
     ----------
@@ -174,58 +173,29 @@ def points_of_map(
     length_m : float
         Length at rest.
     loads_n : array_like, optional
-        Ascending from 0; by default 16 loads up to the largest force.
+        Ascending from 0; by default those that keep the isobars, see ``loads_of``.
+    all_forces : bool
+        Whether these keep the measured forces between the ends of the isobars.
 
     Raises
     ------
     InputError
-        Fewer than 3 pressures, or no force.
+        Fewer than 3 pressures, no force, or none at any contraction.
 
     """
     measured = map_of(table, length_m)
-    pressure, strain, force = measured.pressure_gauge_pa, measured.strain, measured.force_n
     pulling = np.count_nonzero(~measured.censored)
-    levels = np.unique(pressure)
+    levels = np.unique(measured.pressure_gauge_pa)
     if levels.size < 3 or not pulling:
         raise InputError(f'has {levels.size} pressures and {pulling} points with a force; '
                          '3 pressures or more are needed', table.path)
+    isobars = isobars_of(measured)
+    if not any(one.load_n.size for one in isobars):
+        raise InputError('the muscle does not contract at any pressure', table.path)
     if loads_n is None:
-        loads_n = np.linspace(0.0, force.max(), MAP_LOADS)
-    read = [_isobar(strain[rows], force[rows], measured.censored[rows], loads_n)
-            for rows in (pressure == level for level in levels)]
-    eps, doubt = (np.array(part) for part in zip(*read))
+        loads_n = loads_of(isobars, all_forces)
+    eps, doubt = (np.array(part) for part in zip(*(
+        one.contraction(loads_n) for one in isobars)))
     nothing = np.zeros_like(eps)
     return Points(levels, np.asarray(loads_n, dtype=float), np.zeros(len(loads_n)), eps,
                   np.full_like(eps, np.nan), nothing, nothing, doubt)
-
-
-def _isobar(strain: FloatArray, force: FloatArray, slack: BoolArray,
-            loads: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return (contraction, uncertainty) under each load, from one measured isobar."""
-    order = np.argsort(strain)
-    strain, force = strain[order], np.minimum.accumulate(force[order])
-    # Shorter than at the first slack point the muscle is slack too, whatever the load cell reads.
-    count = np.count_nonzero(~np.logical_or.accumulate(slack[order]))
-    if count == 0:
-        return np.zeros(loads.size), np.zeros(loads.size)
-    last = strain[count - 1]
-    slope = ((force[count - 2] - force[count - 1]) / (last - strain[count - 2])
-             if count > 1 else 0.0)
-    # The force vanishes between the last point that pulled and the first that did not.
-    end = last + force[count - 1] / slope if slope > 0.0 else np.inf
-    limit = strain[count] if count < strain.size else end
-    if not np.isfinite(limit):
-        limit = last
-    zero = min(end, limit) if count > 1 else 0.5 * (last + limit)
-    width = (limit - last) if count < strain.size else (zero - last)
-    x = np.append(strain[:count], zero)[::-1]
-    f = np.append(force[:count], 0.0)[::-1]
-    f, first = np.unique(f, return_index=True)
-    x = np.maximum(x[first], 0.0)
-    eps = np.interp(loads, f, x) if f.size < 3 else PchipInterpolator(f, x)(
-        np.clip(loads, f[0], f[-1]))
-    # A load above the force at rest is not lifted.
-    eps = np.where(loads > f[-1] + 1e-9, 0.0, np.maximum(eps, 0.0))
-    share = np.clip(1.0 - loads / force[count - 1], 0.0, 1.0)
-    doubt = np.where(loads > f[-1] + 1e-9, strain[0], share * max(width, 0.0))
-    return eps, np.maximum(doubt, 0.0) / np.sqrt(12.0)

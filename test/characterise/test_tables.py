@@ -18,7 +18,8 @@ from importlib import resources
 
 import numpy as np
 from pam_sim.characterise import characterise_table, Dimensions
-from pam_sim.characterise.tables import points_of_map, read_measured_table
+from pam_sim.characterise.force_map import table_error
+from pam_sim.characterise.tables import map_of, points_of_map, read_measured_table
 from pam_sim.errors import InputError
 from pam_sim.muscle.registry import make_law
 import pytest
@@ -73,9 +74,43 @@ def test_a_measured_force_map_is_followed_through_its_points(name, length_m, bor
     pulled = force > 0.0
     law = make_law('lookup', found.table())
     error = law.force_n(pressure, np.maximum(strain, 0.0), outside='allow') - force
-    # Through 16 loads, not through the points themselves.
     assert np.sqrt(np.mean(error[pulled] ** 2)) < 0.02 * force.max()
     assert 'Martens' in found.table().source
+
+
+@pytest.mark.parametrize('name, length_m, bore_m', [
+    ('dmsp_10_250', 0.25, 0.01), ('dmsp_20_300', 0.3, 0.02)])
+def test_a_table_holds_the_measured_forces_and_says_how_well(name, length_m, bore_m):
+    path = resources.files('pam_sim.muscle').joinpath(f'{name}_force_map.csv')
+    measured = map_of(read_measured_table(path), length_m)
+    found = characterise_table(read_measured_table(path), Dimensions(length_m, bore_m))
+    law, largest_n = make_law('lookup', found.table()), measured.force_n.max()
+    error = law.force_n(measured.pressure_gauge_pa, measured.strain, outside='allow') - (
+        measured.force_n)
+    assert np.abs(error).max() < 0.005 * largest_n
+    # The longest length is where the force is largest and rises most steeply.
+    assert np.abs(error[measured.strain < 0.02]).max() < 0.005 * largest_n
+    said = next(one for one in found.remarks if 'at the measured points' in one.lower())
+    assert f'at most {float(f"{np.abs(error).max():.2g}"):g} N' in said
+    # Loads of the user's own lose the ends, and that is said, in the uncertainty too.
+    rough = characterise_table(read_measured_table(path), Dimensions(length_m, bore_m),
+                               load_step_n=largest_n / 6.0)
+    assert rough.surfaces.load_n.size == 7
+    off = table_error(rough.surfaces.law(), measured)
+    assert off.worst_n > 0.03 * largest_n and off.text(length_m) in rough.remarks
+    assert rough.surfaces.parts['load'].max() > 5.0 * found.surfaces.parts['load'].max()
+
+
+def test_lengths_longer_than_at_rest_tell_the_force_at_rest(tmp_path):
+    law = make_law('sarosi', muscle='dmsp_20_300_map')
+    rows = [(p, -s, max(0.0, float(law.formula_n(1e3 * p, -s))))
+            for p in range(0, 601, 100) for s in np.arange(0.02, -0.3, -0.04)]
+    table = write(tmp_path / 'map.csv', 'pressure_kPa,strain,force_N', rows)
+    found = make_law('lookup', characterise_table(table, Dimensions(0.2, 0.02)).table())
+    pressure = np.arange(2, 7) * 1e5
+    truth = law.formula_n(pressure, np.zeros(5))
+    # Half way between two lengths where the force is steep: no extrapolation to 1.5 times it.
+    assert found.force_n(pressure, 0.0) == pytest.approx(truth, rel=0.2)
 
 
 def test_zeros_of_force_are_censored_and_leave_a_doubt(tmp_path):

@@ -164,6 +164,29 @@ def test_forces_measured_by_others_become_a_muscle(folder, capsys):
     assert sorted(path.name for path in folder.iterdir()) == before
 
 
+def test_the_strength_is_known_no_better_than_the_table_holds_its_points(folder, capsys):
+    lines = ['pressure_kPa,contraction_percent,force_N']
+    for gauge_kpa in range(0, 601, 100):
+        for percent in (0, 5, 10, 15, 20, 25):
+            force_n = max(0.0, gauge_kpa * (1.0 + 2.0 * 2.0 ** -percent) * (1.0 - percent / 25))
+            lines.append(f'{gauge_kpa},{percent},{force_n:.3f}')
+    (folder / 'others.csv').write_text('\n'.join(lines) + '\n')
+    sizes = ('--length-mm', '200', '--bore-mm', '20')
+    assert new('--force-map', 'others.csv', *sizes).tolerance['force_map_gain'] == 0.02
+    capsys.readouterr()
+    assert main(['characterise', 'others.csv', '--length-m', '0.2', '--bore-m', '0.02',
+                 '--load-step-n', '550', '--out', 'rough', '--json']) == 0
+    said = json.loads(capsys.readouterr().out)['remarks'][1]
+    percent = float(said.split('(')[1].split(' %')[0])
+    assert percent > 2.0
+    rig = new('--force-map', 'rough/lookup.csv', *sizes, '--overwrite')
+    assert rig.tolerance['force_map_gain'] == pytest.approx(0.01 * percent)
+    assert 'what the table is off' in open('made.yaml', encoding='utf-8').read()
+    stated = new('--force-map', 'rough/lookup.csv', '--about', 'force_map_gain=1±1%',
+                 '--overwrite')
+    assert stated.tolerance['force_map_gain'] == 0.01
+
+
 def test_a_force_map_from_60_kpa_on_gives_no_warning(folder):
     from pam_sim.muscle.laws.lookup import SHIPPED
     lines = (SHIPPED / 'dmsp_5_300.csv').read_text(encoding='utf-8').splitlines(keepends=True)
