@@ -56,7 +56,8 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument('--held-mm', type=number(0.0, 5e3, 'mm'), nargs='+', default=None,
                         metavar='MM',
                         help='the bags are of a muscle held at one length each: its '
-                             'contractions, one per bag in their order')
+                             'contractions, one per bag in their order (a shell sorts `at_10` '
+                             'before `at_5`)')
     parser.add_argument('--load-step-n', type=number(0.01, 1e3, 'N'), default=None, metavar='N',
                         help='spacing of loads in the table (default: as measured)')
     parser.add_argument('--length-m', type=number(0.01, 20.0, 'm'), default=None, metavar='M',

@@ -26,6 +26,7 @@ from pam_sim.annotations import FloatArray
 from pam_sim.characterise.characterise import (
     Characterisation, characterise_table, one_muscle, rig_of)
 from pam_sim.characterise.dimensions import Dimensions
+from pam_sim.characterise.held_lengths import check_recorded, lengths_told, rising_force
 from pam_sim.characterise.holds import samples_of, still_spans
 from pam_sim.characterise.tables import MeasuredTable
 from pam_sim.errors import InputError
@@ -67,7 +68,10 @@ def held_points(run: Run) -> tuple[FloatArray, FloatArray]:
 
 def held_table(runs: Sequence[Run], held_m: Sequence[float]) -> tuple[MeasuredTable, list[str]]:
     """
-    Return (force map of recordings at held lengths, what was taken away as zeros in sentences).
+    Return (force map of recordings at held lengths, what a reader should know in sentences).
+
+    That is which recording has which length, a force that does not fall with contraction, and what
+    was taken away as zeros of the sensors.
 
     Parameters
     ----------
@@ -95,6 +99,8 @@ def held_table(runs: Sequence[Run], held_m: Sequence[float]) -> tuple[MeasuredTa
         columns['pressure'].append(gauge - zero_pa)
         columns['contraction'].append(np.full(gauge.size, contraction_m))
         columns['force'].append(force - zero_n)
+    remarks = [lengths_told(runs, held_m), *rising_force(runs, held_m, list(zip(
+        columns['pressure'], columns['force']))), *remarks]
     whole = {name: np.concatenate(parts) for name, parts in columns.items()}
     return MeasuredTable(
         'force map', whole, [], f'{len(runs)} recordings at held lengths, '
@@ -119,14 +125,18 @@ def characterise_held(runs: Sequence[Run], held_m: Sequence[float],
     Raises
     ------
     InputError
-        As of ``held_table``, too few lengths, runs of different muscles.
+        As of ``held_table``, too few lengths, runs of different muscles, a recorded contraction
+        that is another one.
 
     """
-    size = one_muscle(runs, [rig_of(run) for run in runs], dimensions)
+    rigs = [rig_of(run) for run in runs]
+    size = one_muscle(runs, rigs, dimensions)
     table, remarks = held_table(runs, held_m)
+    for run, rig, contraction_m in zip(runs, rigs, held_m):
+        remarks += check_recorded(run, rig, contraction_m, size.length_m)
     result = characterise_table(table, size, load_step_n)
     result.paths = [run.path for run in runs]
-    result.remarks += remarks
+    result.remarks = remarks + result.remarks
     return result
 
 

@@ -26,6 +26,7 @@ from pam_sim.errors import InputError
 from pam_sim.muscle.force_maps import read_force_map
 from pam_sim.muscle.registry import make_law
 from pam_sim.run import Run, Series
+from pam_sim.tolerance import UNKNOWN
 from pam_sim.units import P_ATM_PA
 import pytest
 
@@ -127,6 +128,58 @@ def test_recordings_at_held_lengths_make_a_table():
     told = [one for one in found.remarks if one.startswith('held ')]
     assert sum('does not push' in one for one in told) == 3
     assert sum('not evacuated' in one for one in told) == 4
+
+
+def with_contraction(run, contraction_m):
+    """Return a run that recorded its contraction, too."""
+    stamp = run['pressure'].stamp_ns
+    noise = 2e-5 * np.random.default_rng(9).standard_normal(stamp.size)
+    return Run({**run.topics, 'contraction': Series(
+        stamp, {'contraction_m': contraction_m + noise})}, run.metadata, '/muscle', run.path)
+
+
+def test_the_length_of_each_recording_is_told():
+    runs = [with_contraction(pulses(strain, seed=k), LENGTH_M * strain)
+            for k, strain in enumerate(HELD)]
+    found = characterise_held(runs, [LENGTH_M * strain for strain in HELD],
+                              Dimensions(LENGTH_M, BORE_M))
+    assert found.remarks[0] == ('Contraction of each recording as stated: held 0 0 mm, held 0.04 '
+                                '12 mm, held 0.09 27 mm, held 0.15 45 mm.')
+    assert not any('pulls' in one for one in found.remarks[1:])
+
+
+def test_a_length_that_the_recording_contradicts_is_refused():
+    size, held = Dimensions(LENGTH_M, BORE_M), [LENGTH_M * strain for strain in HELD]
+    runs = [pulses(strain, seed=k) for k, strain in enumerate(HELD)]
+    recorded = [with_contraction(run, one) for run, one in zip(runs, held)]
+    swapped = [held[0], held[2], held[1], held[3]]
+    with pytest.raises(InputError, match='held 0.04: --held-mm says that it was held at 27 mm, '
+                       'and it recorded a contraction of 12 mm'):
+        characterise_held(recorded, swapped, size)
+    # A zero that nobody knows makes a contraction that nobody knows.
+    rig = load_rig('dmsp_5_300_isometric').with_(
+        {'contraction_m': held[1]}, tolerance={'contraction_zero_m': UNKNOWN})
+    recorded[1] = Run(recorded[1].topics, {'rig': rig.to_yaml()}, '/muscle', 'of a rig')
+    recorded[2] = runs[2]
+    with pytest.raises(InputError, match='of a rig: .* 27 mm, and its rig states .* of 12 mm'):
+        characterise_held(recorded, swapped, size)
+
+
+def test_a_force_that_rises_with_contraction_is_told():
+    runs = [pulses(strain, seed=k) for k, strain in enumerate(HELD)]
+    found = characterise_held(runs, [LENGTH_M * HELD[k] for k in (0, 2, 3, 1)],
+                              Dimensions(LENGTH_M, BORE_M))
+    assert found.remarks[1].startswith('held 0.04, stated as contracted by 27 mm, pulls ')
+    assert 'order of the recordings' in found.remarks[1]
+
+
+def test_a_contraction_that_moves_is_told():
+    runs = [pulses(strain, seed=k) for k, strain in enumerate(HELD)]
+    held = [LENGTH_M * strain for strain in HELD]
+    moved = np.linspace(0.0, 0.02, len(runs[1]['pressure'].stamp_ns))
+    runs[1] = with_contraction(runs[1], moved)
+    found = characterise_held(runs, held, Dimensions(LENGTH_M, BORE_M))
+    assert any('held 0.04: the recorded contraction moved by 19.' in one for one in found.remarks)
 
 
 def test_what_is_no_recording_at_a_held_length_is_refused():
