@@ -116,6 +116,7 @@ def _characterised(args: argparse.Namespace, sources: list[str]) -> 'Characteris
     """Return the Characterisation of bags or of one table."""
     from pam_actuation.bags.ending import early_sentences
     from pam_actuation.bags.load import load_run
+    from pam_actuation.tables.separated import rows_of_text
     from pam_sim.characterise import characterise_held, characterise_runs, characterise_table
     from pam_sim.characterise.tables import read_measured_table
     from pam_sim.errors import InputError
@@ -147,7 +148,8 @@ def _characterised(args: argparse.Namespace, sources: list[str]) -> 'Characteris
         raise InputError('a table comes alone; give either one CSV file or bags', tables[0])
     dimensions = _dimensions(args, [])
     assert dimensions is not None       # without runs they are given, or missing
-    return characterise_table(read_measured_table(tables[0]), dimensions, args.load_step_n)
+    measured = read_measured_table(tables[0], rows_of_text)
+    return characterise_table(measured, dimensions, args.load_step_n)
 
 
 def _dimensions(args: argparse.Namespace, runs: 'list[RecordedRun]') -> 'Dimensions | None':

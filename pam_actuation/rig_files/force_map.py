@@ -19,6 +19,7 @@ from contextlib import contextmanager
 import os
 import re
 
+from pam_actuation.tables.separated import rows_of_text
 from pam_sim.errors import InputError
 from pam_sim.files import check_file
 from pam_sim.muscle.lookup_table import COLUMNS, read_commented_csv, read_table
@@ -76,7 +77,7 @@ def force_map_of(path: str, length_m: float | None, bore_m: float | None, out: s
         The table is of neither form, or the length is missing.
 
     """
-    rows, _ = read_commented_csv(path)
+    rows, _ = rows_of_text(path)
     if rows and tuple(rows[0]) == COLUMNS:
         read_table(path)
         yield path, []
@@ -85,7 +86,7 @@ def force_map_of(path: str, length_m: float | None, bore_m: float | None, out: s
     from pam_sim.characterise import characterise_table
     from pam_sim.characterise.dimensions import Dimensions
     from pam_sim.characterise.tables import read_measured_table
-    measured = read_measured_table(path)
+    measured = read_measured_table(path, rows_of_text)
     if length_m is None or bore_m is None:
         raise InputError('a table measured by others needs --length-mm and --bore-mm, the size of '
                          'the muscle at rest', path)

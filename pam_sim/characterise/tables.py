@@ -21,6 +21,7 @@ table: gauge pressure, load and contraction. Lines that begin with ``#`` are
 kept as the source.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,6 +48,7 @@ COLUMNS = {
     'contraction_u_m': ('contraction_u', 1.0), 'contraction_u_mm': ('contraction_u', 1e-3),
     'load_u_n': ('load_u', 1.0), 'drift_m': ('drift', 1.0), 'pressure_u_pa': ('pressure_u', 1.0),
 }
+RowsOf = Callable[[StrPath], tuple[list[list[str]], str]]
 
 
 @short_repr
@@ -65,9 +67,17 @@ class MeasuredTable:
     path: str
 
 
-def read_measured_table(path: StrPath) -> MeasuredTable:
+def read_measured_table(path: StrPath, rows_of: RowsOf = read_commented_csv) -> MeasuredTable:
     """
     Return the MeasuredTable of a CSV file.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    rows_of : callable
+        Returns (rows of cells, text of the ``#`` lines) of a file; by default of one with commas
+        between the columns and decimal points.
 
     Raises
     ------
@@ -76,11 +86,14 @@ def read_measured_table(path: StrPath) -> MeasuredTable:
         negative pressure.
 
     """
-    rows, source = read_commented_csv(path)
+    rows, source = rows_of(path)
     head = [name.strip().lower() for name in rows[0]] if rows else []
     unknown = [name for name in head if name not in COLUMNS and name != 'branch']
     if not rows:
         raise InputError('holds no table', str(path))
+    if len(head) == 1 and (sign := next((one for one in ';\t|' if one in head[0]), None)):
+        raise InputError(f'separates columns by {sign!r}; write commas, and decimal points in the '
+                         'numbers', str(path))
     if unknown:
         raise InputError(
             f'has the column `{unknown[0]}`; known are {", ".join(COLUMNS)}, branch', str(path))

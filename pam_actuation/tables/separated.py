@@ -1,0 +1,58 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Rows of a table of points, whatever separator and decimal sign its program writes."""
+
+import csv
+from pathlib import Path
+
+from pam_actuation.tables.formats.layout_of_text import encoding_of, layout_of, split
+from pam_sim.errors import InputError
+from pam_sim.files import refuse_pipe, StrPath
+
+
+def rows_of_text(path: StrPath) -> tuple[list[list[str]], str]:
+    """
+    Return (rows, text of the ``#`` lines), as ``read_commented_csv`` does, of any separator.
+
+    Encoding, separator and decimal sign are found as ``pam import`` finds them. Numbers have
+    decimal points in the result.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read as text.
+
+    """
+    refuse_pipe(path)
+    try:
+        raw = Path(path).read_bytes()
+    except OSError as error:
+        raise InputError(f'cannot be read as a table: {error}', str(path)) from None
+    text = raw.decode(encoding_of(raw, str(path)), errors='replace').removeprefix('\ufeff')
+    lines = [line for line in text.splitlines() if line.strip()]
+    source = '\n'.join(line[1:].strip() for line in lines if line.startswith('#'))
+    lines = [line for line in lines if not line.startswith('#')]
+    try:
+        layout = layout_of('\n'.join([*lines, '']).encode(), str(path))
+    except InputError:
+        # With what is wrong in the cells, whoever reads them can say more.
+        return list(csv.reader(lines)), source
+    if (layout.separator, layout.decimal) in ((',', '.'), (',', ',')) or layout.first_line < 2:
+        rows = list(csv.reader(lines))
+    else:
+        rows = [split(line, layout.separator) for line in lines[layout.first_line - 2:]]
+    if layout.decimal == ',':
+        rows[1:] = [[cell.replace(',', '.') for cell in row] for row in rows[1:]]
+    return rows, source
