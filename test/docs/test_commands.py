@@ -27,10 +27,13 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = sorted({*ROOT.glob('*.md'), *ROOT.glob('msg_docs/*.md'), *ROOT.glob('docs/**/*.md')})
 # Pages whose Python runs, each from top to bottom; a pinned bag stands for the reader's.
-PYTHON = ('README.md', 'docs/guides/simulate_in_python.md', 'docs/guides/tables.md',
-          'docs/reference/bags.md', 'docs/reference/joint.md', 'docs/reference/muscle_laws.md')
+PYTHON = ('README.md', 'docs/guides/characterise.md', 'docs/guides/simulate_in_python.md',
+          'docs/guides/tables.md', 'docs/reference/bags.md', 'docs/reference/joint.md',
+          'docs/reference/muscle_laws.md')
 BAG = ROOT / 'test' / 'replay' / 'pinned' / 'sofc_ppr.mcap'
-PLACES = {"'runs/live'": repr(str(BAG)), "'runs/run7'": repr(str(BAG)), "'bag'": repr(str(BAG)),
+TABLE = ROOT / 'pam_sim' / 'muscle' / 'lookup_tables' / 'dmsp_5_300.csv'
+PLACES = {"'surfaces/lookup.csv'": repr(str(TABLE)),
+          "'runs/live'": repr(str(BAG)), "'runs/run7'": repr(str(BAG)), "'bag'": repr(str(BAG)),
           '/robot/encoder': '/muscle/contraction', '/robot/p': '/muscle/pressure'}
 # What a shell takes before the command sees it.
 SHELL = re.compile(r'^(\|\|?|&&?|[0-9]?>.*|<)$')
