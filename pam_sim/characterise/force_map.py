@@ -67,8 +67,8 @@ class TableError:
 
 
 def _short(value: float) -> str:
-    """Return a number with two digits."""
-    return f'{float(f"{value:.2g}"):g}'
+    """Return a number with two digits, 0 for what is rounding alone."""
+    return f'{float(f"{value:.2g}"):g}' if value >= 1e-3 else '0'
 
 
 def table_error(law: Lookup, points: ForceMap) -> TableError:

@@ -193,7 +193,8 @@ def _force(
         mass: FloatArray | None) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return (contractions, F, uncertainty of F); NaN where only larger loads would reach."""
     law = _law(pressure, loads, strain, mass)
-    axis = np.append(np.arange(0.0, strain.max(), STRAIN_STEP), strain.max())
+    # Without a point that rounding puts beside the largest contraction.
+    axis = np.append(np.arange(0.0, strain.max() - 1e-6, STRAIN_STEP), strain.max())
     force = law.force_n(pressure[:, None], axis[None, :], outside='allow')
     # Smooth rows of the largest load say nothing on contractions that only more load reaches.
     beyond = axis[None, :] < strain[:, -1:] - 1e-9

@@ -101,6 +101,15 @@ def test_a_table_holds_the_measured_forces_and_says_how_well(name, length_m, bor
     assert rough.surfaces.parts['load'].max() > 5.0 * found.surfaces.parts['load'].max()
 
 
+@pytest.mark.filterwarnings('error')
+def test_a_contraction_that_is_a_step_of_the_table_makes_no_second_point(tmp_path):
+    rows = [(p, s, p * (1.0 - s / 0.14)) for p in (100, 200, 300) for s in (0.0, 0.07)]
+    found = characterise_table(write(tmp_path / 'map.csv', 'pressure_kPa,strain,force_N', rows),
+                               Dimensions(0.2, 0.02)).surfaces
+    assert found.strain.max() == 0.14 and np.all(np.diff(found.force_strain) > 1e-3)
+    assert np.all(np.isfinite(found.force_u_n))
+
+
 def test_lengths_longer_than_at_rest_tell_the_force_at_rest(tmp_path):
     law = make_law('sarosi', muscle='dmsp_20_300_map')
     rows = [(p, -s, max(0.0, float(law.formula_n(1e3 * p, -s))))
