@@ -69,10 +69,12 @@ def check_recorded(run: Run, rig: Rig | None, held_m: float, length_m: float) ->
             told.append(f'{run.path}: the recorded contraction moved by {1e3 * (high - low):.1f} '
                         'mm, though the muscle is said to be held.')
         elif abs(middle - held_m) > same_m:
-            raise InputError(_contradiction(middle, held_m, 'it recorded'), run.path)
+            other = 'leave out a sensor that was not mounted'
+            raise InputError(_contradiction(middle, held_m, 'it recorded', other), run.path)
     stated_m = _stated_m(rig)
     if stated_m is not None and abs(stated_m - held_m) > same_m:
-        raise InputError(_contradiction(stated_m, held_m, 'its rig states'), run.path)
+        other = 'correct the rig'
+        raise InputError(_contradiction(stated_m, held_m, 'its rig states', other), run.path)
     return told
 
 
@@ -110,9 +112,9 @@ def rising_force(runs: Sequence[Run], held_m: Sequence[float],
     return told
 
 
-def _contradiction(found_m: float, held_m: float, who: str) -> str:
+def _contradiction(found_m: float, held_m: float, who: str, other: str) -> str:
     return (f'--held-mm says that it was held at {1e3 * held_m:g} mm, and {who} a contraction of '
-            f'{1e3 * found_m:.4g} mm; give the lengths in the order of the recordings')
+            f'{1e3 * found_m:.4g} mm; give the lengths in the order of the recordings, or {other}')
 
 
 def _recorded_m(run: Run, rig: Rig | None) -> tuple[float, float, float] | None:
