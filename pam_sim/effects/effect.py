@@ -20,7 +20,7 @@ from typing import Any, NamedTuple, TYPE_CHECKING
 
 import numpy as np
 from pam_sim.annotations import FloatArray
-from pam_sim.effects.fitting import Fitting, FreeParameter
+from pam_sim.effects.fitting import Fitting, FreeParameter, SENSOR_CHANGES
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.parameters import check_parameters, Parameter
 from pam_sim.records import put, put_some, record
@@ -180,10 +180,22 @@ class Effect:
             raise InputError(f'effect `{self.name}` has no amplitude; name at least one parameter')
         known = [parameter.name for parameter in self.parameters]
         fitted = [free.name for free in self.fitting.free]
-        for name in (*self.amplitude, *fitted, *self.fitting.edges, self.fitting.delay):
+        for name in (*self.amplitude, *fitted, *self.fitting.edges, self.fitting.delay,
+                     self.fitting.sensor_parameter):
             if name and name not in known:
                 raise InputError(f'effect `{self.name}` has no parameter `{name}`'
                                  f'{did_you_mean(name, known)}; allowed: {", ".join(known)}')
+        if (self.fitting.sensor_change in SENSOR_CHANGES and len(self.amplitude) > 1
+                and not self.fitting.sensor_parameter):
+            raise InputError(
+                f'effect `{self.name}` has several amplitudes; name the one that is the '
+                f'{self.fitting.sensor_change} as `sensor_parameter` of `fitting`; allowed: '
+                f'{", ".join(known)}')
+
+    @property
+    def sensor_parameter(self) -> str:
+        """Return the parameter that is the bias, the gain error or the lag of a sensor."""
+        return self.fitting.sensor_parameter or self.amplitude[0]
 
     def free_parameters(self, valve: str) -> tuple[FreeParameter, ...]:
         """Return what is fitted with a type of valve; by default every amplitude."""

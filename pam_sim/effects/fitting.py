@@ -22,6 +22,9 @@ from pam_sim.valve import VALVES
 
 # What comes this late in quick motion is not a multiple of what comes a little late.
 DELAY_STARTS_S = (0.01, 0.002)
+# What a sensor measures, and what an effect can do to it.
+SENSOR_SIGNALS = ('pressure', 'contraction', 'force')
+SENSOR_CHANGES = ('bias', 'gain', 'lag')
 _MAX_LOGARITHM = 50.0
 
 
@@ -99,6 +102,8 @@ class Fitting:
         Parameters by which rising and falling edges are late, each by its own.
     sensor_signal, sensor_change : str
         Of an effect of a sensor: the reading it changes, and how: ``bias``, ``gain`` or ``lag``.
+    sensor_parameter : str
+        Parameter that is the bias, the gain error or the lag; the amplitude by default.
     is_limit : callable, optional
         ``is_limit(values) -> bool``: whether values make it a limit although no shape is at
         the end of its range.
@@ -116,4 +121,5 @@ class Fitting:
     edges: tuple[str, ...] = ()
     sensor_signal: str = ''
     sensor_change: str = ''
+    sensor_parameter: str = ''
     is_limit: Callable[[Mapping[str, float]], bool] | None = None

@@ -19,11 +19,10 @@ from pathlib import Path
 import re
 
 from pam_sim.effects.effect import Effect
-from pam_sim.effects.fitting import Fitting, FreeParameter
+from pam_sim.effects.fitting import Fitting, FreeParameter, SENSOR_CHANGES, SENSOR_SIGNALS
 from pam_sim.effects.registry import effects
 from pam_sim.errors import InputError
 import pam_sim.gap
-from pam_sim.gap.subsystems.effects import SENSOR_CHANGES
 from pam_sim.parameters import Parameter
 import pytest
 
@@ -63,7 +62,7 @@ def test_a_sensor_effect_says_what_it_changes_and_others_do_not():
     for effect in effects().values():
         fitting = effect.fitting
         if effect.subsystem == 'sensor':
-            assert fitting.sensor_signal in ('pressure', 'contraction', 'force')
+            assert fitting.sensor_signal in SENSOR_SIGNALS
             assert fitting.sensor_change in SENSOR_CHANGES
         else:
             assert fitting.sensor_signal == fitting.sensor_change == ''
@@ -83,7 +82,7 @@ def test_fitted_ranges_lie_within_those_of_the_model_file():
 
 @pytest.mark.parametrize('fitting', (
     Fitting(free=(FreeParameter('width_m', 1.0, 0.0, 2.0),)), Fitting(delay='delay_s'),
-    Fitting(edges=('open_time_s',))))
+    Fitting(edges=('open_time_s',)), Fitting(sensor_parameter='bias_n')))
 def test_what_is_no_parameter_cannot_be_fitted(fitting):
     with pytest.raises(InputError, match='`made_up` has no parameter .*allowed: force_n'):
         Effect('made_up', 'friction', 'muscle', 'A test.', 'here',

@@ -14,16 +14,23 @@
 
 """The rig cut at measured signals: what is missing in one part leaves no trace in the other."""
 
+from types import SimpleNamespace
+
 from gap_runs import nominal, recorded, voltages
 import numpy as np
+from pam_sim.effects.effect import Effect
+from pam_sim.effects.fitting import Fitting
 from pam_sim.effects.unnamed import terms
 from pam_sim.effects.unnamed.reading import with_terms
 from pam_sim.gap.data.noise import noise_of
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.signals import FIELD
 from pam_sim.gap.data.split import FIT, SELECT
-from pam_sim.gap.subsystems.effects import acts_on
+from pam_sim.gap.subsystems import effects as of_sensors
+from pam_sim.gap.subsystems.effects import acts_on, sensor_changes, true_value
 from pam_sim.gap.subsystems.problems import subsystem_problems
+from pam_sim.parameters import Parameter
+from pam_sim.units import P_ATM_PA
 import pytest
 
 
@@ -86,6 +93,46 @@ def test_a_known_sensor_effect_is_taken_out_of_the_input(sensor, parameters):
     assert problem.chi2(left, SELECT) > 2.0
     problem, left = errors(rig, given=rig)['muscle']
     assert problem.chi2(left, SELECT) < 1.5
+
+
+def of_pressure(name, change, order, parameter=''):
+    """Return an effect of the pressure sensor whose first parameter is a time."""
+    return Effect(
+        name, 'sensor', 'sensor', 'A test.', 'here',
+        (Parameter('time_s', 's', 9.0, 0.0, 99.0), Parameter('amount', '-', 0.0, -1e5, 1e5)),
+        ('amount',) if not parameter else ('time_s', 'amount'), order=order,
+        fitting=Fitting(sensor_signal='pressure', sensor_change=change,
+                        sensor_parameter=parameter))
+
+
+OF_PRESSURE = {e.name: e for e in (
+    of_pressure('drift', 'bias', 60), of_pressure('offset', 'bias', 40, 'amount'),
+    of_pressure('scale', 'gain', 50), of_pressure('span', 'gain', 51),
+    of_pressure('filter', 'lag', 30), of_pressure('line', 'lag', 31),
+    of_pressure('kink', 'other', 90))}
+
+
+@pytest.mark.parametrize('sizes, zero, changes', [
+    ({'drift': 500.0, 'pressure_bias': 3000.0}, 0.0, (3500.0, None, None)),
+    ({'drift': 500.0}, 20.0, (520.0, None, None)),
+    ({'scale': 0.5, 'span': 0.1}, 0.0, (None, 1.5 * 1.1 - 1.0, None)),
+    ({'scale': 0.5, 'offset': 100.0, 'drift': 1.0}, 5.0, (156.0, 0.5, None)),
+    ({'filter': 0.02, 'line': 0.01}, 0.0, (None, None, 0.03)),
+    ({'kink': 7.0}, 0.0, (None, None, None))])
+def test_what_several_effects_do_to_a_reading_is_taken_out_of_it(
+        monkeypatch, sizes, zero, changes):
+    find = of_sensors.get_effect
+    monkeypatch.setattr(
+        of_sensors, 'get_effect', lambda name: OF_PRESSURE.get(name) or find(name))
+    settings = [SimpleNamespace(name=name, parameters={'bias_pa': size} if (
+        name == 'pressure_bias') else {'time_s': 9.0, 'amount': size})
+        for name, size in sizes.items()]
+    for listed in (settings, settings[::-1]):
+        rig = SimpleNamespace(effects=listed, parameters={'pressure_zero_pa': zero})
+        assert sensor_changes('pressure', rig) == pytest.approx(changes)
+        bias, gain_error, lag_s = (change or 0.0 for change in changes)
+        read = P_ATM_PA + (1.0 + gain_error) * (1e5 - lag_s * 2e4) + bias
+        assert true_value('pressure', rig, read, 2e4) == pytest.approx(P_ATM_PA + 1e5)
 
 
 def test_a_force_recorded_in_one_of_two_runs_is_used():

@@ -115,10 +115,11 @@ def within_reading(pool: Iterable[Candidate], recordings: Sequence[Recording], c
                      default=math.inf)
     found = []
     for c in pool:
-        fitting = get_effect(c.effect).fitting
-        if (fitting.sensor_signal, fitting.sensor_change) == ('pressure', 'bias'):
-            c = replace(c, free=tuple(replace(f, upper=max(min(f.upper, highest_pa), f.lower))
-                                      for f in c.free))
+        effect = get_effect(c.effect)
+        if (effect.fitting.sensor_signal, effect.fitting.sensor_change) == ('pressure', 'bias'):
+            c = replace(c, free=tuple(
+                replace(f, upper=max(min(f.upper, highest_pa), f.lower))
+                if f.name == effect.sensor_parameter else f for f in c.free))
         found.append(c)
     return found
 

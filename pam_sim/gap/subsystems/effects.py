@@ -17,13 +17,13 @@
 from typing import Protocol, TypeVar
 
 from pam_sim.annotations import FloatArray
+from pam_sim.effects.fitting import SENSOR_CHANGES
 from pam_sim.effects.registry import get_effect
 from pam_sim.load import LOADS
 from pam_sim.rig import Rig
 from pam_sim.units import P_ATM_PA
 from pam_sim.valve import hsv, ppr
 
-SENSOR_CHANGES = ('bias', 'gain', 'lag')
 _ZERO_OF = {'pressure': 'pressure_zero_pa', 'contraction': 'contraction_zero_m',
             'force': 'force_zero_n'}
 
@@ -58,13 +58,26 @@ def sensor_changes(signal: str, rig: Rig) -> SensorChanges:
     """
     Return (bias, gain error, lag in s) of the sensor of a signal, None where there is none.
 
-    The bias holds the zero of the sensor, a number of the rig, too.
+    Several of one kind act as one, in the order of a simulation. Biases add up, and a later gain
+    scales them. Gains multiply. Lags add up, which is exact for motion at a constant rate. The
+    bias holds the zero of the sensor, a number of the rig, too. What is none of the three is not
+    here.
     """
-    found = {}
-    for setting in rig.effects:
-        fitting = get_effect(setting.name).fitting
-        if fitting.sensor_signal == signal and setting.parameters:
-            found[fitting.sensor_change] = next(iter(setting.parameters.values()))
+    found: dict[str, float] = {}
+    known = [(get_effect(setting.name), setting.parameters) for setting in rig.effects]
+    for effect, values in sorted(known, key=lambda one: (one[0].order, one[0].name)):
+        change = effect.fitting.sensor_change
+        if effect.fitting.sensor_signal != signal or change not in SENSOR_CHANGES or not values:
+            continue
+        value = values[effect.sensor_parameter]
+        if change == 'gain' and 'bias' in found:
+            found['bias'] *= 1.0 + value
+        if change not in found:
+            found[change] = value
+        elif change == 'gain':
+            found['gain'] += value + found['gain'] * value
+        else:
+            found[change] += value
     zero = rig.parameters[_ZERO_OF[signal]]
     if zero != 0.0:
         found['bias'] = found.get('bias', 0.0) + zero
