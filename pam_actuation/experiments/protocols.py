@@ -22,7 +22,7 @@ judged again.
 """
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import combinations
 from typing import Any
@@ -103,7 +103,11 @@ class Planned:
 
 @dataclass
 class Plan:
-    """Protocols as asked for and the best of the candidates, which comes last."""
+    """
+    Protocols as asked for and the best of the candidates, which comes last.
+
+    ``remarks`` tell which of the names asked for are not looked at, and why.
+    """
 
     rig: Rig
     signals: tuple[str, ...]
@@ -111,6 +115,7 @@ class Plan:
     materiality: float
     protocols: list[Planned]
     tried: int
+    remarks: list[str] = field(default_factory=list)
 
     @property
     def best(self) -> Planned:
@@ -122,6 +127,7 @@ class Plan:
         return {'schema': 1, 'rig': self.rig.name, 'valve': self.rig.valve,
                 'signals': list(self.signals), 'noise': self.noise,
                 'materiality': self.materiality, 'candidates': self.tried,
+                'remarks': self.remarks,
                 'protocols': [p.to_dict(self.rig) for p in self.protocols],
                 'best': self.best.name}
 
@@ -133,7 +139,7 @@ class Plan:
             f'{self.rig.name}, {self.rig.valve}; sensors: {noise}. Sizes at which an effect moves '
             f'some signal by {self.materiality:g} noise floors (rms), numbers calibrated, and at '
             'which no rival can stand in for it.',
-            *(p.text(self.rig) for p in self.protocols),
+            *self.remarks, *(p.text(self.rig) for p in self.protocols),
             f'{self.best.name} is the best of {self.tried} protocols of at most '
             f'{LONGEST_S:g} s.'])
 
@@ -166,7 +172,8 @@ def plan(rig: Rig, experiments: Sequence[Experiment] = (), with_force: bool = Tr
     Raises
     ------
     InputError
-        An experiment that this rig cannot do, or one that nothing can be read from.
+        An experiment that this rig cannot do, or one that nothing can be read from; none of the
+        names can be tried.
 
     """
     noise, noisy = sensors_for(rig)
@@ -178,7 +185,8 @@ def plan(rig: Rig, experiments: Sequence[Experiment] = (), with_force: bool = Tr
         progress(done[0] / steps)
         return found
 
-    judged = [_judged(e.to_dict(), looked(e.to_dict()), materiality) for e in experiments]
+    judged = [_judged(e.to_dict(), _some(looked(e.to_dict())), materiality)
+              for e in experiments]
     looks = {}
     for name, segments in pieces(rig.valve).items():
         try:
@@ -187,12 +195,13 @@ def plan(rig: Rig, experiments: Sequence[Experiment] = (), with_force: bool = Tr
             continue                   # a piece that this rig cannot do
     if not looks:
         raise InputError('can do none of the candidate protocols', rig.name)
+    first = _some(next(iter(looks.values())))
     chosen, tried = _best(looks, rig.valve, materiality)
     plain = _experiment(chosen, _joined(chosen, rig.valve), rig, with_force)
     judged.append(_judged(plain, looked(plain), materiality))
     progress(1.0)
-    signals = next(iter(looks.values())).signals
-    return Plan(rig, signals, {s: noise[s] for s in signals}, materiality, judged, tried)
+    return Plan(rig, first.signals, {s: noise[s] for s in first.signals}, materiality, judged,
+                tried, first.left_out)
 
 
 def _best(looks: Mapping[str, Sensitivities], valve: str,
@@ -301,6 +310,13 @@ def _judged(plain: dict[str, Any], looks: Sensitivities, materiality: float) -> 
     found = outlooks(looks, materiality)
     return Planned(plain['name'], load_experiment(dump_yaml(plain)).duration_s, found,
                    score(o.factors for o in found), plain)
+
+
+def _some(looks: Sensitivities) -> Sensitivities:
+    """Return what is given, if any effect can be tried there."""
+    if not looks.pool:
+        raise InputError(' '.join(looks.left_out).rstrip('.'), looks.rig.name)
+    return looks
 
 
 def _shown(size: dict[str, Any] | None) -> str:

@@ -20,7 +20,8 @@ from typing import Any, NamedTuple, TYPE_CHECKING
 
 import numpy as np
 from pam_sim.annotations import FloatArray
-from pam_sim.effects.fitting import Fitting, FreeParameter, SENSOR_CHANGES
+from pam_sim.effects.fitting import (
+    Fitting, FreeParameter, OTHER_CHANGE, SENSOR_CHANGES, SENSOR_SIGNALS)
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.parameters import check_parameters, Parameter
 from pam_sim.records import put, put_some, record
@@ -185,12 +186,29 @@ class Effect:
             if name and name not in known:
                 raise InputError(f'effect `{self.name}` has no parameter `{name}`'
                                  f'{did_you_mean(name, known)}; allowed: {", ".join(known)}')
-        if (self.fitting.sensor_change in SENSOR_CHANGES and len(self.amplitude) > 1
-                and not self.fitting.sensor_parameter):
+        self._check_sensor()
+
+    def _check_sensor(self) -> None:
+        """Refuse an effect that does not say which reading it changes and how."""
+        fitting = self.fitting
+        for key, given, allowed in (
+                ('sensor_signal', fitting.sensor_signal, SENSOR_SIGNALS),
+                ('sensor_change', fitting.sensor_change, (*SENSOR_CHANGES, OTHER_CHANGE))):
+            if self.subsystem != 'sensor':
+                if given:
+                    raise InputError(f'effect `{self.name}` of the {self.subsystem} has the '
+                                     f'{key} `{given}`, which a sensor effect states')
+            elif given not in allowed:
+                raise InputError(
+                    f'effect `{self.name}` of a sensor has the {key} `{given}`'
+                    f'{did_you_mean(given, allowed)}; write fitting=Fitting({key}=...) with one '
+                    f'of {", ".join(allowed)}')
+        if (fitting.sensor_change in SENSOR_CHANGES and len(self.amplitude) > 1
+                and not fitting.sensor_parameter):
             raise InputError(
                 f'effect `{self.name}` has several amplitudes; name the one that is the '
-                f'{self.fitting.sensor_change} as `sensor_parameter` of `fitting`; allowed: '
-                f'{", ".join(known)}')
+                f'{fitting.sensor_change} as `sensor_parameter` of `fitting`; allowed: '
+                f'{", ".join(p.name for p in self.parameters)}')
 
     @property
     def sensor_parameter(self) -> str:

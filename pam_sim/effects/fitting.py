@@ -25,6 +25,7 @@ DELAY_STARTS_S = (0.01, 0.002)
 # What a sensor measures, and what an effect can do to it.
 SENSOR_SIGNALS = ('pressure', 'contraction', 'force')
 SENSOR_CHANGES = ('bias', 'gain', 'lag')
+OTHER_CHANGE = 'other'              # none of them: `pam gap` does not take it out of a reading
 _MAX_LOGARITHM = 50.0
 
 
@@ -101,7 +102,8 @@ class Fitting:
     edges : tuple of str
         Parameters by which rising and falling edges are late, each by its own.
     sensor_signal, sensor_change : str
-        Of an effect of a sensor: the reading it changes, and how: ``bias``, ``gain`` or ``lag``.
+        Of an effect of a sensor: the reading it changes, and how: ``bias``, ``gain``, ``lag``
+        or ``other``.
     sensor_parameter : str
         Parameter that is the bias, the gain error or the lag; the amplitude by default.
     is_limit : callable, optional

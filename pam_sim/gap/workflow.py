@@ -156,6 +156,7 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     context = context_of(
         estimator, criteria.seen_gap, criteria.least_gap * min(materiality, 1.0), effects,
         lambda: time.perf_counter() > deadline, matters)
+    remarks += context.left_out
     outcome = search(context)
     progress(0.8)
     estimator.use = (FIT, SELECT)

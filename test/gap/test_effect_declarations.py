@@ -19,7 +19,7 @@ from pathlib import Path
 import re
 
 from pam_sim.effects.effect import Effect
-from pam_sim.effects.fitting import Fitting, FreeParameter, SENSOR_CHANGES, SENSOR_SIGNALS
+from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.effects.registry import effects
 from pam_sim.errors import InputError
 import pam_sim.gap
@@ -58,14 +58,31 @@ def test_look_alikes_are_effects_and_go_by_their_own_name():
             assert effects()[name].variant_of == '' and effect.variant_of == ''
 
 
-def test_a_sensor_effect_says_what_it_changes_and_others_do_not():
-    for effect in effects().values():
-        fitting = effect.fitting
-        if effect.subsystem == 'sensor':
-            assert fitting.sensor_signal in SENSOR_SIGNALS
-            assert fitting.sensor_change in SENSOR_CHANGES
-        else:
-            assert fitting.sensor_signal == fitting.sensor_change == ''
+@pytest.mark.parametrize('subsystem, given, sentence', [
+    ('sensor', {}, 'of a sensor has the sensor_signal ``; write fitting=Fitting(sensor_signal=...'
+     ') with one of pressure, contraction, force'),
+    ('sensor', {'sensor_signal': 'presure', 'sensor_change': 'bias'},
+     'of a sensor has the sensor_signal `presure` (did you mean `pressure`?); write'),
+    ('sensor', {'sensor_signal': 'force'}, 'has the sensor_change ``; write fitting=Fitting('
+     'sensor_change=...) with one of bias, gain, lag, other'),
+    ('sensor', {'sensor_signal': 'force', 'sensor_change': 'gian'}, '(did you mean `gain`?)'),
+    ('load', {'sensor_signal': 'force'},
+     'effect `made_up` of the load has the sensor_signal `force`, which a sensor effect states'),
+    ('load', {'sensor_change': 'bias'}, 'has the sensor_change `bias`, which a sensor effect')])
+def test_a_sensor_effect_says_what_it_changes_and_others_do_not(subsystem, given, sentence):
+    with pytest.raises(InputError) as caught:
+        Effect('made_up', 'family', subsystem, 'A test.', 'here',
+               (Parameter('force_n', 'N', 1.0, 0.0, 2.0),), ('force_n',),
+               fitting=Fitting(**given))
+    assert sentence in caught.value.problem
+
+
+def test_of_several_amplitudes_one_is_the_bias():
+    given = {'sensor_signal': 'force', 'sensor_change': 'bias'}
+    with pytest.raises(InputError, match='name the one that is the bias as `sensor_parameter`'):
+        Effect('made_up', 'family', 'sensor', 'A test.', 'here', (
+            Parameter('first_n', 'N', 1.0, 0.0, 2.0), Parameter('then_n', 'N', 1.0, 0.0, 2.0)),
+            ('first_n', 'then_n'), fitting=Fitting(**given))
 
 
 def test_fitted_ranges_lie_within_those_of_the_model_file():

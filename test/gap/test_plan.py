@@ -98,6 +98,15 @@ def test_candidates_fill_a_minute_and_none_could_take_in_more():
         assert min(lengths) > 0.7 * protocols.LONGEST_S
 
 
+def test_a_name_that_cannot_be_tried_is_told_and_alone_refused(capsys):
+    run = recorded(nominal(), voltages(4.0), topics=('pressure', 'contraction'))
+    recording = Recording(run, 'ppr')
+    told = '`thermal` was asked for and is not tried: it acts with valve hsv, the model has ppr'
+    assert Sensitivities(nominal(), recording, ['thermal', 'creep']).left_out == [f'{told}.']
+    assert main(['gap', '--plan', 'sine_quarter_hz', '--effects', 'thermal']) == 2
+    assert capsys.readouterr().err.endswith(f'{nominal().name}: {told}\n')
+
+
 def test_the_verb_writes_an_experiment_that_runs(monkeypatch, tmp_path, capsys):
     whole = protocols.pieces('ppr')
     monkeypatch.setattr(protocols, 'pieces', lambda valve: {'slow': whole['slow']})

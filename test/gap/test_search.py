@@ -109,9 +109,12 @@ def test_what_drifts_slowly_opens_a_cut_at_full_weight(promise, flat, first):
 def test_names_can_be_limited():
     rig = nominal().with_(effects=[
         {'name': 'valve_hysteresis', 'parameters': {'half_width_pa': 3e3}}])
-    result = find_gap(recorded(rig, voltages(12.0)), nominal(), effects=['valve_hysteresis'])
+    result = find_gap(recorded(rig, voltages(12.0)), nominal(), effects=[
+        'valve_hysteresis', 'thermal'])
     assert [e['name'] for e in result.effects] == ['valve_hysteresis']
     assert {e['name'] for e in result.evidence} <= {'valve_hysteresis', 'T_m', 'K_m'}
+    assert ('`thermal` was asked for and is not tried: it acts with valve hsv, the model has '
+            'ppr.') in result.text()
 
 
 def test_a_formulation_never_fits_worse_than_the_one_it_contains():

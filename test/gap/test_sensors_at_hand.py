@@ -25,6 +25,7 @@ from pam_sim import load_rig
 from pam_sim.gap import find_gap
 from pam_sim.gap.data.health import check_health, dead_signals, without_dead
 from pam_sim.gap.result import GapResult
+from pam_sim.gap.select.candidates import candidates, left_out
 import pytest
 
 NAMES = ['coulomb_friction', 'force_bias']
@@ -68,6 +69,28 @@ def test_a_dead_sensor_is_one_that_never_changes(dead):
     assert health.usable and health.dead == ('force',)
     assert health.signals == ('pressure', 'contraction')
     assert 'force' not in without_dead(dead) and 'force' in dead
+
+
+@pytest.mark.parametrize('name, rig, outputs, still, why', [
+    ('force_bias', nominal(), ('pressure', 'contraction'), False,
+     'it acts on the sensor of the force, whose readings are not compared'),
+    ('guide_friction', load_rig('dmsp_5_300_driven'), ('pressure', 'force'), False,
+     'it acts on a load that moves freely, the model has `driven`'),
+    ('valve_dead_time', nominal(), ('contraction',), False,
+     'the pressure that the valve gives is not compared'),
+    ('thermal', nominal(), ('pressure',), False,
+     'it acts with valve hsv, the model has ppr'),
+    ('supply_droop', nominal().with_(valve='hsv'), ('pressure',), True,
+     'the recorded supply pressure stands still'),
+    ('pressure_bias', nominal().with_(effects=['pressure_bias']), ('pressure',), False,
+     'the model has it'),
+    ('tube_lag', nominal(), ('pressure',), True, '')])
+def test_a_name_asked_for_that_cannot_be_tried_is_told_with_the_reason(
+        name, rig, outputs, still, why):
+    pool = candidates(rig, outputs, [name, 'creep'], still)
+    assert ('creep' in {c.name for c in pool}) and (name in {c.name for c in pool}) == (not why)
+    assert left_out([name, 'creep'], pool, rig, outputs, still) == [
+        f'`{name}` was asked for and is not tried: {why}.'] * bool(why)
 
 
 def sensors(**noise):

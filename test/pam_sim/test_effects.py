@@ -274,6 +274,9 @@ def refused(folder, monkeypatch, text):
                          'itself; allowed are other names, such as `shape_value`'),
     ('subsystem="muscle"', 'subsystem="limb"',
      'effect `ripple` has the subsystem `limb`; allowed: valve, muscle, load, sensor'),
+    ('subsystem="muscle"', 'subsystem="sensor"',
+     'effect `ripple` of a sensor has the sensor_signal ``; write fitting=Fitting('
+     'sensor_signal=...) with one of pressure, contraction, force'),
     ('amplitude=("depth_n",)', 'amplitude=("dept_n",)',
      'effect `ripple` has no parameter `dept_n` (did you mean `depth_n`?); allowed: depth_n'),
     ('amplitude=("depth_n",)', 'amplitude=()',

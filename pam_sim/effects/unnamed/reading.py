@@ -26,7 +26,7 @@ import numpy as np
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import compiled, entry_point, source_key
 from pam_sim.effects.effect import Effect, Numbers
-from pam_sim.effects.fitting import Fitting
+from pam_sim.effects.fitting import Fitting, OTHER_CHANGE
 from pam_sim.effects.unnamed import terms
 from pam_sim.records import columns, part, values_of
 from pam_sim.rollout import layout
@@ -59,7 +59,7 @@ def term_of_reading(signal: str) -> Effect:
         sentence='A change of the reading found from data.', source='', equation='',
         parameters=terms.parameters_of(INPUTS), amplitude=terms.AMPLITUDES,
         states=terms.STATES, packed=terms.PACKED, pack=_pack, initial=_initial, order=90,
-        fitting=Fitting(sensor_signal=signal))
+        fitting=Fitting(sensor_signal=signal, sensor_change=OTHER_CHANGE))
 
 
 @compiled

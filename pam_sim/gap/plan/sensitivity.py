@@ -25,7 +25,8 @@ from pam_sim.gap.criteria import CRITERIA, Criteria
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.split import UNUSED
 from pam_sim.gap.fit.candidate import Candidate
-from pam_sim.gap.select.candidates import candidates, is_limit, split_refinements
+from pam_sim.gap.select.candidates import (
+    candidates, is_limit, left_out, split_refinements)
 from pam_sim.gap.subsystems.effects import acts_on
 from pam_sim.gap.subsystems.parallel import parallel_map
 from pam_sim.gap.subsystems.problems import subsystem_problems
@@ -129,6 +130,11 @@ class Sensitivities:
     criteria : Criteria
         Decision thresholds.
 
+    Attributes
+    ----------
+    left_out : list of str
+        A sentence for every name asked for that cannot be tried.
+
     """
 
     def __init__(self, rig: Rig, recording: Recording, only: Iterable[str] | None = None,
@@ -136,7 +142,9 @@ class Sensitivities:
         self.rig, self.criteria = rig, criteria
         self.problems = subsystem_problems(rig, [recording], holds_certify=False)
         self.signals = sum((problem.signals for problem in self.problems), ())
-        self.pool, _ = split_refinements(candidates(rig, self.signals, only))
+        pool = candidates(rig, self.signals, only)
+        self.left_out = left_out(only, pool, rig, self.signals)
+        self.pool, _ = split_refinements(pool)
         self.probes = {c.name: c for c in self.pool if c.effect == c.name}
         self._base = [problem.values(rig, np.zeros(len(problem.known)))
                       for problem in self.problems]

@@ -16,6 +16,7 @@
 from collections.abc import Mapping, Sequence
 import re
 
+from pam_sim.effects.fitting import OTHER_CHANGE
 from pam_sim.effects.registry import effects
 from pam_sim.effects.unnamed import terms
 from pam_sim.gap.propose.hooks import (
@@ -157,7 +158,8 @@ class EffectText:
             rows += [f"    packed=record({names}, 'step_s'),", '    pack=_pack,']
         if self._stand_in.valves != VALVES:
             rows.append(f'    valves={self._stand_in.valves!r},')
-        signal = f", sensor_signal='{self._stand_in.signal}'" if self._stand_in.signal else ''
+        signal = (f", sensor_signal='{self._stand_in.signal}', sensor_change={OTHER_CHANGE!r}"
+                  if self._stand_in.signal else '')
         rows += ['    order=90,', '    fitting=Fitting(free=(', *free, f'    ){signal}),', ')', '']
         return '\n'.join(rows)
 

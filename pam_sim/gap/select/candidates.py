@@ -19,7 +19,7 @@ Each effect of the registry is a candidate; formulations with ``variant_of`` car
 name of that effect. What is fitted of each, from where and how far, is declared in its file.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 import math
 
@@ -53,8 +53,8 @@ def is_limit_at(candidate: Candidate, values: Mapping[str, float]) -> bool:
     return turned is not None and turned(values)
 
 
-def candidates(rig: Rig, outputs: Sequence[str], only: Iterable[str] | None = None
-               ) -> list[Candidate]:
+def candidates(rig: Rig, outputs: Sequence[str], only: Iterable[str] | None = None,
+               supply_stands: bool = False) -> list[Candidate]:
     """
     Return the candidates that can show on a rig.
 
@@ -66,6 +66,8 @@ def candidates(rig: Rig, outputs: Sequence[str], only: Iterable[str] | None = No
         Signals that are compared.
     only : sequence of str, optional
         Names to try, canonical or of a formulation.
+    supply_stands : bool
+        Whether the recordings show that the supply pressure does not move.
 
     Returns
     -------
@@ -77,20 +79,62 @@ def candidates(rig: Rig, outputs: Sequence[str], only: Iterable[str] | None = No
         candidate = Candidate(name, effect.free_parameters(rig.valve))
         if effect.relative_of and name not in (only or ()):
             continue
-        if rig.valve not in effect.valves or rig.effect(name) is not None:
-            continue
         if only is not None and name not in only and candidate.name not in only:
             continue
-        if effect.subsystem == 'load' and rig.is_driven:
-            continue
-        if effect.subsystem == 'valve' and 'pressure' not in outputs:
-            continue
-        # The pressure is compared, or it drives muscle and load.
-        if effect.subsystem == 'sensor' and effect.fitting.sensor_signal not in (
-                'pressure', *outputs):
-            continue
-        found.append(candidate)
+        if not why_not(name, rig, outputs, supply_stands):
+            found.append(candidate)
     return found
+
+
+def why_not(name: str, rig: Rig, outputs: Sequence[str], supply_stands: bool = False) -> str:
+    """
+    Return why an effect cannot be tried on a rig, nothing where it can.
+
+    Parameters
+    ----------
+    name : str
+        Of a formulation.
+    rig, outputs, supply_stands
+        As of :func:`candidates`.
+
+    """
+    effect = get_effect(name)
+    if rig.valve not in effect.valves:
+        return f'it acts with valve {" or ".join(effect.valves)}, the model has {rig.valve}'
+    if rig.effect(name) is not None:
+        return 'the model has it'
+    if effect.subsystem == 'load' and rig.is_driven:
+        return f'it acts on a load that moves freely, the model has `{rig.load}`'
+    if effect.subsystem == 'valve' and 'pressure' not in outputs:
+        return 'the pressure that the valve gives is not compared'
+    signal = effect.fitting.sensor_signal
+    # The pressure is compared, or it drives muscle and load.
+    if effect.subsystem == 'sensor' and signal not in ('pressure', *outputs):
+        return f'it acts on the sensor of the {signal}, whose readings are not compared'
+    if supply_stands and 'supply' in effect.hooks:
+        return 'the recorded supply pressure stands still'
+    return ''
+
+
+def left_out(only: Iterable[str] | None, pool: Collection[Candidate], rig: Rig,
+             outputs: Sequence[str], supply_stands: bool = False) -> list[str]:
+    """
+    Return a sentence for every name asked for that is not tried, with the reason.
+
+    Parameters
+    ----------
+    only : sequence of str, optional
+        Names asked for.
+    pool : list of Candidate
+        What is tried.
+    rig, outputs, supply_stands
+        As of :func:`candidates`.
+
+    """
+    tried = {name for c in pool for name in (c.effect, c.name)}
+    return [f'`{name}` was asked for and is not tried: '
+            f'{why_not(name, rig, outputs, supply_stands)}.'
+            for name in dict.fromkeys(only or ()) if name not in tried]
 
 
 def within_reading(pool: Iterable[Candidate], recordings: Sequence[Recording], criteria: Criteria

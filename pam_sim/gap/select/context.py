@@ -17,14 +17,14 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
-from pam_sim.effects.registry import get_effect
 from pam_sim.gap.criteria import Criteria
 from pam_sim.gap.data.split import FIT, SELECT
 from pam_sim.gap.data.supply import supply_stands
 from pam_sim.gap.fit.candidate import Candidate
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit
-from pam_sim.gap.select.candidates import candidates, split_refinements, within_reading
+from pam_sim.gap.select.candidates import (
+    candidates, left_out, split_refinements, within_reading)
 from pam_sim.gap.select.comparison import gap
 from pam_sim.gap.select.ranking import Ranking
 from pam_sim.gap.select.rival import Rival
@@ -60,6 +60,8 @@ class SearchContext:
     matters : callable
         ``matters(with, without)``: whether two fits differ by enough for a name, in a free
         run; asked of every effect once there are several.
+    left_out : tuple of str
+        A sentence for every name asked for that is not tried.
 
     """
 
@@ -74,6 +76,7 @@ class SearchContext:
     least_gap: float
     out_of_time: Callable[[], bool]
     matters: Callable[[Fit, Fit], bool]
+    left_out: tuple[str, ...] = ()
 
     @property
     def criteria(self) -> Criteria:
@@ -130,17 +133,17 @@ def context_of(estimator: Estimator, seen_gap: float, least_gap: float,
     """
     outputs: tuple[str, ...] = sum((problem.signals for problem in estimator.problems), ())
     recordings = estimator.problems[0].recordings
+    stands = supply_stands(recordings, estimator.criteria)
     pool = within_reading(
-        candidates(estimator.rig, outputs, only), recordings, estimator.criteria)
-    if supply_stands(recordings, estimator.criteria):
-        pool = [c for c in pool if 'supply' not in get_effect(c.effect).hooks]
+        candidates(estimator.rig, outputs, only, stands), recordings, estimator.criteria)
     base = estimator.base
     screened = screen(estimator, base, split_refinements(pool)[0])
     first_gap = {p.subsystem: first_gap_of(p, base, screened, seen_gap)
                  for p in estimator.problems}
     return SearchContext(
         estimator, Ranking(estimator, base, seen_gap), base, tuple(pool), outputs,
-        tuple(screened), first_gap, seen_gap, least_gap, out_of_time, matters)
+        tuple(screened), first_gap, seen_gap, least_gap, out_of_time, matters,
+        tuple(left_out(only, pool, estimator.rig, outputs, stands)))
 
 
 def first_gap_of(problem: SubsystemProblem, base: Fit, screened: Iterable[Screened],
