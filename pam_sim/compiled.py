@@ -151,13 +151,13 @@ def sources(*parts: Callable[..., Any] | types.ModuleType) -> tuple[list[Path], 
         seen.add(id(part))
         if isinstance(part, types.ModuleType):
             files.add(_file_of(part))
-            waiting += filter(_is_compiled, vars(part).values())
+            waiting += filter(is_compiled, vars(part).values())
             continue
         function: Any = getattr(part, 'py_func', part)       # itself where nothing is compiled
         found = inspect.getclosurevars(function)
         files.add(_file_of(function))
         for name, value in {**found.globals, **found.nonlocals}.items():
-            if _is_compiled(value):
+            if is_compiled(value):
                 waiting.append(value)
             elif isinstance(value, np.dtype):
                 constants.add(f'{name} = {_text(value)}')
@@ -168,7 +168,7 @@ def sources(*parts: Callable[..., Any] | types.ModuleType) -> tuple[list[Path], 
             elif isinstance(value, types.ModuleType) and value.__name__.startswith('pam_'):
                 files.add(_file_of(value))
                 used = (getattr(value, name, None) for name in function.__code__.co_names)
-                waiting += filter(_is_compiled, used)
+                waiting += filter(is_compiled, used)
     return sorted(files), sorted(constants)
 
 
@@ -197,5 +197,6 @@ def _file_of(part: types.ModuleType | Callable[..., Any]) -> Path:
     return Path(file)
 
 
-def _is_compiled(value: object) -> TypeGuard[Compiled[..., Any]]:
+def is_compiled(value: object) -> TypeGuard[Compiled[..., Any]]:
+    """Return whether a value is a function made by one of the decorators above."""
     return hasattr(value, 'py_func') and not isinstance(value, type)

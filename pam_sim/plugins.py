@@ -22,13 +22,15 @@ a module is a plug-in by being there.
 from collections.abc import Mapping
 import importlib
 import importlib.util
+import keyword
 import os
 from pathlib import Path
 import sys
 import traceback
 from types import ModuleType
-from typing import TypeVar
+from typing import Any, TypeVar
 
+from pam_sim.compiled import Compiled, is_compiled, named_arguments
 from pam_sim.errors import did_you_mean, InputError
 
 T = TypeVar('T')
@@ -36,7 +38,7 @@ T = TypeVar('T')
 
 def plugin_files(own_folder: Path, variable: str, not_plugins: tuple[str, ...] = ()) -> list[Path]:
     """
-    Return the source files of all plug-ins, sorted by name.
+    Return the source files of all plug-ins, sorted by name; of one name our own first.
 
     Parameters
     ----------
@@ -61,7 +63,7 @@ def plugin_files(own_folder: Path, variable: str, not_plugins: tuple[str, ...] =
     files = [path for folder in folders for path in folder.glob('*.py')
              if not path.stem.startswith('_')
              and not (folder == folders[0] and path.stem in not_plugins)]
-    return sorted(files, key=lambda path: (path.stem, str(path)))
+    return sorted(files, key=lambda path: (path.stem, path.parent != folders[0], str(path)))
 
 
 def plugin_module(path: Path, own_folder: Path, package: str, prefix: str) -> ModuleType:
@@ -96,6 +98,73 @@ def plugin_module(path: Path, own_folder: Path, package: str, prefix: str) -> Mo
         raise InputError(f'cannot be loaded: {type(error).__name__}: {error}',
                          ':'.join(map(str, [path, *lines[-1:]]))) from error
     return module
+
+
+def check_name(what: str, name: str, path: Path, taken: Mapping[str, Path]) -> None:
+    """
+    Refuse a plug-in whose name is not that of its file, or is taken.
+
+    Parameters
+    ----------
+    what : str
+        Noun used in messages.
+    name : str
+        What the file defines.
+    path : Path
+        The file.
+    taken : mapping
+        Names that are defined already: name -> file.
+
+    Raises
+    ------
+    InputError
+        The sentence names both files.
+
+    """
+    if name != path.stem:
+        raise InputError(f'defines the {what} `{name}`, which must be defined in a file of its '
+                         f'name; rename one of them', str(path))
+    if not name.isidentifier() or keyword.iskeyword(name):
+        raise InputError(f'the {what} `{name}` is no name of Python; take letters, digits and '
+                         '`_`, such as `my_name`', str(path))
+    if name in taken:
+        raise InputError(f'the name `{name}` is taken by {taken[name]}; give the {what} and its '
+                         'file another name', str(path))
+
+
+def formula(module: ModuleType, name: str, arguments: tuple[str, ...],
+            path: Path) -> Compiled[..., Any] | None:
+    """
+    Return a compiled function of a plug-in, None where it has none of this name.
+
+    Parameters
+    ----------
+    module : module
+        Of the plug-in.
+    name : str
+        Of the function.
+    arguments : tuple of str
+        Names of its arguments, in the order in which a simulation gives them.
+    path : Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        It is not compiled, or has other arguments, or these in another order.
+
+    """
+    function = getattr(module, name, None)
+    if function is None:
+        return None
+    form = (f'write `def {name}({", ".join(arguments)})` with `@compiled` above it, and read the '
+            'numbers by name, `par.length_m`')
+    if not is_compiled(function):
+        raise InputError(f'`{name}` is not compiled; {form}', str(path))
+    given = named_arguments(function)
+    if given != arguments:
+        raise InputError(f'`{name}` takes ({", ".join(given)}); {form}', str(path))
+    return function
 
 
 def pick(known: Mapping[str, T], name: str, what: str, where: str = '') -> T:

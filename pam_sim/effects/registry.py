@@ -20,7 +20,7 @@ from types import ModuleType
 
 from pam_sim.effects.effect import Effect
 from pam_sim.errors import InputError
-from pam_sim.plugins import pick, plugin_files, plugin_module
+from pam_sim.plugins import check_name, pick, plugin_files, plugin_module
 from pam_sim.rollout.hooks import check_hook, HOOKS
 
 _OWN_FOLDER = Path(__file__).parent
@@ -36,6 +36,11 @@ def effect_files() -> list[Path]:
     return plugin_files(_OWN_FOLDER, 'PAM_EFFECTS_PATH', _NOT_EFFECTS)
 
 
+def _term_files() -> list[Path]:
+    """Return the source files of the stand-ins for terms that have no name."""
+    return plugin_files(_UNNAMED_FOLDER, '', _NOT_TERMS)
+
+
 @lru_cache(maxsize=None)
 def effects() -> dict[str, Effect]:
     """
@@ -44,10 +49,11 @@ def effects() -> dict[str, Effect]:
     Raises
     ------
     InputError
-        A file without ``EFFECT``, a name defined twice, or a hook that names what it has not.
+        A file without ``EFFECT``, a name that is taken, or a hook that names what it has not.
 
     """
     found: dict[str, Effect] = {}
+    taken = {path.stem: path for path in _term_files()}
     for path in effect_files():
         if path.parent == _OWN_FOLDER and path.stem in _SHARED:
             continue
@@ -55,9 +61,8 @@ def effects() -> dict[str, Effect]:
         effect = getattr(module, 'EFFECT', None)
         if not isinstance(effect, Effect):
             raise InputError('defines no EFFECT = Effect(...)', str(path))
-        if effect.name in found or effect.name != path.stem:
-            raise InputError(
-                f'effect `{effect.name}` must be defined once, in a file of its name', str(path))
+        check_name('effect', effect.name, path, taken)
+        taken[effect.name] = path
         found[effect.name] = _with_hooks(effect, module, path)
     return _in_order(found)
 
@@ -70,7 +75,7 @@ def all_effects() -> dict[str, Effect]:
     The latter are for `pam gap` alone, which tries forms with them; no list shows them.
     """
     found = dict(effects())
-    for path in plugin_files(_UNNAMED_FOLDER, '', _NOT_TERMS):
+    for path in _term_files():
         module = plugin_module(path, _UNNAMED_FOLDER, 'pam_sim.effects.unnamed', 'pam_term')
         found[path.stem] = _with_hooks(module.EFFECT, module, path)
     return _in_order(found)

@@ -25,9 +25,9 @@ from types import ModuleType
 
 import numpy as np
 from pam_sim.annotations import Number
-from pam_sim.compiled import interpreted, named_arguments
+from pam_sim.compiled import interpreted
 from pam_sim.errors import InputError
-from pam_sim.plugins import plugin_files, plugin_module
+from pam_sim.plugins import check_name, formula, plugin_files, plugin_module
 from pam_sim.records import fields, record, values_of
 
 HANGING_MASS = 'hanging_mass'
@@ -46,7 +46,7 @@ def find_loads() -> dict[str, ModuleType]:
     Raises
     ------
     InputError
-        A file that does not state what a load states, or a name defined twice.
+        A file that does not state what a load states, or a name that is taken.
 
     """
     found: dict[str, ModuleType] = {}
@@ -56,9 +56,8 @@ def find_loads() -> dict[str, ModuleType]:
         if missing:
             raise InputError(f'defines no {missing[0]}; a load states {", ".join(_STATED)}',
                              str(path))
-        if module.NAME in found or module.NAME != path.stem:
-            raise InputError(
-                f'load `{module.NAME}` must be defined once, in a file of its name', str(path))
+        check_name('load', module.NAME, path, {
+            name: Path(str(other.__file__)) for name, other in found.items()})
         _check_force(module, path)
         found[module.NAME] = module
     return dict(sorted(found.items(), key=lambda item: (
@@ -69,16 +68,16 @@ def _check_force(module: ModuleType, path: Path) -> None:
     """Refuse a load whose force cannot be calculated."""
     if module.NAME == HANGING_MASS:
         return
-    function = getattr(module, 'load_force_n', None)
+    function = formula(module, 'load_force_n', _ARGUMENTS, path)
     if not module.MOVES_FREELY:
         if function is not None:
             raise InputError('has a `load_force_n`, which a load that is held does not feel; '
                              'state MOVES_FREELY = True', str(path))
         return
-    if function is None or named_arguments(function) != _ARGUMENTS:
+    if function is None:
         raise InputError(
-            f'moves freely: write `def load_force_n({", ".join(_ARGUMENTS)})`, compiled, and '
-            'read the numbers by name, `par.mass_kg`', str(path))
+            f'moves freely: write `def load_force_n({", ".join(_ARGUMENTS)})` with `@compiled` '
+            'above it, and read the numbers by name, `par.mass_kg`', str(path))
     if not any(p.name == 'mass_kg' and p.lower > 0.0 for p in module.PARAMETERS):
         raise InputError('moves freely: state the parameter `mass_kg`, above 0, its inertia as '
                          'the muscle feels it', str(path))

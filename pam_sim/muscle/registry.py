@@ -16,13 +16,11 @@
 
 from functools import lru_cache
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
-from pam_sim.compiled import Compiled, named_arguments
 from pam_sim.errors import InputError
 from pam_sim.muscle.law import MuscleLaw
-from pam_sim.plugins import pick, plugin_files, plugin_module
+from pam_sim.plugins import check_name, formula, pick, plugin_files, plugin_module
 
 _OWN_FOLDER = Path(__file__).parent / 'laws'
 _POINT = 'gauge_pa', 'strain', 'par'
@@ -41,35 +39,24 @@ def laws() -> dict[str, type[MuscleLaw]]:
     Raises
     ------
     InputError
-        A file without ``LAW``, a name defined twice, or a formula of other arguments.
+        A file without ``LAW``, a name that is taken, or a formula that is not compiled or has
+        other arguments.
 
     """
     found: dict[str, type[MuscleLaw]] = {}
+    places: dict[str, Path] = {}
     for path in law_files():
         module = plugin_module(path, _OWN_FOLDER, 'pam_sim.muscle.laws', 'pam_muscle_law')
         law = getattr(module, 'LAW', None)
         if not (isinstance(law, type) and issubclass(law, MuscleLaw)):
             raise InputError('defines no LAW, a subclass of MuscleLaw', str(path))
-        if law.NAME in found or law.NAME != path.stem:
-            raise InputError(
-                f'law `{law.NAME}` must be defined once, in a file of its name', str(path))
-        law.COMPILED = _formula(module, 'tension_n', _POINT, path)
-        law.COMPILED_DAMPER = _formula(
+        check_name('law', law.NAME, path, places)
+        law.COMPILED = formula(module, 'tension_n', _POINT, path)
+        law.COMPILED_DAMPER = formula(
             module, 'damper_force_n', ('velocity_m_per_s', *_POINT), path)
+        places[law.NAME] = path
         found[law.NAME] = law
     return found
-
-
-def _formula(module: ModuleType, name: str, arguments: tuple[str, ...],
-             path: Path) -> Compiled[..., float] | None:
-    """Return a compiled function of a law's file, None where it has none."""
-    function: Compiled[..., float] | None = getattr(module, name, None)
-    if function is not None and len(named_arguments(function)) != len(arguments):
-        raise InputError(
-            f'`{name}` takes {len(named_arguments(function))} arguments; write `def '
-            f'{name}({", ".join(arguments)})` and read the numbers by name, `par.length_m`',
-            str(path))
-    return function
 
 
 def get_law(name: str, where: str = '') -> type[MuscleLaw]:

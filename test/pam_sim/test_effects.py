@@ -251,9 +251,9 @@ def muscle_force({arguments}):
 """
 
 
-def refused(folder, monkeypatch, text):
+def refused(folder, monkeypatch, text, name='ripple'):
     """Return the InputError on a file ``ripple.py`` with an effect."""
-    path = folder / 'ripple.py'
+    path = folder / f'{name}.py'
     path.write_text(text)
     monkeypatch.setenv('PAM_EFFECTS_PATH', str(folder))
     effects.cache_clear()
@@ -286,6 +286,16 @@ def test_a_wrong_declaration_is_told_in_one_sentence_with_its_file(
     text = EFFECT_FILE.format(arguments='force_n, contraction_m, par')
     error = refused(tmp_path, monkeypatch, text.replace(old, new))
     assert error.problem == sentence and error.where == str(tmp_path / 'ripple.py')
+
+
+@pytest.mark.parametrize('name, place', [
+    ('load_term', 'effects/unnamed/load_term.py'), ('creep', 'effects/creep.py')])
+def test_a_name_that_is_taken_is_refused_with_both_places(tmp_path, monkeypatch, name, place):
+    text = EFFECT_FILE.format(arguments='force_n, par').replace('"ripple"', f'"{name}"')
+    error = refused(tmp_path, monkeypatch, text, name)
+    assert re.fullmatch(f'the name `{name}` is taken by .*/pam_sim/{place}; give the effect and '
+                        'its file another name', error.problem)
+    assert error.where == str(tmp_path / f'{name}.py')
 
 
 def test_a_file_that_is_not_python_is_told_with_its_line(tmp_path, monkeypatch):

@@ -280,14 +280,25 @@ def test_a_law_in_a_folder_of_the_user_moves_a_rig(tmp_path):
     assert answer.stdout.split() == ['True', 'True'], answer.stderr
 
 
-def test_a_formula_that_takes_a_place_is_refused_in_one_sentence(tmp_path, monkeypatch):
-    path = tmp_path / 'straight.py'
-    path.write_text(LAW.replace('strain, par)', 'strain, par, k)'))
+@pytest.mark.parametrize('before, after, name, words', [
+    ('strain, par)', 'strain, par, k)', 'straight',
+     r'takes \(gauge_pa, strain, par, k\); write `def tension_n\(gauge_pa, strain, par\)`'),
+    ('gauge_pa, strain, par)', 'strain, gauge_pa, par)', 'straight',
+     r'takes \(strain, gauge_pa, par\); write `def tension_n\(gauge_pa, strain, par\)`'),
+    ('@compiled', '', 'straight', '`tension_n` is not compiled; write'),
+    ("'straight'", "'sarosi'", 'sarosi', r'`sarosi` is taken by .*/laws/sarosi\.py; give the law'),
+    ("'straight'", "'my law'", 'my law', '`my law` is no name of Python'),
+    ("'straight'", "'bent'", 'straight', 'defines the law `bent`, which must be defined in a')])
+def test_a_wrong_file_is_refused_in_one_sentence(
+        tmp_path, monkeypatch, before, after, name, words):
+    path = tmp_path / f'{name}.py'
+    path.write_text(LAW.replace(before, after))
     monkeypatch.setenv('PAM_MUSCLE_LAWS_PATH', str(tmp_path))
     laws.cache_clear()
     try:
-        with pytest.raises(InputError, match=r'write `def tension_n\(gauge_pa, strain, par\)`'):
+        with pytest.raises(InputError, match=words) as caught:
             laws()
+        assert caught.value.where == str(path) and '\n' not in str(caught.value)
     finally:
         monkeypatch.undo()
         laws.cache_clear()

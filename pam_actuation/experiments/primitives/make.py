@@ -22,7 +22,7 @@ from typing import Any
 
 from pam_actuation.experiments.primitives.base import Primitive
 from pam_sim.errors import InputError
-from pam_sim.plugins import pick, plugin_files, plugin_module
+from pam_sim.plugins import check_name, pick, plugin_files, plugin_module
 
 _FOLDER = Path(__file__).parent
 _FILLED_IN = ('start', 'rest_value')
@@ -37,14 +37,14 @@ _LARGEST_SEED = 2**32 - 1
 def _found() -> dict[str, type[Primitive]]:
     """Return name to class of all primitives there are; InputError for a file without one."""
     found: dict[str, type[Primitive]] = {}
+    places: dict[str, Path] = {}
     for path in plugin_files(_FOLDER, 'PAM_PRIMITIVES_PATH', not_plugins=('base', 'make')):
         module = plugin_module(path, _FOLDER, __package__, 'pam_primitive')
         cls = getattr(module, 'PRIMITIVE', None)
         if not (isinstance(cls, type) and issubclass(cls, Primitive)):
             raise InputError('defines no PRIMITIVE, a subclass of Primitive', str(path))
-        if path.stem in found:
-            raise InputError(f'primitive `{path.stem}` is defined twice', str(path))
-        found[path.stem] = cls
+        check_name('primitive', path.stem, path, places)
+        found[path.stem], places[path.stem] = cls, path
     return found
 
 
