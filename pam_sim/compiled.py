@@ -82,13 +82,39 @@ class _Deferred(Generic[P, R]):
 
     def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
         """Call the machine code."""
-        result: R = self.dispatcher(*args, **kwargs)
+        try:
+            result: R = self.dispatcher(*args, **kwargs)
+        except Exception as error:
+            told = _told(error)
+            if told is None:
+                raise
+            raise told from None
         return result
 
     def __reduce__(self) -> Any:
         """Return the name by which another process finds the function, or all that it needs."""
         name = self.py_func.__qualname__
         return self.dispatcher.__reduce__() if '<locals>' in name else name
+
+
+_explainers: list[Callable[[], Exception | None]] = []
+
+
+def explain_with(explain: Callable[[], Exception | None]) -> None:
+    """Ask ``explain`` for a better error where a function cannot be compiled."""
+    _explainers.append(explain)
+
+
+def _told(error: Exception) -> Exception | None:
+    """Return a better error for one that came up while numba compiled, None without one."""
+    seen, frame = {type(error).__module__}, error.__traceback__
+    while frame is not None:
+        seen.add(str(frame.tb_frame.f_globals.get('__name__')))
+        frame = frame.tb_next
+    # Its own errors come without the way there, others with it.
+    if not seen & {'numba.core.errors', 'numba.core.compiler'}:
+        return None
+    return next(filter(None, (explain() for explain in _explainers)), None)
 
 
 class _Compiler:

@@ -20,17 +20,14 @@ from typing import Any, NamedTuple, TYPE_CHECKING
 
 import numpy as np
 from pam_sim.annotations import FloatArray
-from pam_sim.effects.fitting import (
-    Fitting, FreeParameter, OTHER_CHANGE, SENSOR_CHANGES, SENSOR_SIGNALS)
-from pam_sim.errors import did_you_mean, InputError
+from pam_sim.effects.declaration import check_declaration
+from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import check_parameters, Parameter
 from pam_sim.records import put, put_some, record
 from pam_sim.valve import VALVES
 
 if TYPE_CHECKING:
     from pam_sim.rig import Rig
-
-SUBSYSTEMS = ('valve', 'muscle', 'load', 'sensor')
 
 
 class Numbers(NamedTuple):
@@ -94,6 +91,12 @@ def _at_zero(values: Mapping[str, float], numbers: Numbers) -> dict[str, float]:
     return {}
 
 
+def _size_of(parameter: Parameter) -> float:
+    """Return a size from which a fit begins, within the range."""
+    size: float = abs(parameter.default) or 1e-3 * max(abs(parameter.lower), abs(parameter.upper))
+    return size if size <= parameter.upper else -size
+
+
 _BY_PARAMETERS = np.dtype([])     # stands for the record of the parameters
 
 
@@ -105,7 +108,7 @@ class Effect:
     Parameters
     ----------
     name, family, subsystem : str
-        ``subsystem`` is one of :data:`SUBSYSTEMS`.
+        ``subsystem`` is one of :data:`pam_sim.effects.declaration.SUBSYSTEMS`.
     sentence : str
         What it is, for people.
     source : str
@@ -169,46 +172,14 @@ class Effect:
         Raises
         ------
         InputError
-            Unknown subsystem, no amplitude, what is no parameter, or a name that numpy uses.
+            A name that numpy uses, or what :mod:`pam_sim.effects.declaration` refuses: unknown
+            words, no amplitude, what is no parameter, a range that cannot be fitted.
 
         """
+        check_declaration(self)
+        record(self.name)       # all effects stand in one record
         if self.packed is _BY_PARAMETERS:
             object.__setattr__(self, 'packed', record(*(p.name for p in self.parameters)))
-        if self.subsystem not in SUBSYSTEMS:
-            raise InputError(f'effect `{self.name}` has the subsystem `{self.subsystem}`; '
-                             f'allowed: {", ".join(SUBSYSTEMS)}')
-        if not self.amplitude:
-            raise InputError(f'effect `{self.name}` has no amplitude; name at least one parameter')
-        known = [parameter.name for parameter in self.parameters]
-        fitted = [free.name for free in self.fitting.free]
-        for name in (*self.amplitude, *fitted, *self.fitting.edges, self.fitting.delay,
-                     self.fitting.sensor_parameter):
-            if name and name not in known:
-                raise InputError(f'effect `{self.name}` has no parameter `{name}`'
-                                 f'{did_you_mean(name, known)}; allowed: {", ".join(known)}')
-        self._check_sensor()
-
-    def _check_sensor(self) -> None:
-        """Refuse an effect that does not say which reading it changes and how."""
-        fitting = self.fitting
-        for key, given, allowed in (
-                ('sensor_signal', fitting.sensor_signal, SENSOR_SIGNALS),
-                ('sensor_change', fitting.sensor_change, (*SENSOR_CHANGES, OTHER_CHANGE))):
-            if self.subsystem != 'sensor':
-                if given:
-                    raise InputError(f'effect `{self.name}` of the {self.subsystem} has the '
-                                     f'{key} `{given}`, which a sensor effect states')
-            elif given not in allowed:
-                raise InputError(
-                    f'effect `{self.name}` of a sensor has the {key} `{given}`'
-                    f'{did_you_mean(given, allowed)}; write fitting=Fitting({key}=...) with one '
-                    f'of {", ".join(allowed)}')
-        if (fitting.sensor_change in SENSOR_CHANGES and len(self.amplitude) > 1
-                and not fitting.sensor_parameter):
-            raise InputError(
-                f'effect `{self.name}` has several amplitudes; name the one that is the '
-                f'{fitting.sensor_change} as `sensor_parameter` of `fitting`; allowed: '
-                f'{", ".join(p.name for p in self.parameters)}')
 
     @property
     def sensor_parameter(self) -> str:
@@ -219,8 +190,7 @@ class Effect:
         """Return what is fitted with a type of valve; by default every amplitude."""
         declared = tuple(free for free in self.fitting.free if valve in free.valves)
         return declared or tuple(
-            FreeParameter(p.name, abs(p.default) or 1e-3 * max(abs(p.lower), abs(p.upper)),
-                          p.lower, p.upper)
+            FreeParameter(p.name, _size_of(p), p.lower, p.upper)
             for p in self.parameters if p.name in self.amplitude)
 
     def values(self, given: Mapping[str, Any] | Iterable[tuple[str, Any]] = (),

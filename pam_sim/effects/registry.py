@@ -14,21 +14,25 @@
 
 """Find the effects: every module of this folder, and of ``PAM_EFFECTS_PATH``."""
 
+from difflib import get_close_matches
 from functools import lru_cache
 from pathlib import Path
-from types import ModuleType
+from types import FunctionType, ModuleType
 
+from pam_sim.compiled import is_compiled
+from pam_sim.effects.declaration import check_names
 from pam_sim.effects.effect import Effect
 from pam_sim.errors import InputError
 from pam_sim.plugins import check_name, pick, plugin_files, plugin_module
 from pam_sim.rollout.hooks import check_hook, HOOKS
 
 _OWN_FOLDER = Path(__file__).parent
-_NOT_EFFECTS = ('effect', 'fitting', 'registry', 'setting')
+_NOT_EFFECTS = ('declaration', 'effect', 'fitting', 'registry', 'setting')
 # What several effects call.
 _SHARED = ('air_volume', 'lag', 'loop_level', 'presliding', 'progressive', 'saturation')
 _UNNAMED_FOLDER = _OWN_FOLDER / 'unnamed'
 _NOT_TERMS = ('reading', 'terms')
+_SLIP = 0.8             # how alike a misspelt hook is to the one that was meant
 
 
 def effect_files() -> list[Path]:
@@ -49,7 +53,8 @@ def effects() -> dict[str, Effect]:
     Raises
     ------
     InputError
-        A file without ``EFFECT``, a name that is taken, or a hook that names what it has not.
+        A file without ``EFFECT`` or without a hook, a name that is taken or unknown, a hook that
+        is misspelt, not compiled or names what it has not.
 
     """
     found: dict[str, Effect] = {}
@@ -64,7 +69,17 @@ def effects() -> dict[str, Effect]:
         check_name('effect', effect.name, path, taken)
         taken[effect.name] = path
         found[effect.name] = _with_hooks(effect, module, path)
+    of_rig = _numbers_of_rigs()
+    for name, effect in found.items():
+        check_names(effect, found, of_rig, str(taken[name]))
     return _in_order(found)
+
+
+def _numbers_of_rigs() -> list[str]:
+    """Return the names of the numbers that rigs have, whatever their load."""
+    from pam_sim.load import LOADS
+    from pam_sim.rig_parameters import rig_parameters
+    return list(dict.fromkeys(p.name for load in LOADS for p in rig_parameters(load)))
 
 
 @lru_cache(maxsize=None)
@@ -84,9 +99,24 @@ def all_effects() -> dict[str, Effect]:
 def _with_hooks(effect: Effect, module: ModuleType, path: Path) -> Effect:
     """Return an effect with the functions of its file by which it acts."""
     effect.hooks.update({hook: getattr(module, hook) for hook in HOOKS if hasattr(module, hook)})
+    for name, value in vars(module).items():
+        if name not in HOOKS and _is_own_function(name, value, module):
+            near = get_close_matches(name, HOOKS, n=1, cutoff=_SLIP)
+            if near:
+                raise InputError(f'`{name}` is no hook (did you mean `{near[0]}`?); begin its '
+                                 'name with `_` if it is a helper', str(path))
+    if not effect.hooks:
+        raise InputError(f'effect `{effect.name}` has no hook, so it does nothing; write one of '
+                         f'{", ".join(HOOKS)}', str(path))
     for hook, function in effect.hooks.items():
         check_hook(hook, function, effect.states is not None, path)
     return effect
+
+
+def _is_own_function(name: str, value: object, module: ModuleType) -> bool:
+    """Return whether a file defines a function of a public name, compiled or not."""
+    return (not name.startswith('_') and getattr(value, '__module__', '') == module.__name__
+            and (is_compiled(value) or isinstance(value, FunctionType)))
 
 
 def _in_order(found: dict[str, Effect]) -> dict[str, Effect]:

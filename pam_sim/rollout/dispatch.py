@@ -25,11 +25,12 @@ it is not, the compiler leaves nothing of the call.
 
 from collections.abc import Iterator
 
-from pam_sim.compiled import named_arguments
+from pam_sim.compiled import explain_with, named_arguments
 from pam_sim.effects.registry import all_effects, effects
 from pam_sim.generated import generated_module
 from pam_sim.muscle.registry import laws
 from pam_sim.rollout.hooks import HOOKS
+from pam_sim.rollout.mistakes import first_mistake
 from pam_sim.rollout.places import law_codes, load_codes
 
 _HEAD = '''"""Calls of the registered effects, laws, loads; by pam_sim.rollout.dispatch."""
@@ -163,3 +164,4 @@ def dispatch_source() -> str:
 
 
 hooks = generated_module('pam_hooks', dispatch_source())
+explain_with(first_mistake)

@@ -33,7 +33,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pam_sim.compiled import named_arguments
+from pam_sim.compiled import is_compiled, named_arguments
 from pam_sim.errors import InputError
 
 
@@ -132,7 +132,7 @@ HOOKS = {
 def check_hook(name: str, function: Callable[..., Any], has_states: bool,
                path: str | Path) -> None:
     """
-    Refuse a function that names arguments its hook has not.
+    Refuse a function that is not compiled, or names arguments its hook has not.
 
     Raises
     ------
@@ -140,6 +140,9 @@ def check_hook(name: str, function: Callable[..., Any], has_states: bool,
         The sentence says what the hook could name.
 
     """
+    if not is_compiled(function):
+        raise InputError(f'hook `{name}` is not compiled; write `@compiled` above `def {name}`, '
+                         'from pam_sim.compiled', str(path))
     allowed = (*HOOKS[name].arguments, *(own for own in OWN if own != 'state' or has_states))
     unknown = [one for one in named_arguments(function) if one not in allowed]
     if unknown:

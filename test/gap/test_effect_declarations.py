@@ -52,12 +52,6 @@ def test_a_name_in_a_string_would_be_seen(tmp_path):
     assert strings(tmp_path / 'one.py') == [(2, 'creep')]
 
 
-def test_look_alikes_are_effects_and_go_by_their_own_name():
-    for effect in effects().values():
-        for name in effect.fitting.limits:
-            assert effects()[name].variant_of == '' and effect.variant_of == ''
-
-
 @pytest.mark.parametrize('subsystem, given, sentence', [
     ('sensor', {}, 'of a sensor has the sensor_signal ``; write fitting=Fitting(sensor_signal=...'
      ') with one of pressure, contraction, force'),
@@ -85,16 +79,51 @@ def test_of_several_amplitudes_one_is_the_bias():
             ('first_n', 'then_n'), fitting=Fitting(**given))
 
 
-def test_fitted_ranges_lie_within_those_of_the_model_file():
-    for effect in effects().values():
-        whole = {p.name: p for p in effect.parameters}
-        for valve in effect.valves:
-            fitted = effect.free_parameters(valve)
-            assert fitted
-            for free in fitted:
-                assert whole[free.name].lower <= free.lower < free.upper
-                assert free.upper <= whole[free.name].upper
-                assert all(free.lower <= start <= free.upper for start in free.starts)
+def made_up(*free, **changed):
+    """Return an effect with one parameter from 0 to 2 N that is fitted as given."""
+    given = {'parameters': (Parameter('force_n', 'N', 1.0, 0.0, 2.0),),
+             'amplitude': ('force_n',), 'fitting': Fitting(free=free), **changed}
+    return Effect('made_up', 'friction', 'muscle', 'A test.', 'here', **given)
+
+
+@pytest.mark.parametrize('free, sentence', [
+    (FreeParameter('force_n', 1.0, 0.0, 2.0, shape=True),
+     'fits `force_n` on a logarithmic scale (shape) from 0 to 2; the range must not hold 0'),
+    (FreeParameter('force_n', 0.0, 0.0, 2.0), 'fits `force_n` with the typical size 0; write'),
+    (FreeParameter('force_n', 1.0, 0.0, 3.0), 'fits `force_n` from 0 to 3; allowed 0 to 2 N'),
+    (FreeParameter('force_n', 1.0, -1.0, 2.0), 'fits `force_n` from -1 to 2; allowed 0 to 2 N'),
+    (FreeParameter('force_n', 1.9, 0.0, 1.5), 'size or start 1.9; allowed 0 to 1.5'),
+    (FreeParameter('force_n', 1.0, 0.0, 1.5, starts=(0.5, 1.6)), 'or start 1.6; allowed 0 to 1.5'),
+    (FreeParameter('force_n', 1.0, 1.0, 1.0), 'the lower end must be below the upper one'),
+    (FreeParameter('force_n', 1.0, 0.0, 2.0, ends=('uper',)),
+     'names the end `uper` of `force_n` (did you mean `upper`?); allowed: lower, upper'),
+    (FreeParameter('force_n', 1.0, 0.0, 2.0, valves=('pr',)),
+     'names the valve `pr` for `force_n` (did you mean `ppr`?); allowed: ppr, hsv')])
+def test_a_range_that_cannot_be_fitted_is_refused(free, sentence):
+    assert made_up(FreeParameter('force_n', 1.0, 0.5, 2.0, shape=True)).fitting.free
+    with pytest.raises(InputError) as caught:
+        made_up(free)
+    assert sentence in caught.value.problem
+    assert caught.value.problem.startswith('effect `made_up` ')
+
+
+@pytest.mark.parametrize('changed, sentence', [
+    ({'parameters': (Parameter('force_n', 'N', 3.0, 0.0, 2.0),)},
+     'has the nominal force_n = 3; allowed 0 to 2 N'),
+    ({'parameters': (Parameter('force_n', 'N', 1.0, 0.0, 2.0),) * 2},
+     'has two parameters of one name'),
+    ({'parameters': (Parameter('force_n', 'N', 0.0),)}, 'with the typical size inf; write'),
+    ({'valves': ('hvs',)}, 'names the valve `hvs` (did you mean `hsv`?)')])
+def test_numbers_without_a_range_and_unknown_valves_are_refused(changed, sentence):
+    with pytest.raises(InputError) as caught:
+        made_up(**changed)
+    assert sentence in caught.value.problem
+
+
+@pytest.mark.parametrize('default, typical', [(1.0, 1.0), (-1.0, 1.0), (-4.0, -4.0), (0.0, 5e-3)])
+def test_an_amplitude_is_fitted_from_a_size_within_its_range(default, typical):
+    effect = made_up(parameters=(Parameter('force_n', 'N', default, -5.0, 2.0),))
+    assert [free.typical for free in effect.free_parameters('ppr')] == [typical]
 
 
 @pytest.mark.parametrize('fitting', (

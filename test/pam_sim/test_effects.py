@@ -241,6 +241,7 @@ def test_a_file_in_a_folder_is_a_new_effect(tmp_path):
 EFFECT_FILE = """
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect
+from pam_sim.effects.fitting import Fitting
 from pam_sim.parameters import Parameter
 EFFECT = Effect(name="ripple", family="static_map", subsystem="muscle", sentence="Ripple.",
     source="test", parameters=(Parameter("depth_n", "N", 1.0, 0.0, 10.0),),
@@ -286,6 +287,34 @@ def test_a_wrong_declaration_is_told_in_one_sentence_with_its_file(
     text = EFFECT_FILE.format(arguments='force_n, contraction_m, par')
     error = refused(tmp_path, monkeypatch, text.replace(old, new))
     assert error.problem == sentence and error.where == str(tmp_path / 'ripple.py')
+
+
+@pytest.mark.parametrize('old, new, sentence', [
+    ('source="test",', 'source="test", fitting=Fitting(limits=("creeep",)),',
+     'effect `ripple` names `creeep` in `limits` (did you mean `creep`?); allowed: '),
+    ('source="test",', 'source="test", fitting=Fitting(limits=("hysteresis_lugre",)),',
+     'effect `ripple` names `hysteresis_lugre` in `limits` (did you mean `hysteresis`?); '),
+    ('source="test",', 'source="test", fitting=Fitting(together=("nothing",)),',
+     'effect `ripple` names `nothing` in `together`; allowed: '),
+    ('source="test",', 'source="test", variant_of="tube_leg",',
+     'effect `ripple` names `tube_leg` in `variant_of` (did you mean `tube_lag`?); allowed: '),
+    ('source="test",', 'source="test", variant_of="creep", fitting=Fitting(limits=("tube_lag",)),',
+     'effect `ripple` is a formulation of `creep`, which states the `limits`; leave them out'),
+    ('source="test",', 'source="test", fitting=Fitting(same_as="mass"),',
+     'effect `ripple` names `mass` in `same_as` (did you mean `mass_kg`?); allowed: '),
+    ('def muscle_force', 'def muscel_force',
+     '`muscel_force` is no hook (did you mean `muscle_force`?); begin its name with `_` if it is '
+     'a helper'),
+    ('@compiled\ndef muscle_force', 'def load_fore', '`load_fore` is no hook (did you mean '),
+    ('def muscle_force', 'def _pulled', 'effect `ripple` has no hook, so it does nothing; write '),
+    ('@compiled', '', 'hook `muscle_force` is not compiled; write `@compiled` above `def ')])
+def test_what_would_do_nothing_or_end_a_search_is_refused(
+        tmp_path, monkeypatch, old, new, sentence):
+    text = EFFECT_FILE.format(arguments='force_n, contraction_m, par')
+    assert old in text
+    error = refused(tmp_path, monkeypatch, text.replace(old, new))
+    assert error.problem.startswith(sentence) and '\n' not in error.problem
+    assert error.where == str(tmp_path / 'ripple.py')
 
 
 @pytest.mark.parametrize('name, place', [

@@ -1,0 +1,109 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A mistake in compiled code of a user is told with file, line and numba's reason."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+EFFECT = """
+from pam_sim.compiled import compiled
+from pam_sim.effects.effect import Effect
+from pam_sim.effects.fitting import Fitting
+from pam_sim.parameters import Parameter
+EFFECT = Effect(name="drift", family="sensor", subsystem="sensor", sentence="Drift.",
+    source="test", parameters=(Parameter("drift_n", "N", 1.0, 0.0, 10.0),),
+    amplitude=("drift_n",), fitting=Fitting(sensor_signal="force", sensor_change="bias"))
+@compiled
+def sensor(pressure_pa, contraction_m, force_n, par):
+    force_n += par.drift_n
+    return pressure_pa, contraction_m, force_n
+"""
+LAW = """
+from pam_sim.compiled import compiled
+from pam_sim.muscle.law import MuscleLaw, ParameterSet
+from pam_sim.parameters import Parameter
+@compiled
+def tension_n(gauge_pa, strain, par):
+    return par.area_m2 * gauge_pa * (1.0 - strain / 0.2)
+class Line(MuscleLaw):
+    NAME, FORMULA, SOURCE, EQUATION = "line", "F = a p", "test", "none"
+    PARAMETERS = (Parameter("area_m2", "m^2", 2e-4, 1e-6, 1.0),)
+    SETS = {"one": ParameterSet({}, "nothing")}
+    def _tension_n(self, pressure, strain):
+        return self.values["area_m2"] * pressure * (1.0 - strain / 0.2)
+LAW = Line
+"""
+# All that is compiled, one after the other, as a simulation that failed does it.
+LOOK = """
+from pam_sim.rollout.mistakes import first_mistake
+print(first_mistake())
+"""
+RUN = """
+import numpy as np
+from pam_sim import InputError, load_rig
+try:
+    load_rig('dmsp_5_300_hanging_mass').simulate(np.full(9, 4.0))
+except InputError as error:
+    print(error)
+"""
+
+
+def told(folder, name, text, script):
+    """Return what a script prints with a plug-in of the user."""
+    (folder / f'{name}.py').write_text(text)
+    variable = 'PAM_MUSCLE_LAWS_PATH' if 'LAW =' in text else 'PAM_EFFECTS_PATH'
+    done = subprocess.run(
+        [sys.executable, '-c', script], capture_output=True, text=True, cwd=folder,
+        env={**os.environ, variable: str(folder), 'PYTHONPATH': os.pathsep.join(sys.path),
+             'PAM_CACHE_DIR': str(folder / 'cache')})
+    assert done.returncode == 0, done.stderr
+    return done.stdout.removesuffix('\n')
+
+
+@pytest.mark.parametrize('old, new, line, sentence', [
+    ('par.drift_n', 'par.drif_n', 11, 'hook `sensor` cannot be compiled: there is no number '
+     '`drif_n` (did you mean `drift_n`?); allowed: drift_n, steps, '),
+    ('pressure_pa, contraction_m, force_n\n', 'force_n\n', 10, 'hook `sensor` returns 1 number; '
+     'write `return pressure_pa, contraction_m, force_n` with a number for each'),
+    ('    return pressure_pa, contraction_m, force_n\n', '', 10,
+     'hook `sensor` returns nothing; write `return pressure_pa, '),
+    ('par.drift_n', 'math.exp(1.0)', 11,
+     "hook `sensor` cannot be compiled: NameError: name 'math' is not defined")])
+def test_a_mistake_in_a_hook_is_told_with_its_file(tmp_path, old, new, line, sentence):
+    assert old in EFFECT
+    found = told(tmp_path, 'drift', EFFECT.replace(old, new), LOOK)
+    assert found.startswith(f'{tmp_path / "drift.py"}:{line}: {sentence}')
+    assert '\n' not in found
+
+
+def test_a_mistake_in_a_law_is_told_with_its_file(tmp_path):
+    found = told(tmp_path, 'line', LAW.replace('par.area_m2', 'par.area'), LOOK)
+    assert found == (f'{tmp_path / "line.py"}:7: `tension_n` cannot be compiled: there is no '
+                     'number `area` (did you mean `area_m2`?); allowed: area_m2')
+
+
+@pytest.mark.slow
+def test_a_simulation_ends_with_this_sentence(tmp_path):
+    text = EFFECT.replace('pressure_pa, contraction_m, force_n\n', 'force_n\n')
+    assert told(tmp_path, 'drift', text, RUN).startswith(
+        f'{tmp_path / "drift.py"}:10: hook `sensor` returns 1 number; ')
+
+
+@pytest.mark.slow
+def test_what_ships_has_no_mistake(tmp_path):
+    assert told(tmp_path, 'drift', EFFECT, LOOK) == 'None'
