@@ -15,7 +15,9 @@
 """Find the muscle laws: every module of ``laws``, and of ``PAM_MUSCLE_LAWS_PATH``."""
 
 from functools import lru_cache
+import math
 from pathlib import Path
+import re
 from typing import Any
 
 from pam_sim.errors import InputError
@@ -24,6 +26,7 @@ from pam_sim.plugins import check_name, formula, pick, plugin_files, plugin_modu
 
 _OWN_FOLDER = Path(__file__).parent / 'laws'
 _POINT = 'gauge_pa', 'strain', 'par'
+_SIZE_IN_NAME = re.compile(r'dmsp_(\d+)(?:_|$)')
 
 
 def law_files() -> list[Path]:
@@ -39,8 +42,8 @@ def laws() -> dict[str, type[MuscleLaw]]:
     Raises
     ------
     InputError
-        A file without ``LAW``, a name that is taken, or a formula that is not compiled or has
-        other arguments.
+        A file without ``LAW``, a name that is taken, a formula that is not compiled or has other
+        arguments, or a set named after a size without its bore.
 
     """
     found: dict[str, type[MuscleLaw]] = {}
@@ -54,9 +57,21 @@ def laws() -> dict[str, type[MuscleLaw]]:
         law.COMPILED = formula(module, 'tension_n', _POINT, path)
         law.COMPILED_DAMPER = formula(
             module, 'damper_force_n', ('velocity_m_per_s', *_POINT), path)
+        _check_bores(law, path)
         places[law.NAME] = path
         found[law.NAME] = law
     return found
+
+
+def _check_bores(law: type[MuscleLaw], path: Path) -> None:
+    """Refuse a set that is named after a size of muscle and states another bore, or none."""
+    for name, one in law.SETS.items():
+        size = _SIZE_IN_NAME.match(name)
+        if size and not math.isclose(one.bore_m, 1e-3 * int(size[1])):
+            raise InputError(
+                f'the set `{name}` is named after a muscle of {size[1]} mm and has bore_m = '
+                f'{one.bore_m:g}; write bore_m={1e-3 * int(size[1]):g} or give it another name',
+                str(path))
 
 
 def get_law(name: str, where: str = '') -> type[MuscleLaw]:

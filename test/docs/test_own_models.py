@@ -29,8 +29,8 @@ import numpy as np
 from pam_actuation.experiments import load_experiment
 from pam_sim import load_rig
 
-rig = load_rig('muscle: dmsp_5_300\\nload: pendulum\\nlaw: straight\\nvalve: hsv\\n'
-               'effects: [{name: three_two_valve}]\\n')
+rig = load_rig('muscle: dmsp_5_300\\nload: own_pendulum\\nlaw: own_straight\\nvalve: hsv\\n'
+               'effects: [{name: own_three_two_valve}]\\n')
 seen = rig.simulate(np.tile([0.5, 0.0], (60, 1)), initial_pressure_pa=401325.0)
 plain = rig.with_(effects=[]).simulate(np.tile([0.5, 0.0], (60, 1)), initial_pressure_pa=401325.0)
 assert seen.pressure_pa[-1] < plain.pressure_pa[-1] - 1e3          # it vents as well
@@ -39,7 +39,7 @@ assert abs(held - 80.0 * np.sin(seen.contraction_m[0] / 0.05)) < 1e-9 and held >
 assert abs(held - 2.3e-4 * 300e3 * (1.0 - seen.contraction_m[0] / 0.3 / 0.2)) < 1e-6
 played = load_experiment('name: a\\ndescription: b\\ndomain: pressure\\nsegments:\\n'
                          '  - rest: {duration_s: 1.0}\\n'
-                         '  - sawtooth: {height_pa: 2e4, period_s: 0.5, duration_s: 2.0}\\n')
+                         '  - own_sawtooth: {height_pa: 2e4, period_s: 0.5, duration_s: 2.0}\\n')
 print(played.duration_s)
 """
 
@@ -53,6 +53,19 @@ def examples():
     return {**found, 'sawtooth': sawtooth[1]}
 
 
+def test_the_guide_names_the_tests_that_read_the_registries():
+    text = (GUIDES / 'own_models.md').read_text(encoding='utf-8')
+    named = re.search("make test ARGS='(.*)'", text)[1].split()
+    assert all((ROOT / one).exists() for one in named)
+    every = re.compile(
+        r'(effects|laws)\(\)(\)|\.items|\.values)|in (effects|laws)\(\)|LOADS\.items')
+    readers = [path.relative_to(ROOT) for path in sorted((ROOT / 'test').rglob('test_*.py'))
+               if every.search(path.read_text(encoding='utf-8'))]
+    assert len(readers) > 9
+    assert [str(path) for path in readers
+            if not any(path.is_relative_to(one) for one in named)] == []
+
+
 def test_the_examples_of_the_guides_work_together(tmp_path):
     files = examples()
     assert set(files) == set(FOLDERS)
@@ -62,7 +75,9 @@ def test_the_examples_of_the_guides_work_together(tmp_path):
     for name, variable in FOLDERS.items():
         folder = tmp_path / name
         folder.mkdir()
-        (folder / f'{name}.py').write_text(files[name], encoding='utf-8')
+        # A name that is free, should the example stand in the package.
+        text = files[name].replace(f"'{name}'", f"'own_{name}'")
+        (folder / f'own_{name}.py').write_text(text, encoding='utf-8')
         environment[variable] = str(folder)
     done = subprocess.run([sys.executable, '-c', USE], capture_output=True, text=True,
                           cwd=tmp_path, env=environment)

@@ -181,10 +181,11 @@ def test_pulses_begin_each_interval_and_end_at_the_base():
 
 
 def test_the_file_that_the_guide_shows_is_a_primitive(tmp_path):
-    (tmp_path / 'sawtooth.py').write_text(re.search('```python\n(.*?)```', GUIDE, re.S)[1])
+    # A name that is free, should the example stand in the package.
+    (tmp_path / 'own_sawtooth.py').write_text(re.search('```python\n(.*?)```', GUIDE, re.S)[1])
     code = ('from pam_actuation.experiments.primitives import PRIMITIVES, make_primitive\n'
             'keys = {"height_m": 0.003, "period_s": 1.0, "duration_s": 3.0}\n'
-            'print(make_primitive("sawtooth", keys, 0.0, 0.0, "m").at(1.5)[0])')
+            'print(make_primitive("own_sawtooth", keys, 0.0, 0.0, "m").at(1.5)[0])')
     done = subprocess.run(
         [sys.executable, '-c', code], capture_output=True, text=True,
         env={**os.environ, 'PAM_PRIMITIVES_PATH': str(tmp_path)})
