@@ -86,7 +86,7 @@ def rollouts() -> None:
     found = rig.simulate(np.zeros(ROWS))
     reading, = rig.with_(effects=[
         {'name': 'force_reading_term', 'parameters': {'first_of_1': 1.0}}]).effects
-    with_terms(found.outputs, 'force', reading.parameters, rig.parameters)
+    with_terms(found.outputs, 'force', reading.parameters, rig)
     follow(*np.zeros((3, ROWS)))
     make_law('lookup').formula_n(3e5, 0.1)
     mean_openings_with_lift(np.zeros(ROWS), 0.01, 0.0, 0.0, 0.0, 0.0, np.empty(ROWS))

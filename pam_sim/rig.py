@@ -322,6 +322,10 @@ class Rig:
         return (self.parameters['mass_kg'] * GRAVITY_M_PER_S2
                 + self.parameters['spring_n_per_m'] * contraction_m)
 
+    def force_at_start_n(self, contraction_m: float) -> float:
+        """Return the force [N] that a free load asks for at rest; 0 of one that is held."""
+        return 0.0 if self.is_driven else self.tension_n(contraction_m)
+
     def force_of_motion_n(self, contraction_m: FloatArray, velocity_m_per_s: FloatArray,
                           acceleration_m_per_s2: FloatArray) -> FloatArray:
         """

@@ -61,7 +61,8 @@ def pack_rig(rig: 'Rig', dt_s: float, initial_pressure_pa: float,
     if initial_contraction_m is None and LOADS[rig.load].MOVES_FREELY:
         rest_m = kernel.entries_for(par).rest_contraction(numbers.pressure_pa, state, par)
         if rest_m != numbers.contraction_m:         # effects start from where the load rests
-            numbers = numbers._replace(contraction_m=rest_m)
+            numbers = numbers._replace(
+                contraction_m=rest_m, force_n=rig.force_at_start_n(rest_m))
             put_some(state, layout.STATE, {'contraction_m': rest_m})
             _pack_effects(rig, numbers, state, par)
     kernel.entries_for(par).settle(state, par)
@@ -109,13 +110,7 @@ def _numbers(rig: 'Rig', dt_s: float, pressure: float, contraction: float | None
         float(dt_s), _substep(rig, dt_s), rig.valve,
         rig.fidelity if rig.valve == 'hsv' else 'averaged',
         {**value, 'p_atm': P_ATM_PA}, tuple(map(float, signal)),
-        float(pressure), float(contraction), _force_at_start(rig, contraction), rig.muscle)
-
-
-def _force_at_start(rig: 'Rig', contraction_m: float) -> float:
-    if has_force(LOADS[rig.load]):
-        return rig.tension_n(contraction_m)
-    return rig.parameters.get('mass_kg', 0.0) * GRAVITY_M_PER_S2
+        float(pressure), float(contraction), rig.force_at_start_n(contraction), rig.muscle)
 
 
 def _substep(rig: 'Rig', dt_s: float) -> float:

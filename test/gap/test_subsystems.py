@@ -173,17 +173,20 @@ def test_noise_with_a_memory_is_measured_where_the_signal_rests():
 
 
 @pytest.mark.parametrize('signal, size', [('contraction', 1e-4), ('force', 1.0)])
-@pytest.mark.parametrize('kind, of, shape', [
-    (terms.STOP, 1, 2e-4), (terms.SINE, 1, 3e-3), (terms.PASSING, 0, 0.02), (terms.LINEAR, 3, 1.0),
-    (terms.SIGNED_SQUARE, 2, 1.0)])
-def test_terms_of_a_reading_are_those_of_a_simulation(signal, size, kind, of, shape):
+@pytest.mark.parametrize('kind, of, shape, spring_n_per_m', [
+    (terms.STOP, 1, 2e-4, 0.0), (terms.SINE, 1, 3e-3, 0.0), (terms.PASSING, 0, 0.02, 0.0),
+    (terms.LINEAR, 3, 1.0, 0.0), (terms.SIGNED_SQUARE, 2, 1.0, 0.0),
+    (terms.PASSING, 2, 0.02, 2000.0)])
+def test_terms_of_a_reading_are_those_of_a_simulation(
+        signal, size, kind, of, shape, spring_n_per_m):
     effect = {'name': f'{signal}_reading_term', 'parameters': {
         'first_of_1': size, 'kind_1_of_1': kind, 'input_1_of_1': of, 'shape_1_of_1': shape}}
-    rig = nominal().with_(parameters={'contraction_zero_m': 1e-4, 'force_zero_n': 0.3})
+    rig = nominal().with_(parameters={'contraction_zero_m': 1e-4, 'force_zero_n': 0.3,
+                                      'spring_n_per_m': spring_n_per_m})
     volts = 3.0 + np.sin(np.arange(2000) * 5e-3)
     whole, bare = (one.simulate(volts, initial_pressure_pa=401325.0)
                    for one in (rig.with_(effects=[effect]), rig))
-    read, = (with_terms(bare.outputs, signal, one.parameters, rig.parameters)
+    read, = (with_terms(bare.outputs, signal, one.parameters, rig)
              for one in rig.with_(effects=[effect]).effects)
     wanted, without = (getattr(one, FIELD[signal]) for one in (whole, bare))
     np.testing.assert_allclose(read, wanted, rtol=0, atol=1e-12 * np.abs(wanted).max())

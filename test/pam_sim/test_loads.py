@@ -24,6 +24,7 @@ from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.load import LOADS
 from pam_sim.load.registry import find_loads
+from pam_sim.rollout import packing
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -55,6 +56,7 @@ import numpy as np
 from pam_actuation.drivers.for_rig import driver_config
 from pam_sim import load_rig
 from pam_sim.catalogue import catalogue, find
+from pam_sim.rollout import packing
 
 wall = load_rig('muscle: dmsp_5_300\\nload: wall\\n')
 same = load_rig('dmsp_5_300_hanging_mass').with_(parameters={'spring_n_per_m': 400.0})
@@ -69,6 +71,10 @@ pressures = np.array([301325.0, 401325.0, 701325.0])
 free, met = same.with_(parameters={'spring_n_per_m': 0.0}), gap.static_contraction_m(pressures)
 np.testing.assert_allclose(met[:2], free.static_contraction_m(pressures[:2]), atol=1e-9)
 assert 0.02 < met[2] < 0.022 < free.static_contraction_m(pressures[2])
+numbers = []
+packing._pack_effects = lambda rig, found, *rest: numbers.append(found)
+gap.pack(initial_pressure_pa=pressures[2])
+assert numbers[-1].force_n == gap.tension_n(numbers[-1].contraction_m) > 49.1
 settled = gap.simulate(volts[:1], initial_pressure_pa=pressures[2])
 assert abs(settled.contraction_m[0] - met[2]) < 1e-9
 motion = np.array([0.01, 0.021]), np.zeros(2), np.array([1.0, 0.0])
@@ -99,6 +105,19 @@ def test_the_cell_reads_what_the_motion_of_mass_and_spring_asks_for():
         seen.contraction_m, seen.velocity_m_per_s, seen.acceleration_m_per_s2)
     assert np.ptp(seen.contraction_m) > 1e-3
     np.testing.assert_allclose(seen.force_n, asked, atol=1e-9)
+
+
+def test_effects_start_from_the_force_that_the_load_asks_for(monkeypatch):
+    seen = []
+    monkeypatch.setattr(packing, '_pack_effects', lambda rig, numbers, *rest: seen.append(numbers))
+    rig = load_rig('dmsp_5_300_hanging_mass').with_({'spring_n_per_m': 2000.0})
+    rig.pack(initial_contraction_m=0.012)
+    assert seen[-1].force_n == rig.tension_n(0.012) == pytest.approx(73.03, abs=5e-3)
+    rig.pack(initial_pressure_pa=501325.0)              # where it rests
+    assert seen[-1].contraction_m > 0.004
+    assert seen[-1].force_n == rig.tension_n(seen[-1].contraction_m)
+    load_rig('dmsp_5_300_driven').pack(initial_contraction_m=0.012)
+    assert seen[-1].force_n == 0.0
 
 
 def test_a_load_in_a_folder_of_the_user_moves_a_rig(tmp_path):

@@ -20,7 +20,7 @@ them, ``with_terms``.
 """
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
 from pam_sim.annotations import FloatArray
@@ -31,7 +31,10 @@ from pam_sim.effects.unnamed import terms
 from pam_sim.records import columns, part, values_of
 from pam_sim.rollout import layout
 from pam_sim.rollout.layout import OUTPUT
-from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
+from pam_sim.units import P_ATM_PA
+
+if TYPE_CHECKING:
+    from pam_sim.rig import Rig
 
 INPUTS = (terms.PRESSURE, terms.CONTRACTION, terms.READ_FORCE, terms.TIME)
 READING = 0
@@ -80,7 +83,7 @@ def remember(pressure_pa: float, contraction_m: float, force_n: float, dt_s: flo
 
 
 def with_terms(outputs: FloatArray, signal: str, values: Mapping[str, float],
-               parameters: Mapping[str, float]) -> FloatArray:
+               rig: 'Rig') -> FloatArray:
     """
     Return the readings of a signal with the terms, from a simulation without them.
 
@@ -92,8 +95,8 @@ def with_terms(outputs: FloatArray, signal: str, values: Mapping[str, float],
         Which reading.
     values : dict
         All parameters of the stand-in.
-    parameters : dict
-        Those of the rig that was simulated.
+    rig : pam_sim.Rig
+        The one that was simulated.
 
     """
     seen = columns(outputs, OUTPUT)
@@ -101,10 +104,10 @@ def with_terms(outputs: FloatArray, signal: str, values: Mapping[str, float],
     par = values_of(terms.PACKED, terms.packed_of(INPUTS, values))
     state = values_of(terms.STATES, terms.memory_of(values, (
         seen['true_pressure_pa'][0] - P_ATM_PA, seen['true_contraction_m'][0],
-        parameters.get('mass_kg', 0.0) * GRAVITY_M_PER_S2, 0.0, 0.0)))
+        rig.force_at_start_n(seen['true_contraction_m'][0]), 0.0, 0.0)))
     # What terms read is without the zeros of the sensors.
-    _add_terms(outputs, parameters['pressure_zero_pa'], parameters['contraction_zero_m'],
-               parameters['force_zero_n'], state, par, read)
+    _add_terms(outputs, rig.parameters['pressure_zero_pa'], rig.parameters['contraction_zero_m'],
+               rig.parameters['force_zero_n'], state, par, read)
     return read
 
 

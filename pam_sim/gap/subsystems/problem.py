@@ -248,7 +248,7 @@ class SubsystemProblem:
                 outputs, column = response.outputs, COLUMNS[FIELD[name]]
                 if name in added:
                     outputs, column = with_terms(
-                        outputs, name, added[name].parameters, rig.parameters)[:, np.newaxis], 0
+                        outputs, name, added[name].parameters, rig)[:, np.newaxis], 0
                 found.append(np.empty(row.size))
                 sample_into(outputs, column, row, ahead, found[-1])
         return np.concatenate(found)
