@@ -56,6 +56,15 @@ def emit(args: argparse.Namespace, payload: dict[str, Any], text: str) -> None:
     print(json.dumps(payload, indent=2, default=str) if args.json else text)
 
 
+def read_line(question: str) -> str:
+    """Return the line with which a person at a terminal answers; InputError after Ctrl-D."""
+    try:
+        return input(question)
+    except EOFError:
+        from pam_sim.errors import InputError
+        raise InputError('the answers ended before the questions; nothing was written') from None
+
+
 def effect_names(args: argparse.Namespace) -> list[str]:
     """
     Return the effects that ``--effects`` lists, none without the option.

@@ -20,7 +20,7 @@ import sys
 from typing import Any, TYPE_CHECKING
 
 from pam_actuation.cli.common import (
-    add_overwrite_option, emit, EXIT_DONE, EXIT_FINDING, progress)
+    add_overwrite_option, emit, EXIT_DONE, EXIT_FINDING, progress, read_line)
 from pam_actuation.cli.options import count, number, out_path, Parser, source
 
 if TYPE_CHECKING:
@@ -165,7 +165,7 @@ def _asked(text: str, answers: tuple[str, ...]) -> str | None:
     more = ', where the zero may be another' if any(map(zero.search, answers)) else ''
     print(f'{text}\n  one of: {", ".join(answers)}{more}; Enter leaves the column out')
     while True:
-        said = input('> ').strip()
+        said = read_line('> ').strip()
         if not said:
             return None
         if zero.sub('', said) in [zero.sub('', one) for one in answers]:

@@ -19,7 +19,7 @@ import sys
 from typing import Any, TYPE_CHECKING
 
 from pam_actuation.cli.common import (
-    add_overwrite_option, check_outputs, emit, EXIT_DONE)
+    add_overwrite_option, check_outputs, emit, EXIT_DONE, read_line)
 from pam_actuation.cli.options import number, out_path, Parser, source
 
 if TYPE_CHECKING:
@@ -105,7 +105,7 @@ def _new(args: argparse.Namespace) -> int:
     check_outputs(args, args.out)
     described = _described(args)
     if _nothing_said(args) and not args.json and sys.stdin.isatty() and sys.stdout.isatty():
-        described = ask_description(_read_line, print)
+        described = ask_description(read_line, print)
     with _force_map(args) as (table, remarks):
         described.force_map = table or described.force_map
         if table is not None:
@@ -133,14 +133,6 @@ def _force_map(args: argparse.Namespace
     length_m, bore_m = (None if mm is None else round(1e-3 * mm, 12)
                         for mm in (args.length_mm, args.bore_mm))
     return force_map_of(args.force_map, length_m, bore_m, args.out, args.overwrite)
-
-
-def _read_line(question: str) -> str:
-    try:
-        return input(question)
-    except EOFError:
-        from pam_sim.errors import InputError
-        raise InputError('the answers ended before the questions; nothing was written') from None
 
 
 def _following(rig: 'Rig', out: str) -> str:

@@ -325,6 +325,21 @@ def test_a_question_on_a_terminal_is_asked(tmp_path, monkeypatch, capsys):
                                   load_run('again')['pressure']['pressure_pa'])
 
 
+def test_the_end_of_the_answers_is_a_sentence(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path('a.csv').write_text('t_s,pressure\n' + ''.join(
+        f'{0.01 * k:.2f},{0.02 * k:.2f}\n' for k in range(200)), encoding='utf-8')
+    for stream in ('stdin', 'stdout'):
+        monkeypatch.setattr(f'sys.{stream}.isatty', lambda: True)
+
+    def ended(_):
+        raise EOFError
+    monkeypatch.setattr('builtins.input', ended)
+    assert main(['import', 'a.csv', '--out', 'bag']) == 2
+    assert 'the answers ended before the questions' in capsys.readouterr().err
+    assert not Path('bag').exists()
+
+
 @pytest.mark.skipif(not DATA.is_dir(), reason='measurements of others are not at hand')
 @pytest.mark.parametrize('file, options, topics', [
     ('dmsp10_250_steps_and_loop/steps_100hz.csv', [], {'pressure', 'contraction', 'valve_signal'}),
