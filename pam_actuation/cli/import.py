@@ -26,6 +26,7 @@ from pam_actuation.cli.options import count, number, out_path, Parser, source
 if TYPE_CHECKING:
     from pam_actuation.tables.guess import Guess
     from pam_actuation.tables.importer import Recording
+    from pam_actuation.tables.questions import Question
     from pam_actuation.tables.table import Table
 
 HELP = """Make a bag of a table measured elsewhere: CSV, Excel, LabVIEW, MAT, or a foreign bag.
@@ -158,19 +159,15 @@ def _move(bar: Any, done: int, share: float) -> None:
     bar.update(done + share - bar.n)
 
 
-def _asked(text: str, answers: tuple[str, ...]) -> str | None:
+def _asked(question: 'Question') -> str | None:
     """Ask a person; return the answer, None to leave the column out."""
-    import re
-    zero = re.compile('zero=[^:]*')
-    more = ', where the zero may be another' if any(map(zero.search, answers)) else ''
-    print(f'{text}\n  one of: {", ".join(answers)}{more}; Enter leaves the column out')
-    while True:
-        said = read_line('> ').strip()
-        if not said:
-            return None
-        if zero.sub('', said) in [zero.sub('', one) for one in answers]:
+    print(f'{question.text}\n  {question.choice()}; Enter leaves the column out')
+    while said := read_line('> ').strip():
+        refusal = question.refusal(said)
+        if not refusal:
             return said
-        print(f'  {said!r} is not one of them')
+        print(f'  {refusal}')
+    return None
 
 
 def _show(args: argparse.Namespace, tables: 'list[Table]', found: 'Guess') -> int:

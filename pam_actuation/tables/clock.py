@@ -24,7 +24,7 @@ from pam_actuation.tables.dates import Dates, dates_of, days_as_ns
 from pam_actuation.tables.mapping import TableMapping, TimeMap
 from pam_actuation.tables.signals import TIME_WORDS
 from pam_actuation.tables.table import Table
-from pam_actuation.tables.units import DATE, FACTORS, TIME, unit_of_text
+from pam_actuation.tables.units import DATE, FACTORS, is_output, TIME, unit_of_text
 from pam_actuation.tables.words import unit_in, words_of
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.errors import InputError
@@ -79,6 +79,8 @@ def time_column(table: Table, mapping: TableMapping) -> TimeMap | None:
         return mapping.time
     found = [name for name in table.columns if re.fullmatch(TIME_WORDS, words_of(name))]
     exact = [name for name in found if name.endswith('stamp_ns')]
+    found = [name for name in found if not is_output(          # `t_s` goes before `t_ticks`
+        table.units.get(name, '') or unit_in(name), TIME)] or found
     if not found and _rises_without_name(table, mapping):
         found = [next(iter(table.columns))]
     return TimeMap((exact or found)[0]) if found else None

@@ -22,13 +22,15 @@ import numpy as np
 from pam_actuation.tables.lengths import length_column, LengthColumn
 from pam_actuation.tables.mapping import column_of_text, ColumnMap, TableMapping
 from pam_actuation.tables.parts import is_length_of_muscle, kind_of_pressure
+from pam_actuation.tables.questions import (
+    needs_gain, of_output_column, Question, which_of)
 from pam_actuation.tables.signals import (
     ANGLES, are_of_joint, BY_NAME, of_words, Signal, TIME_WORDS)
 from pam_actuation.tables.table import Table
 from pam_actuation.tables.units import (
     ABSOLUTE, ANGLE, checked_unit, FACTORS, GAUGE, LENGTH, names_of, PRESSURE, si_unit, Unit,
     unit_of_text, VOLTAGE)
-from pam_actuation.tables.words import unit_in, words_of
+from pam_actuation.tables.words import path_and_name, unit_in, words_of
 from pam_sim.annotations import BoolArray, FloatArray
 from pam_sim.units import P_ATM_PA
 
@@ -36,34 +38,6 @@ BELOW_ATMOSPHERE = 0.9            # of it: no muscle on a rig is evacuated furth
 # What names of other programs end in that says only where in a message the number stands.
 _PLACE = re.compile(r'(?<=.)/(data|value|[xyz])([.\[]\d+\]?)?$')
 FEW_BELOW = 0.02                  # share of the rows; fewer may be a sensor that drops out
-
-
-@dataclass(frozen=True)
-class Question:
-    """
-    What the file does not say of a column that seems to be a signal.
-
-    Parameters
-    ----------
-    signal, column : str
-        Which is meant; the column is '' where several could be the signal.
-    text : str
-        The question, in one sentence.
-    answers : tuple of str
-        Units among which to choose, as after the column in ``--map``; of several columns
-        ``COLUMN:UNIT``.
-
-    """
-
-    signal: str
-    column: str
-    text: str
-    answers: tuple[str, ...]
-
-    def options(self) -> str:
-        """Return the words of the command line that answer it, one of them for each answer."""
-        column = f'{self.column}:' if self.column else ''
-        return ' or '.join(f'--map {self.signal}="{column}{unit}"' for unit in self.answers)
 
 
 @dataclass
@@ -135,8 +109,12 @@ def guess(tables: Collection[Table], mapping: TableMapping,
         else:
             signals[name], found.told[name] = chosen
     found.mapping = replace(mapping, signals=signals)
-    if not joint and 'contraction' not in {*signals, *seen}:
-        found.questions += _of_lengths(tables, found.mapping, missing)
+    measured = {name for name, of_name in seen.items() if not all(
+        map(_is_output, of_name.values()))}
+    if not joint and 'contraction' not in {*signals, *measured} and (
+            lengths := _of_lengths(tables, found.mapping, missing)):
+        found.questions = [one for one in found.questions if one.signal != 'contraction']
+        found.questions += lengths
     return found
 
 
@@ -148,7 +126,7 @@ def _of_lengths(tables: Collection[Table], mapping: TableMapping, missing: Colle
     lengths: dict[str, LengthColumn] = {}
     for table in tables:
         for column in table.columns:
-            words = words_of(_name_of(table, column).rpartition('/')[2])
+            words = words_of(path_and_name(_name_of(table, column))[1])
             if (id(table), column) in used or not is_length_of_muscle(words) or (
                     table.begins_with_text(column)):
                 continue
@@ -170,18 +148,20 @@ def _chosen(name: str, candidates: dict[str, tuple[ColumnMap, str] | Question]
             ) -> tuple[ColumnMap, str] | Question:
     """Return the one column that is a signal, or the question which of several is."""
     exported = [one for column, one in candidates.items() if _is_exported(column, BY_NAME[name])]
+    measured = {column: one for column, one in candidates.items() if not _is_output(one)}
+    candidates = measured or candidates
     if exported or len(candidates) == 1:
         return exported[0] if exported else next(iter(candidates.values()))
-    answers = []
-    for column, one in candidates.items():
-        units = one.answers[:2] if isinstance(one, Question) else (one[0].unit.name,)
-        answers += [f'{column}:{unit}' for unit in units]
-    columns = ' and '.join(f'"{column}"' for column in candidates)
-    return Question(name, '', f'columns {columns} could each be the {BY_NAME[name].meaning}: '
-                    'which one?', tuple(answers))
+    return which_of(BY_NAME[name], [
+        (column, one.answers if isinstance(one, Question) else (one[0].unit.name,))
+        for column, one in candidates.items()])
 
 
-def ask(found: Guess, answer: Callable[[str, tuple[str, ...]], str | None]) -> Guess:
+def _is_output(one: tuple[ColumnMap, str] | Question) -> bool:
+    return isinstance(one, Question) and one.is_output
+
+
+def ask(found: Guess, answer: Callable[[Question], str | None]) -> Guess:
     """
     Return the guess with the questions answered; None as an answer leaves the signal out.
 
@@ -190,12 +170,12 @@ def ask(found: Guess, answer: Callable[[str, tuple[str, ...]], str | None]) -> G
     found : Guess
         With questions.
     answer : callable
-        Returns one of the answers to a question's text, or None.
+        Returns an answer that the question does not refuse, or None.
 
     """
     signals, told = dict(found.mapping.signals), dict(found.told)
     for question in found.questions:
-        said = answer(question.text, question.answers)
+        said = answer(question)
         if said:
             column = f'{question.column}:' if question.column else ''
             signals[question.signal] = column_of_text(
@@ -224,7 +204,7 @@ def unit_of_column(table: Table, column: str) -> str:
 
 def _signal_of(column: str, unit: str) -> Signal | None:
     """Return the signal that the name of a column and its unit mean."""
-    path, _, name = column.rpartition('/')
+    path, name = path_and_name(column)
     return next((signal for signal in BY_NAME.values() if _is_exported(column, signal)),
                 None) or of_words(words_of(name), path, unit)
 
@@ -242,14 +222,17 @@ def _of_column(table: Table, column: str, signal: Signal, missing: Collection[st
         return ColumnMap(column, si), f'unit {si.name} by name'
     text = unit_of_column(table, column)
     unit = unit_of_text(text, signal.quantity) if text else None
-    if unit is None and text and any(unit_of_text(text, one) for one in FACTORS):
-        return None                                     # such as a pressure sensor's volts
+    is_output = unit is None and bool(text) and needs_gain(text, signal.quantity)
+    if unit is None and not is_output and any(unit_of_text(text, one) for one in FACTORS):
+        return None                                     # of another quantity
     values = table.numbers(column, missing)
     finite = values[np.isfinite(values)]
     if not len(finite):
         return None
     low, high = float(finite.min()), float(finite.max())
     shown = f'column "{column}", {low:.4g} to {high:.4g}, seems to be the {signal.meaning}'
+    if unit is None and text:
+        return of_output_column(signal, column, shown, text)
     if unit is None:
         return Question(signal.name, column, f'{shown}: in which unit?',
                         tuple(_plausible(signal, low, high)))

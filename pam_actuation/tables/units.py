@@ -51,6 +51,18 @@ _OTHER_NAMES = {'µm': 'um', 'μm': 'um', 'µs': 'us', 'μs': 'us', 'sec': 's', 
 _OUTPUTS = {'mA': (4.0, 16.0), 'V': (0.0, 10.0), 'mV': (0.0, 20.0)}
 _SPANS = {PRESSURE: (10.0, 'bar_gauge'), LENGTH: (100.0, 'mm'), FORCE: (1000.0, 'N'),
           ANGLE: (180.0, 'deg')}
+# Steps of encoders and converters, in several languages. A name may end in the first of them.
+_STEPS = set('counts cts ticks pulses increments inkremente impulse digits lsb'.split())
+_OTHER_STEPS = set("""
+    count cnt cnts ct tick pulse pls puls pulser inc incs incr increment ink inkr inkrement
+    impulsen imp imps impulsions impulsion impulsi impulsos impulsy импульсы incrementen
+    incrementi incrementos incremente inkrementy inkrement digit dig lsbs raw roh rohwert rohwerte
+    brut grezzo crudo adc adu bit bits step steps stap stappen schritt schritte pas pasos passi
+    strich striche code codes dn au a.u. cuentas conteos conteggi punkte points edges
+    a ua hz khz uv mv/v v/v uv/v ohm kohm pf""".split())
+# What is left to be filled in, in the answer to a question.
+ZERO, GAIN = 'ZERO', 'GAIN'
+_FILLED = {PRESSURE: 'bar_gauge', LENGTH: 'mm', FORCE: 'N', ANGLE: 'deg', VOLTAGE: 'V', DUTY: '%'}
 
 
 @dataclass(frozen=True)
@@ -132,14 +144,50 @@ def checked_unit(text: str, quantity: str, where: str) -> Unit:
 
 
 def of_output(text: str, quantity: str) -> str:
-    """Return how the output of a sensor, in V or mA, is mapped; '' where the unit is another."""
+    """Return how the output of a sensor, such as V, is mapped; '' where the unit is another."""
+    if not is_output(text, quantity) or quantity not in _SPANS:
+        return ''
+    return (f'{text} is what a sensor puts out: state the unit of what it measures, with zero '
+            f'and gain, such as COLUMN:{example_of(text, quantity) or form_of(quantity)}')
+
+
+def example_of(text: str, quantity: str) -> str:
+    """Return how an output of a usual range is mapped, such as 4 to 20 mA; '' for others."""
     if text not in _OUTPUTS or quantity not in _SPANS:
         return ''
     (zero, wide), (span, unit) = _OUTPUTS[text], _SPANS[quantity]
     begin = f':zero={zero:g}' if zero else ''
-    return (f'{text} is what a sensor puts out: state the unit of what it measures, with zero '
-            f'and gain, such as COLUMN:{unit}{begin}:gain={span / wide:g} for {span:g} '
+    return (f'{unit}{begin}:gain={span / wide:g} for {span:g} '
             f'{unit.partition("_")[0]} over {zero:g} to {zero + wide:g} {text}')
+
+
+def is_output(text: str, quantity: str) -> bool:
+    """Return whether a text names what sensors put out, such as mA, and no unit of a quantity."""
+    return unit_of_text(text, quantity) is None and (
+        text in _OUTPUTS or _flat(text) in _STEPS | _OTHER_STEPS)
+
+
+def ends_a_name(text: str) -> bool:
+    """Return whether a text without brackets is the output of a sensor, as in ``p_mA``."""
+    return text == 'mA' or _flat(text) in _STEPS        # `x_ma` may be an average
+
+
+def form_of(quantity: str) -> str:
+    """Return unit, zero and gain of an output of a sensor, to be filled in."""
+    return f'{filled_unit(quantity)}:zero={ZERO}:gain={GAIN}'
+
+
+def filled_unit(quantity: str) -> str:
+    """Return the unit that stands in ``form_of``."""
+    return _FILLED[quantity]
+
+
+def _flat(text: str) -> str:
+    """Return a text in lower case, without accents and brackets; µ and Ω spelled out."""
+    flat = text.strip().strip('[]()').strip().lower()
+    for one, spelled in (('µ', 'u'), ('μ', 'u'), ('ω', 'ohm'), ('é', 'e'), ('ä', 'ae')):
+        flat = flat.replace(one, spelled)
+    return flat
 
 
 def si_unit(quantity: str) -> Unit:

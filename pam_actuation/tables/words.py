@@ -18,7 +18,7 @@ import re
 import unicodedata
 
 from pam_actuation.tables.languages import in_english
-from pam_actuation.tables.units import FACTORS, unit_of_text
+from pam_actuation.tables.units import ends_a_name, FACTORS, unit_of_text
 
 _BRACKETS = re.compile(r'(?!(?<=\w)\[\d+\])[\[(]([^\])]*)[\])]\s*$')     # `data[1]` has no unit
 
@@ -32,10 +32,16 @@ def unit_in(name: str) -> str:
     parts = re.split(r'[_\s.,/]+', name.strip())
     for count in (2, 1):                    # bar_gauge, then bar
         text = '_'.join(parts[-count:])
-        if len(parts) > count and text not in ('1', '-') and any(
-                unit_of_text(text, one) for one in FACTORS):
+        if len(parts) > count and text not in ('1', '-') and (ends_a_name(text) or any(
+                unit_of_text(text, one) for one in FACTORS)):
             return text
     return ''
+
+
+def path_and_name(column: str) -> tuple[str, str]:
+    """Return what stands before the last stroke, and after it; one in a unit is none."""
+    place = _BRACKETS.sub('', column).rfind('/')
+    return column[:max(place, 0)], column[place + 1:]
 
 
 def words_of(name: str) -> str:

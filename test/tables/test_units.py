@@ -59,7 +59,14 @@ def test_the_output_of_a_sensor_is_no_unit_of_what_it_measures(text, quantity, o
     assert 'did you mean' not in str(error.value)
 
 
+@pytest.mark.parametrize('text', ['counts', 'Ticks', 'Inkremente', 'Ink', 'digits', 'LSB', 'mV/V'])
+def test_the_steps_of_an_encoder_are_no_unit(text):
+    with pytest.raises(InputError, match='such as COLUMN:mm:zero=ZERO:gain=GAIN'):
+        checked_unit(text, 'length', 'here')
+
+
 @pytest.mark.parametrize('name, unit, words', [
+    ('Encoder_counts', 'counts', 'encoder'), ('p_mA', 'mA', 'p'), ('x_ma', '', 'x ma'),
     ('p_bar', 'bar', 'p'), ('Pressure [kPa gauge]', 'kPa gauge', 'pressure'),
     ('t_nominal_s', 's', 't nominal'), ('Force (N)', 'N', 'force'), ('time', '', 'time'),
     ('p_kpa_gauge', 'kpa_gauge', 'p'), ('loadCell', '', 'load cell'),

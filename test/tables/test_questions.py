@@ -1,0 +1,114 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Columns whose unit is none of the signal: what is asked, and which answers are admitted."""
+
+import numpy as np
+from pam_actuation.bags.load import load_run
+from pam_actuation.cli.main import main
+from pam_actuation.tables.guess import guess
+from pam_actuation.tables.mapping import TableMapping
+from pam_actuation.tables.preview import question_sentence
+from pam_actuation.tables.table import Table
+import pandas as pd
+import pytest
+
+PLACES = np.arange(200) % 9
+
+
+def guessed(*columns, values=None):
+    """Return what is guessed of a table with columns of these names."""
+    return guess([Table('m.csv', {'t_s': pd.Series(0.01 * np.arange(200)), **{
+        name: pd.Series(PLACES if values is None else values) for name in columns}})],
+        TableMapping())
+
+
+@pytest.mark.parametrize('column, signal, answer', [
+    ('Encoder [counts]', 'contraction', 'mm:zero=ZERO:gain=GAIN'),
+    ('Encoder_ticks', 'contraction', 'mm:zero=ZERO:gain=GAIN'),
+    ('Weg (Ink)', 'contraction', 'mm:zero=ZERO:gain=GAIN'),
+    ('x [V]', 'contraction', 'mm:zero=ZERO:gain=GAIN'),
+    ('Position [xyz]', 'contraction', 'mm:zero=ZERO:gain=GAIN'),
+    ('p [mA]', 'pressure', 'bar_gauge:zero=ZERO:gain=GAIN'),
+    ('p_mA', 'pressure', 'bar_gauge:zero=ZERO:gain=GAIN'),
+    ('Druck [Digits]', 'pressure', 'bar_gauge:zero=ZERO:gain=GAIN'),
+    ('Kraft [mV/V]', 'force', 'N:zero=ZERO:gain=GAIN'),
+    ('F [%]', 'force', 'N:zero=ZERO:gain=GAIN'),
+    ('u [counts]', 'ppr_voltage', 'V:zero=ZERO:gain=GAIN'),
+    ('Kontraktion [%]', 'contraction', 'mm:gain=GAIN'), ('x [-]', 'contraction', 'mm:gain=GAIN')])
+def test_a_unit_that_is_none_of_the_signal_needs_a_gain(column, signal, answer):
+    question, = guessed(column).questions
+    assert (question.signal, question.answers) == (signal, (answer,))
+
+
+def test_what_the_question_says():
+    said = question_sentence(guessed('Encoder [counts]'))
+    assert 'in counts, which is no unit of a length' in said and 'mm is one step' in said
+    said = question_sentence(guessed('p [mA]'))
+    assert 'zero=4:gain=0.625 for 10 bar over 4 to 20 mA' in said
+    assert '1/100 of that length, in mm' in question_sentence(guessed('Kontraktion [%]'))
+    assert 'state one in place of' in question_sentence(guessed('x (left)'))
+
+
+def test_a_column_with_a_unit_goes_before_the_output_of_a_sensor():
+    found = guessed('x_mm', 'Encoder [counts]', 'p [V]', 'p_bar_gauge', 'p [mm]')
+    assert not found.questions
+    assert {one.column for one in found.mapping.signals.values()} == {'x_mm', 'p_bar_gauge'}
+    question, = guessed('x [V]', 'Länge [mm]', values=200 - PLACES).questions
+    assert question.column == 'Länge [mm]'
+    question, = guessed('x [V]', 'Encoder [counts]').questions
+    assert question.answers == ('x [V]:mm:zero=ZERO:gain=GAIN',
+                                'Encoder [counts]:mm:zero=ZERO:gain=GAIN')
+
+
+@pytest.mark.parametrize('column, said, why', [
+    ('x [counts]', 'mm:zero=10:gain=0.005', ''), ('x [counts]', 'um:gain=5', ''),
+    ('x [counts]', 'um', 'says no gain'), ('x [counts]', 'mm:zero=4', 'says no gain'),
+    ('x [counts]', 'mm:zero=ZERO:gain=GAIN', 'allowed is a number'),
+    ('x [counts]', 'bar_gauge:gain=3', 'is no unit of a length'),
+    ('x (left)', 'mm', ''), ('p [mA]', 'kPa_abs:zero=4:gain=62.5', ''),
+    ('p_bar', 'bar_gauge:zero=0.03', ''), ('p_bar', 'kPa_gauge', 'is not one of them'),
+    ('length_mm', 'mm:gain=-1', 'says no zero'), ('length_mm', 'mm:zero=201:gain=-1', '')])
+def test_the_answers_that_are_admitted(column, said, why):
+    values = 200 - PLACES if column == 'length_mm' else 2.0 + PLACES
+    question, = guessed(column, values=values).questions
+    assert why in question.refusal(said) and bool(question.refusal(said)) == bool(why)
+
+
+def test_counts_are_imported_by_the_answer_at_a_terminal(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'enc.csv').write_text('t_s,p_bar_gauge,Encoder [counts]\n' + ''.join(
+        f'{0.01 * k:.2f},{0.1 * place},{500 * place}\n' for k, place in enumerate(PLACES)))
+    assert main(['import', 'enc.csv', '--out', 'bag']) == 2
+    said = capsys.readouterr().err
+    assert '"Encoder [counts]:mm:zero=ZERO:gain=GAIN"' in said and ':um"' not in said
+    # Stated without a gain it is taken, and told.
+    stated = 'contraction=Encoder [counts]:um'
+    assert main(['import', 'enc.csv', '--out', 'bag', '--map', stated]) == 1
+    assert 'counts is what a sensor puts out' in capsys.readouterr().out
+    for stream in ('stdin', 'stdout'):
+        monkeypatch.setattr(f'sys.{stream}.isatty', lambda: True)
+    answers = iter(['um', 'mm:gain=0.005'])
+    monkeypatch.setattr('builtins.input', lambda _: next(answers))
+    assert main(['import', 'enc.csv', '--out', 'right']) == 0
+    assert "'um' says no gain" in capsys.readouterr().out
+    assert load_run('right')['contraction']['contraction_m'].max() == pytest.approx(0.020)
+
+
+def test_the_time_in_seconds_goes_before_that_in_ticks(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'a.csv').write_text('t_ticks,t_s,x_mm\n' + ''.join(
+        f'{84000 * k},{0.01 * k:.2f},{place}\n' for k, place in enumerate(PLACES)))
+    assert main(['import', 'a.csv', '--out', 'bag']) == 0
+    assert np.diff(load_run('bag')['contraction'].stamp_ns).max() == 10_000_000
