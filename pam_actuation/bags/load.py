@@ -42,6 +42,7 @@ from pam_sim.units import unit_of
 _SIGNAL_NAMES = tuple(name for names in VALVE_NAMES.values() for name in names)
 # Any clock that counts from 1970 is far above this; a simulation's may start at 0.
 _WALL_CLOCK_NS = 10**17
+NAMESPACE = '--namespace (in Python: namespace)'      # for messages
 
 
 @dataclass(repr=False)
@@ -220,7 +221,7 @@ def _choose_namespace(bag: Bag, wanted: str | None) -> str:
             return candidates[0]
         if candidates:
             raise InputError(
-                f'the bag has several muscles, {_listed(candidates)}; choose one with namespace',
+                f'the bag has several muscles, {_listed(candidates)}; choose one with {NAMESPACE}',
                 bag.path)
     names = ', '.join(sorted(bag.topics)) or 'none at all'
     raise InputError(

@@ -20,7 +20,7 @@ The topics of a joint are named relative to it: ``joint_state``, ``flexor/pressu
 
 import os
 
-from pam_actuation.bags.load import read_series, RecordedRun, run_of
+from pam_actuation.bags.load import NAMESPACE, read_series, RecordedRun, run_of
 from pam_actuation.bags.markers import is_marker, markers_of
 from pam_actuation.bags.source import Bag, read_bag, TopicData
 from pam_actuation.topics.table import BY_NAME, JOINT, MUSCLE, short_name
@@ -63,7 +63,7 @@ def load_recording(path: str | os.PathLike[str], namespace: str | None = None,
         return run_of(bag, path, namespace)
     if len(joints) > 1:
         raise InputError(f'the bag has several joints, {", ".join(sorted(joints))}; choose one '
-                         'with namespace', str(path))
+                         f'with {NAMESPACE}', str(path))
     topics, remarks = {}, list(bag.remarks)
     for relative, topic in topics_of_joint(bag, joints[0]).items():
         if BY_NAME[short_name(relative)].numeric is not None:
@@ -90,7 +90,7 @@ def _check_no_half_joint(bag: Bag, path: str | os.PathLike[str]) -> None:
         if side == SIDES[0] and all(f'{joint}/{other}' in places for other in SIDES):
             raise InputError(
                 f'has both muscles of the joint {joint} but no {MEASURED}: the recording of '
-                'the joint is not complete; choose one muscle with namespace', str(path))
+                f'the joint is not complete; choose one muscle with {NAMESPACE}', str(path))
 
 
 def topics_of_joint(bag: Bag, namespace: str) -> dict[str, TopicData]:

@@ -34,20 +34,21 @@ def add_arguments(parser: Parser) -> None:
         '--rate', type=number(0.1, 1e5, 'Hz'), default=None, metavar='HZ',
         help='rows at equal distances; default: one row for each stamp of any topic')
     parser.add_argument('--topics', type=source, default=None, metavar='A,B',
-                        help='short names of topics (default: all that have messages)')
+                        help='short names of topics, of a joint such as joint_state or '
+                             'flexor/pressure (default: all that have numbers)')
     parser.add_argument('--namespace', type=source, default=None, metavar='NS',
-                        help='which muscle, if the bag has several')
+                        help='which muscle or joint, if the bag has several')
     add_recover_option(parser)
     add_overwrite_option(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Write the table and say what is in it."""
-    from pam_actuation.bags.load import load_run
+    from pam_actuation.bags.load_joint import load_recording
     from pam_actuation.tables.export import check_ending, write_table
     check_ending(args.out)
     check_outputs(args, args.out)
-    loaded = load_run(args.bag, namespace=args.namespace, recover=args.recover)
+    loaded = load_recording(args.bag, namespace=args.namespace, recover=args.recover)
     note_implausible(args, [loaded])
     topics = [name.strip() for name in args.topics.split(',')] if args.topics else None
     frame = loaded.to_dataframe(args.rate, topics)

@@ -211,7 +211,9 @@ def _signal_of(column: str, unit: str) -> Signal | None:
 
 def _is_exported(column: str, signal: Signal) -> bool:
     """Return whether a column has the name that ``pam export`` gives a signal; it is in SI."""
-    return column in (f'{signal.topic}.{signal.field}', f'{signal.topic}_{signal.field}')
+    name = f'{signal.topic}.{signal.field}'
+    # As a MAT file and an HDF5 file have it.
+    return column in (name, re.sub('[./]', '_', name), name.replace('/', '.'))
 
 
 def _of_column(table: Table, column: str, signal: Signal, missing: Collection[str]

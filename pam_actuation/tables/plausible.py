@@ -95,7 +95,7 @@ def doubts(signals: Mapping[str, tuple[IntArray, FloatArray]], mapped: Mapping[s
         if {'pressure', 'contraction'} <= names:
             own = {name: whole[f'{place}{name}'] for name in names}
             read = {name: mapped[f'{place}{name}'] for name in names}
-            both = _held(own, read, length_m), _zero(own, read, length_m)
+            both = _held(place, own, read, length_m), _zero(place, own, read, length_m)
             found += [one for one in both if one is not None]
     return found
 
@@ -117,8 +117,8 @@ def _dropped(mapped: ColumnMap, column: FloatArray) -> BoolArray:
     return is_zero & bool(is_apart and is_zero.mean() <= MOST_DROPPED)
 
 
-def _held(signals: Mapping[str, tuple[IntArray, FloatArray]], mapped: Mapping[str, ColumnMap],
-          length_m: float) -> Doubt | None:
+def _held(place: str, signals: Mapping[str, tuple[IntArray, FloatArray]],
+          mapped: Mapping[str, ColumnMap], length_m: float) -> Doubt | None:
     """Return a doubt on a muscle that hardly moves under much pressure, None without."""
     both = [signals[name][1] for name in ('pressure', 'contraction')]
     if not all(np.isfinite(column).any() for column in both):
@@ -128,13 +128,13 @@ def _held(signals: Mapping[str, tuple[IntArray, FloatArray]], mapped: Mapping[st
         return None
     one = mapped['contraction']
     return Doubt(
-        f'contraction (column "{one.column}" in {one.unit.name}): it moves by '
+        f'{place}contraction (column "{one.column}" in {one.unit.name}): it moves by '
         f'{1e3 * moved_m:.3g} mm only while the pressure moves by {1e-3 * risen_pa:.0f} kPa; is '
         'the unit right, or is the muscle held?')
 
 
-def _zero(signals: Mapping[str, tuple[IntArray, FloatArray]], mapped: Mapping[str, ColumnMap],
-          length_m: float) -> Doubt | None:
+def _zero(place: str, signals: Mapping[str, tuple[IntArray, FloatArray]],
+          mapped: Mapping[str, ColumnMap], length_m: float) -> Doubt | None:
     """Return a doubt on a contraction that an empty muscle keeps, None without."""
     (own_ns, pressure_pa), (stamp_ns, contraction_m) = signals['pressure'], signals['contraction']
     known = np.isfinite(pressure_pa)
@@ -150,8 +150,9 @@ def _zero(signals: Mapping[str, tuple[IntArray, FloatArray]], mapped: Mapping[st
         return None
     zero = replace(one, zero=float(f'{float(_raw(one, np.array([at_rest_m]))[0]):.4g}'))
     return Doubt(
-        f'contraction (column "{one.column}" in {one.unit.name}): it is {1e3 * at_rest_m:.3g} mm '
-        f'while the muscle is empty; is the zero off? Then write {zero.option("contraction")}')
+        f'{place}contraction (column "{one.column}" in {one.unit.name}): it is '
+        f'{1e3 * at_rest_m:.3g} mm while the muscle is empty; is the zero off? Then write '
+        f'{zero.option(f"{place}contraction")}')
 
 
 def _of_values(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: float

@@ -23,7 +23,7 @@ from pam_actuation.tables.guess import falls_below_atmosphere, Guess, unit_of_co
 from pam_actuation.tables.lengths import length_column
 from pam_actuation.tables.mapping import usual_unit
 from pam_actuation.tables.parts import likely_signals
-from pam_actuation.tables.signals import BY_NAME
+from pam_actuation.tables.signals import are_of_joint, BY_NAME
 from pam_actuation.tables.table import Table
 from pam_actuation.tables.units import ABSOLUTE, GAUGE, unit_of_text, VOLTAGE
 from pam_actuation.tables.words import words_of
@@ -97,8 +97,10 @@ def how_to_begin(tables: Collection[Table], found: Guess) -> str:
 
 def may_be_signals(tables: Collection[Table], found: Guess) -> list[str]:
     """Return an option for each column that is not read and may be a signal that is missing."""
-    missing = BY_NAME.keys() - found.mapping.signals.keys() - {
-        one.signal for one in found.questions}
+    known = {*found.mapping.signals, *(one.signal for one in found.questions)}
+    # Of a joint each muscle has its own: `pressure` alone is none.
+    missing = {name for name in BY_NAME if name not in known
+               and are_of_joint([name]) == are_of_joint(known)}
     return list(dict.fromkeys(
         _option(table, column, signal) for table in tables for column in unread([table], found)
         for signal in _likely(table, column) if signal in missing))

@@ -14,6 +14,8 @@
 
 """A joint with two muscles: its table has every signal of a muscle twice, and an angle."""
 
+import json
+
 import numpy as np
 from pam_actuation.bags.load_joint import load_recording
 from pam_actuation.cli.main import main
@@ -92,3 +94,43 @@ def test_an_angle_beside_one_muscle_is_no_signal(tmp_path, monkeypatch, capsys):
 def test_words_of_a_joint(words, path, signal):
     found = of_words(words, path)
     assert (None if found is None else found.name) == signal
+
+
+@pytest.mark.parametrize('ending', ['csv', 'tsv', 'parquet', 'mat', 'h5', 'npz', 'npy', 'xlsx'])
+def test_a_joint_is_exported_as_a_whole_and_comes_back(table, ending, capsys):
+    main(['import', table, '--out', 'bag', *GAUGE])
+    assert main(['export', 'bag', '--out', f'out.{ending}']) == 0
+    said = capsys.readouterr().out
+    assert 'joint_state.angle_rad' in said and 'extensor/pressure.pressure_pa' in said
+    assert main(['import', f'out.{ending}', '--out', 'back']) == 0
+    first, second = load_recording('bag'), load_recording('back')
+    assert set(first.topics) == set(second.topics) and len(first.topics) == 6
+    for name, series in first.topics.items():
+        np.testing.assert_array_equal(second.topics[name].stamp_ns, series.stamp_ns)
+        for field, values in series.values.items():
+            np.testing.assert_allclose(second.topics[name].values[field], values,
+                                       rtol=1e-15 if ending == 'xlsx' else 0.0)
+
+
+def test_topics_and_muscles_of_a_joint_are_chosen(table, capsys):
+    main(['import', table, '--out', 'bag', *GAUGE])
+    capsys.readouterr()
+    assert main(['export', 'bag', '--out', 'a.csv', '--topics', 'joint_state',
+                 '--namespace', '/knee', '--json']) == 0
+    assert json.loads(capsys.readouterr().out)['columns'] == [
+        'stamp_ns', 'time_s', 'joint_state.angle_rad']
+    assert main(['export', 'bag', '--out', 'b.csv', '--namespace', '/knee/flexor', '--json']) == 0
+    assert 'pressure.pressure_pa' in json.loads(capsys.readouterr().out)['columns']
+    assert main(['export', 'bag', '--out', 'c.csv', '--topics', 'pressure']) == 2
+    assert 'did you mean `flexor/pressure`' in capsys.readouterr().err
+    assert main(['identify', 'bag', '--rig', 'dmsp_5_300_realistic']) == 2
+    assert 'choose one with --namespace' in capsys.readouterr().err
+
+
+def test_what_is_doubtful_names_the_muscle(table, capsys):
+    columns = {**COLUMNS, 'p_flexor [kPa]': np.clip(150.0 * SHARE, 0.0, None),
+               'x_flexor [mm]': 15.0 + np.clip(SHARE, 0.0, None)}
+    np.savetxt('x.csv', np.column_stack([*columns.values()]), '%.6f', ',', comments='',
+               header=','.join(columns))
+    assert main(['import', 'x.csv', '--out', 'bag', *GAUGE]) == 1
+    assert '--map flexor/contraction="x_flexor [mm]:mm:zero=15"' in capsys.readouterr().out

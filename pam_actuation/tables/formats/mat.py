@@ -73,8 +73,8 @@ def _arrays(content: dict[str, Any], prefix: str = '', depth: int = 0
 
 
 def write(frame: 'pd.DataFrame', path: str) -> None:
-    """Write a data frame as a MAT file, one array a column; a dot in a name becomes ``_``."""
+    """Write a data frame as a MAT file, one array a column; dot and stroke become ``_``."""
     from scipy.io import savemat
     with open(path, 'wb') as stream:
-        savemat(stream, {str(name).replace('.', '_'): frame[name].to_numpy()
+        savemat(stream, {re.sub('[./]', '_', str(name)): frame[name].to_numpy()
                          for name in frame.columns}, long_field_names=True, oned_as='column')
