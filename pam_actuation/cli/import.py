@@ -172,8 +172,11 @@ def _asked(question: 'Question') -> str | None:
 
 def _show(args: argparse.Namespace, tables: 'list[Table]', found: 'Guess') -> int:
     from pam_actuation.tables.preview import (
-        how_to_begin, may_be_signals, preview, questions_text)
+        how_to_begin, may_be_signals, preview, questions_text, time_problems)
     lines = [preview(tables, found, args.missing)]
+    problems = time_problems(tables, found, args.sort)
+    if problems:
+        lines += ['', 'the time is not read yet:', *(f'    {one}' for one in problems)]
     if found.questions:
         lines += ['', 'the file does not tell:', questions_text(found)]
     if found.mapping.signals:
@@ -185,7 +188,7 @@ def _show(args: argparse.Namespace, tables: 'list[Table]', found: 'Guess') -> in
         lines += ['', 'not read, but by name and unit these may be signals:',
                   *(f'    {one}' for one in more)]
     emit(args, {
-        'files': args.files, 'mapping': found.mapping.to_yaml(),
+        'files': args.files, 'mapping': found.mapping.to_yaml(), 'time': problems,
         'questions': [{'signal': one.signal, 'column': one.column, 'text': one.text,
                        'answers': list(one.answers)} for one in found.questions],
         'columns': [list(table.columns) for table in tables]}, '\n'.join(lines))

@@ -21,11 +21,12 @@ from typing import NamedTuple, TYPE_CHECKING
 import numpy as np
 from pam_actuation.messages import START_NS
 from pam_actuation.tables.dates import Dates, dates_of, days_as_ns
+from pam_actuation.tables.day_and_time import (
+    dates_of_pair, holds_dates, holds_times_of_day, is_called_time, pair_of)
 from pam_actuation.tables.mapping import TableMapping, TimeMap
-from pam_actuation.tables.signals import TIME_WORDS
 from pam_actuation.tables.table import Table
 from pam_actuation.tables.units import DATE, FACTORS, is_output, TIME, unit_of_text
-from pam_actuation.tables.words import unit_in, words_of
+from pam_actuation.tables.words import unit_in
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.errors import InputError
 
@@ -77,13 +78,24 @@ def time_column(table: Table, mapping: TableMapping) -> TimeMap | None:
     """
     if mapping.time is not None or mapping.rate_hz is not None or table.stamp_ns is not None:
         return mapping.time
-    found = [name for name in table.columns if re.fullmatch(TIME_WORDS, words_of(name))]
+    found = [name for name in table.columns if is_called_time(table, name)]
     exact = [name for name in found if name.endswith('stamp_ns')]
-    found = [name for name in found if not is_output(          # `t_s` goes before `t_ticks`
-        table.units.get(name, '') or unit_in(name), TIME)] or found
+    found = sorted(found, key=lambda name: _rank(table, name))
     if not found and _rises_without_name(table, mapping):
         found = [next(iter(table.columns))]
     return TimeMap((exact or found)[0]) if found else None
+
+
+def _rank(table: Table, name: str) -> int:
+    """Return how far behind others of its kind a column of the time stands."""
+    if is_output(table.units.get(name, '') or unit_in(name), TIME):
+        return 3                                            # such as `t_ticks`
+    values = table.columns[name]
+    if holds_dates(values):
+        return 2
+    # Behind seconds, which are finer; before numbers whose unit is not stated.
+    return int(holds_times_of_day(values) and any(
+        _unit_of_name(table, other) for other in table.columns if is_called_time(table, other)))
 
 
 def _rises_without_name(table: Table, mapping: TableMapping) -> bool:
@@ -156,6 +168,13 @@ def _from_column(table: Table, column: TimeMap, start_ns: int) -> _Times:
     name = table.require(column.column, column.where)
     values = table.columns[name]
     is_date = pd.api.types.is_datetime64_any_dtype(values)
+    if column.unit in ('', DATE) and (pair := pair_of(table, name)) is not None:
+        return _paired(table, *pair, start_ns)
+    if column.unit in ('', DATE) and holds_dates(values):
+        raise InputError(
+            f'column "{name}" holds dates without a time of day, and no column is known to hold '
+            'that; add --map time="COLUMN:s", or --rate HZ for rows at equal distances',
+            table.source)
     if is_date or column.unit in ('', DATE) and _is_text_date(values):
         return _dates(table, name, start_ns)
     unit = column.unit or _unit_of_name(table, name)
@@ -211,6 +230,18 @@ def _dates(table: Table, name: str, start_ns: int) -> _Times:
     stamps = found.stamp_ns + (start_ns if found.is_of_day else 0)
     return _Times(stamps, f'column "{name}", {found.told}', _resolution_ns(found.stamp_ns),
                   found.remark)
+
+
+def _paired(table: Table, date: str, time: str, start_ns: int) -> _Times:
+    """Return the times whose date is in one column and whose time of day in another."""
+    found = dates_of_pair(table, date, time)
+    if isinstance(found, int):
+        texts = ' '.join(str(table.columns[name].iloc[found]) for name in (date, time))
+        raise InputError(f'columns "{date}" and "{time}" hold {texts!r}, which is no date and '
+                         'time as in 2026-11-25 09:30:00.125', table.place(found))
+    return _Times(found.stamp_ns + (start_ns if found.is_of_day else 0),
+                  f'columns "{date}" and "{time}", {found.told}',
+                  _resolution_ns(found.stamp_ns), found.remark)
 
 
 def _unit_of_name(table: Table, name: str) -> str:

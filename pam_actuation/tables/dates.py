@@ -31,7 +31,7 @@ _LEAST_STEP_DAYS, _MOST_STEP_DAYS = 1.0 / (86_400 * 50_000.0), 2.0 / 86_400
 _ORDERS = {'ymd': 'year, month, day', 'dmy': 'day, month, year', 'mdy': 'month, day, year'}
 _LATE_HOUR_NS = DAY_NS // 2         # back by more than this: midnight passed
 # A date in any order, a time of day of two or three parts, and a half of the day.
-_PATTERN = (
+PATTERN = (
     r'^\s*(?:(?P<first>\d{1,4})(?P<mark>[-/.])(?P<second>\d{1,2})[-/.](?P<third>\d{1,4})[T\s,]+)?'
     r'(?P<hour>\d{1,2}):(?P<minute>\d{2})(?::(?P<second_of>\d{2}))?(?:[.,](?P<part>\d{1,9})\d*)?'
     r'\s*(?P<half>[AaPp]\.?[Mm]\.?)?\s*$')
@@ -72,7 +72,7 @@ def dates_of(values: 'pd.Series') -> Dates | int:
     iso = pd.to_datetime(values, errors='coerce', utc=True, format='ISO8601')
     if not iso.isna().any():
         return Dates(iso.dt.as_unit('ns').astype('int64').to_numpy(), 'dates')
-    found = values.astype(str).str.extract(_PATTERN)
+    found = values.astype(str).str.extract(PATTERN)
     wrong = np.flatnonzero(found['hour'].isna().to_numpy())
     if len(wrong):
         return int(wrong[0])

@@ -19,13 +19,14 @@ from dataclasses import dataclass, field, replace
 import re
 
 import numpy as np
+from pam_actuation.tables.day_and_time import is_called_time
 from pam_actuation.tables.lengths import length_column, LengthColumn
 from pam_actuation.tables.mapping import column_of_text, ColumnMap, TableMapping
 from pam_actuation.tables.parts import is_length_of_muscle, kind_of_pressure
 from pam_actuation.tables.questions import (
     needs_gain, of_output_column, Question, which_of)
 from pam_actuation.tables.signals import (
-    ANGLES, are_of_joint, BY_NAME, of_words, Signal, TIME_WORDS)
+    ANGLES, are_of_joint, BY_NAME, of_words, Signal)
 from pam_actuation.tables.table import Table
 from pam_actuation.tables.units import (
     ABSOLUTE, ANGLE, checked_unit, FACTORS, GAUGE, LENGTH, names_of, PRESSURE, si_unit, Unit,
@@ -89,7 +90,7 @@ def guess(tables: Collection[Table], mapping: TableMapping,
         used = {table.name_of(one.column) for one in mapping.signals.values()}
         used |= {table.name_of(mapping.time.column)} if mapping.time is not None else set()
         for column in table.columns:
-            if column in used or re.fullmatch(TIME_WORDS, words_of(column)):
+            if column in used or is_called_time(table, column):
                 continue
             signal = _signal_of(_name_of(table, column), unit_of_column(table, column))
             if signal is None or signal.name in mapping.signals or column in seen.get(

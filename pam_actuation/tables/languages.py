@@ -21,8 +21,18 @@ import unicodedata
 # Danish, Finnish, Polish, Czech, Slovak, Hungarian, Romanian, Turkish, Russian, Japanese, Chinese
 # and Korean, where that is another word. `tension` stays English: a force, and no voltage.
 _WORDS = {
-    'time': 'tijd zeit temps tiempo tempo tid aika czas čas idő timp zaman время 時間 時刻 时间 '
-            '시간',
+    'time': 'tijd zeit temps tiempo tempo tid aika czas czasu čas času idő timp zaman время '
+            'времени 時間 時刻 时间 시간 uhrzeit zeitpunkt kloktijd tijdstip heure hora ora '
+            'godzina klockslag klokkeslæt kellonaika időpont saat 时刻 시각 temporal temporale '
+            'časové',
+    'date': 'datum fecha päivämäärä päiväys pvm dátum tarih дата 日付 日期 날짜 일자',
+    'date time': '日時 일시',
+    'stamp': 'marca marcatura znacznik razítko damgası метка',
+    'time stamp': 'zeitmarke horodatage horodate tidsstämpel tidsstempel aikaleima időbélyeg '
+                  'タイムスタンプ 时间戳 타임스탬프',
+    'elapsed': 'messdauer versuchsdauer écoulé écoulée transcurrido trascorso decorrido '
+               'verstreken verstrichen verstrichene',
+    'elapsed time': 'laufzeit prüfzeit versuchszeit testzeit looptijd meettijd',
     'pressure': 'druk druck pression presión pressione pressão tryck tryk paine ciśnienie tlak '
                 'nyomás presiune basınç давление 圧力 壓力 压力 압력',
     'force': 'kracht kraft fuerza forza força voima siła síla sila erő forță kuvvet сила 力 張力 '

@@ -18,14 +18,15 @@ from collections.abc import Collection
 import re
 
 import numpy as np
-from pam_actuation.tables.clock import time_column
+from pam_actuation.tables.clock import clock_of, time_column
+from pam_actuation.tables.day_and_time import pair_of
 from pam_actuation.tables.guess import falls_below_atmosphere, Guess, unit_of_column
 from pam_actuation.tables.lengths import length_column
 from pam_actuation.tables.mapping import usual_unit
 from pam_actuation.tables.parts import likely_signals
 from pam_actuation.tables.signals import are_of_joint, BY_NAME
 from pam_actuation.tables.table import Table
-from pam_actuation.tables.units import ABSOLUTE, GAUGE, unit_of_text, VOLTAGE
+from pam_actuation.tables.units import ABSOLUTE, DATE, GAUGE, unit_of_text, VOLTAGE
 from pam_actuation.tables.words import words_of
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
@@ -66,6 +67,20 @@ def preview(tables: Collection[Table], found: Guess, missing: Collection[str] = 
         lines += ['  ' + '  '.join(f'{cell:{width}}' for cell, width in zip(row, widths))
                   + f'  {row[5]}' for row in rows]
     return '\n'.join(lines)
+
+
+def time_problems(tables: Collection[Table], found: Guess, sort: bool = False) -> list[str]:
+    """Return a sentence for each table whose time cannot be read, if a signal is in the table."""
+    columns = [one.column for one in found.mapping.signals.values()] + [
+        one.column for one in found.questions if one.column]
+    problems = []
+    for table in tables:
+        if any(table.name_of(one) is not None for one in columns) or len(tables) == 1:
+            try:
+                clock_of(table, found.mapping, sort=sort)
+            except InputError as error:
+                problems.append(str(error))
+    return problems
 
 
 def questions_text(found: Guess) -> str:
@@ -162,7 +177,10 @@ def _meaning(table: Table, found: Guess) -> dict[str, str]:
     meant = {}
     time = time_column(table, found.mapping)
     if time is not None and table.name_of(time.column) is not None:
-        meant[table.require(time.column)] = 'time' + (f' in {time.unit}' if time.unit else '')
+        name = table.require(time.column)
+        meant[name] = 'time' + (f' in {time.unit}' if time.unit else '')
+        if time.unit in ('', DATE) and (pair := pair_of(table, name)) is not None:
+            meant.update(zip(pair, ('date of the time', 'time of day')))
     for name, one in found.mapping.signals.items():
         column = table.name_of(one.column)
         if column is not None:

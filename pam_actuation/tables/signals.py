@@ -122,8 +122,18 @@ ALLOWED = (f'{", ".join(one.name for one in SIGNALS)}; of a joint '
 # Words that other programs have for the sides.
 _SIDE_WORDS = {'flexor': 'flexor', 'flex': 'flexor', 'agonist': 'flexor', 'ago': 'flexor',
                'extensor': 'extensor', 'antagonist': 'extensor', 'antago': 'extensor'}
-TIME_WORDS = (r't|(measured )?time|t ?(nominal|rel|s)|time ?stamp|stamp|elapsed( time)?|timer|'
-              r'clock|seconds|sec|date ?time|date')
+_TIME = re.compile(
+    r't|(measured )?time( of day)?|t ?(nominal|rel|s)|time ?stamp|stamp( time)?|'
+    r'elapsed( time)?|time elapsed|timer|clock|seconds|sec|date ?time|time date|date')
+_BETWEEN = {'and', 'und', 'en', 'et', 'y', 'e', 'i', 'a', 'og', 'och', 'ja', 'és', 'și', 've', 'и',
+            'de', 'du', 'der', 'del', 'di', 'do', '&', '+'}
+
+
+def is_time(words: str) -> bool:
+    """Return whether the words of a name, in English and lower case, mean a time or a date."""
+    own = [word for word in words.split() if word not in _BETWEEN]
+    return _TIME.fullmatch(words) is not None or (
+        len(own) > 1 and 'time' in own and _TIME.fullmatch(' '.join(own)) is not None)
 
 
 def signal_of(name: str, where: str) -> Signal:

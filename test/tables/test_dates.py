@@ -101,3 +101,73 @@ def test_numbers_that_are_called_dates_are_told(tmp_path, capsys):
     assert main(['import', str(tmp_path / 'log.csv'), '--map', 'time=t:date', '--map',
                  'pressure=p_kPa:kPa_gauge', '--out', str(tmp_path / 'bag')]) == 2
     assert 'numbers that are no days of a spreadsheet' in capsys.readouterr().err
+
+
+def of_pair(tmp_path, date, time, names='Datum;Uhrzeit', at=AT):
+    """Return the clock of a table with the date in one column and the time in another."""
+    (tmp_path / 'log.csv').write_text(f'{names};p\n' + ''.join(
+        f'{one.strftime(date)};{one.strftime(time)};1,5\n' for one in at), encoding='utf-8')
+    table, = read_tables(tmp_path / 'log.csv')
+    return clock_of(table, TableMapping())
+
+
+@pytest.mark.parametrize('date, time', [
+    ('%d.%m.%Y', '%H:%M:%S,%f'), ('%Y-%m-%d', '%H:%M:%S.%f'), ('%m/%d/%Y', '%I:%M:%S.%f %p'),
+    ('14.03.2026', '%H:%M:%S,%f')])
+@pytest.mark.parametrize('names', ['Datum;Uhrzeit', 'Date;Time', 'Fecha;Hora', 'Data;Ora'])
+def test_a_date_and_a_time_of_day_are_one_clock(tmp_path, date, time, names):
+    clock = of_pair(tmp_path, date, time, names)
+    assert clock.stamp_ns.tolist() == (EPOCH_NS + STEPS_NS).tolist() and not clock.remarks
+    assert 'columns "' in clock.told
+
+
+@pytest.mark.parametrize('option', [
+    [], ['--map', 'time=Uhrzeit:date'], ['--map', 'time=Datum'], ['--map', 'time=#2']])
+def test_the_date_is_kept_whichever_column_is_mapped(tmp_path, option):
+    from pam_actuation.bags.load import load_run
+    from pam_actuation.cli.main import main
+    of_pair(tmp_path, '%d.%m.%Y', '%H:%M:%S,%f')
+    assert main(['import', str(tmp_path / 'log.csv'), '--out', str(tmp_path / 'bag'), '--map',
+                 'pressure=p:bar_gauge', *option]) in (0, 1)
+    assert load_run(tmp_path / 'bag')['pressure'].stamp_ns[0] == EPOCH_NS
+
+
+def test_a_date_of_two_meanings_beside_its_time_is_left_out(tmp_path):
+    at = [one + timedelta(days=20) for one in AT[:10]]              # 3 April
+    clock = of_pair(tmp_path, '%d/%m/%Y', '%H:%M:%S.%f', at=at)
+    assert clock.stamp_ns.tolist() == (START_NS + SINCE_MIDNIGHT_NS + STEPS_NS[:10]).tolist()
+    assert '03/04/2026 can be read in two ways' in clock.remarks[0]
+
+
+@pytest.mark.parametrize('ending', ['xlsx', 'parquet'])
+def test_a_spreadsheet_with_cells_of_dates_and_of_times(tmp_path, ending):
+    frame = pd.DataFrame({'Date': [one.date() for one in AT], 'Time': [one.time() for one in AT],
+                          'p': 1.5})
+    if ending == 'parquet':
+        frame['Date'] = pd.to_datetime(frame['Date'])
+    getattr(frame, {'xlsx': 'to_excel'}.get(ending, 'to_parquet'))(
+        tmp_path / f'log.{ending}', index=False)
+    table, = read_tables(tmp_path / f'log.{ending}')
+    assert clock_of(table, TableMapping()).stamp_ns.tolist() == (EPOCH_NS + STEPS_NS).tolist()
+
+
+def test_seconds_go_before_a_date_and_a_time_of_day(tmp_path):
+    (tmp_path / 'log.csv').write_text('Date;Time;t_s;p\n' + ''.join(
+        f'{one:%d.%m.%Y};{one:%H:%M:%S};{0.005 * row:.3f};1.5\n' for row, one in enumerate(AT)))
+    table, = read_tables(tmp_path / 'log.csv')
+    assert np.diff(clock_of(table, TableMapping()).stamp_ns).tolist() == [5_000_000] * 59
+
+
+def test_a_time_that_cannot_be_read_shows_in_the_preview(tmp_path, monkeypatch, capsys):
+    from pam_actuation.cli.main import main
+    monkeypatch.chdir(tmp_path)
+    for names, said in (('Datum;row', 'dates without a time of day'), ('day;n', '--rate HZ')):
+        (tmp_path / 'log.csv').write_text(f'{names};x_mm\n' + ''.join(
+            f'{one:%d.%m.%Y};{row};{row % 7}\n' for row, one in enumerate(AT)))
+        assert main(['import', 'log.csv', '--preview']) == 0
+        assert said in capsys.readouterr().out
+        assert main(['import', 'log.csv', '--preview', '--rate', '200']) == 0
+        assert 'the time is not read' not in capsys.readouterr().out
+        assert main(['import', 'log.csv', '--out', 'bag']) == 2
+        told = capsys.readouterr().err
+        assert said in told and '--missing' not in told

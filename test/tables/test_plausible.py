@@ -14,8 +14,6 @@
 
 """A file as a lab keeps it: what its columns are, and a zero of the encoder that is not set."""
 
-import re
-
 import numpy as np
 from pam_actuation.bags.load import load_run
 from pam_actuation.cli.main import main
@@ -23,7 +21,7 @@ from pam_actuation.tables.guess import Guess, guess
 from pam_actuation.tables.mapping import column_of_text, TableMapping
 from pam_actuation.tables.plausible import doubts
 from pam_actuation.tables.preview import how_to_begin
-from pam_actuation.tables.signals import of_words, signal_of, SIGNALS, TIME_WORDS
+from pam_actuation.tables.signals import is_time, of_words, signal_of, SIGNALS
 from pam_actuation.tables.table import Table
 from pam_actuation.tables.words import unit_in, words_of
 from pam_sim.errors import InputError
@@ -220,9 +218,17 @@ def test_what_comes_next_needs_the_file_of_the_rig(columns, there, options, foll
 
 
 @pytest.mark.parametrize('column', [
-    'Tijd (s)', 'Messzeit_s', 'Zeitstempel [s]', 'Zeit_ms', '時間[s]', 'Čas (s)', '시간'])
+    'Tijd (s)', 'Messzeit_s', 'Zeitstempel [s]', 'Zeit_ms', '時間[s]', 'Čas (s)', '시간', 'Datum',
+    'Uhrzeit', 'Datum Uhrzeit', 'Datum/Zeit', 'Datum und Uhrzeit', 'Horodatage', 'Laufzeit [s]',
+    'Prüfzeit', 'Fecha y hora', 'Date/Heure', 'Tijdstip', 'znacznik czasu', 'Дата и время', '日時',
+    'Temps écoulé [s]', 'Päivämäärä ja kellonaika'])
 def test_the_time_in_the_language_of_the_lab(column):
-    assert re.fullmatch(TIME_WORDS, words_of(column))
+    assert is_time(words_of(column))
+
+
+@pytest.mark.parametrize('column', ['data', 'dato', 't_y', 'a_t', 'y', 'up_time_max', 'Totzeit'])
+def test_what_is_no_time(column):
+    assert not is_time(words_of(column))
 
 
 @pytest.mark.parametrize('text, shortening', [
