@@ -271,7 +271,7 @@ def _plausible(signal: Signal, low: float, high: float) -> list[str]:
     fitting = []
     for name in names_of(signal.quantity):
         unit: Unit | None = unit_of_text(name, signal.quantity)
-        if unit is None or name.startswith(('hPa', 'atm', 'mmHg', 'kgf/cm2', 'gf', 'cm')):
+        if unit is None or name.startswith(('hPa', 'atm', 'mmHg', 'kgf/cm2', 'gf', 'daN', 'cm')):
             continue
         size = largest * unit.factor
         limit = _LARGEST[signal.quantity]

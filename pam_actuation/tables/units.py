@@ -30,7 +30,7 @@ FACTORS: dict[str, dict[str, float]] = {
                'kgf/cm2': 98066.5},
     LENGTH: {'m': 1.0, 'cm': 1e-2, 'mm': 1e-3, 'um': 1e-6, 'in': 0.0254},
     FORCE: {'N': 1.0, 'mN': 1e-3, 'kN': 1e3, 'lbf': 4.4482216152605, 'kgf': 9.80665,
-            'gf': 9.80665e-3},
+            'gf': 9.80665e-3, 'daN': 10.0},
     VOLTAGE: {'V': 1.0, 'mV': 1e-3},
     DUTY: {'1': 1.0, '%': 1e-2},
     ANGLE: {'rad': 1.0, 'mrad': 1e-3, 'deg': math.pi / 180.0},
@@ -43,6 +43,9 @@ _OTHER_NAMES = {'µm': 'um', 'μm': 'um', 'µs': 'us', 'μs': 'us', 'sec': 's', 
                 'seconds': 's', 'second': 's', 'msec': 'ms', 'usec': 'us', 'nsec': 'ns',
                 'inch': 'in', 'volt': 'V', 'volts': 'V', 'newton': 'N', 'percent': '%',
                 'lb': 'lbf', 'kg': 'kgf', 'g': 'gf', '-': '1', 'kgf/cm²': 'kgf/cm2',
+                'kp': 'kgf', 'kilopond': 'kgf', 'newtons': 'N', 'kp/cm2': 'kgf/cm2',
+                'kp/cm²': 'kgf/cm2', 'kg/cm2': 'kgf/cm2', 'kg/cm²': 'kgf/cm2', 'n/mm2': 'MPa',
+                'n/mm²': 'MPa', 'inches': 'in', 'millimeter': 'mm', 'millimetre': 'mm',
                 'at': 'kgf/cm2', 'torr': 'mmHg', '°': 'deg', 'degree': 'deg', 'degrees': 'deg',
                 'grad': 'deg', 'radian': 'rad', 'radians': 'rad'}
 

@@ -22,6 +22,8 @@ from pam_actuation.tables.units import ends_a_name, FACTORS, unit_of_text
 
 _BRACKETS = re.compile(r'(?!(?<=\w)\[\d+\])[\[(]([^\])]*)[\])]\s*$')     # `data[1]` has no unit
 
+_NO_ENDS = ('1', '-', 'kp', 'Kp', 'KP')      # `force_kp` is the gain of a controller
+
 
 def unit_in(name: str) -> str:
     """Return the unit in the name of a column, as ``p_bar`` or ``p [bar gauge]``; '' if none."""
@@ -32,7 +34,7 @@ def unit_in(name: str) -> str:
     parts = re.split(r'[_\s.,/]+', name.strip())
     for count in (2, 1):                    # bar_gauge, then bar
         text = '_'.join(parts[-count:])
-        if len(parts) > count and text not in ('1', '-') and (ends_a_name(text) or any(
+        if len(parts) > count and text not in _NO_ENDS and (ends_a_name(text) or any(
                 unit_of_text(text, one) for one in FACTORS)):
             return text
     return ''

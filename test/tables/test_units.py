@@ -39,6 +39,13 @@ def test_what_is_no_pressure(text):
     assert unit_of_text(text, PRESSURE) is None
 
 
+@pytest.mark.parametrize('text, quantity, size', [
+    ('daN', 'force', 10.0), ('kp', 'force', 9.80665), ('kp/cm²', PRESSURE, 98066.5),
+    ('kg/cm2', PRESSURE, 98066.5), ('N/mm²', PRESSURE, 1e6), ('inches', 'length', 0.0254)])
+def test_units_that_testing_machines_write(text, quantity, size):
+    assert unit_of_text(text, quantity).factor == pytest.approx(size)
+
+
 def test_capitals_that_are_a_prefix_count():
     assert unit_of_text('MM', 'length') is None and unit_of_text('Mm', 'length') is None
     assert unit_of_text('MS', TIME) is None and unit_of_text('Ms', TIME) is None
@@ -66,7 +73,9 @@ def test_the_steps_of_an_encoder_are_no_unit(text):
 
 
 @pytest.mark.parametrize('name, unit, words', [
-    ('Encoder_counts', 'counts', 'encoder'), ('p_mA', 'mA', 'p'), ('x_ma', '', 'x ma'),
+    ('F_daN', 'daN', 'f'), ('F [kp]', 'kp', 'f'), ('force_kp', '', 'force kp'),
+    ('p [kp/cm²]', 'kp/cm²', 'p'), ('Encoder_counts', 'counts', 'encoder'),
+    ('p_mA', 'mA', 'p'), ('x_ma', '', 'x ma'),
     ('p_bar', 'bar', 'p'), ('Pressure [kPa gauge]', 'kPa gauge', 'pressure'),
     ('t_nominal_s', 's', 't nominal'), ('Force (N)', 'N', 'force'), ('time', '', 'time'),
     ('p_kpa_gauge', 'kpa_gauge', 'p'), ('loadCell', '', 'load cell'),
