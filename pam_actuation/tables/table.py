@@ -20,6 +20,7 @@ import re
 from typing import TYPE_CHECKING
 
 import numpy as np
+from pam_actuation.tables.thousands import are_marked, marks_of, SENTENCE
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.errors import did_you_mean, InputError
 
@@ -111,7 +112,7 @@ class Table:
         """Return whether the first value of a column is no number."""
         first = self.columns[name].iloc[0] if len(self) else ''
         return isinstance(first, str) and bool(first.strip()) and (
-            _number(str(self._pointed(first))) is None)
+            _number(first.replace(self.decimal, '.')) is None and not are_marked(first))
 
     def numbers(self, name: str, missing: Collection[str] = ()) -> FloatArray:
         """
@@ -129,7 +130,8 @@ class Table:
             texts = column.astype(object)
             empty = column.isna() | texts.map(
                 lambda one: isinstance(one, str) and one.strip() in {'', *missing})
-            values = pd.to_numeric(texts.where(~empty, None).map(self._pointed), errors='coerce')
+            values = pd.to_numeric(
+                self._pointed(texts.where(~empty, None)), errors='coerce')
             wrong = np.flatnonzero(values.isna().to_numpy() & ~empty.to_numpy())
             if len(wrong):
                 text = str(texts.iloc[wrong[0]])
@@ -141,9 +143,11 @@ class Table:
         lacking = [value for value in map(_number, missing) if value is not None]
         return np.where(np.isin(numbers, lacking), np.nan, numbers) if lacking else numbers
 
-    def _pointed(self, value: object) -> object:
-        """Return a text with a decimal point; anything else as it is."""
-        return value.replace(self.decimal, '.') if isinstance(value, str) else value
+    def _pointed(self, values: 'pd.Series') -> 'pd.Series':
+        """Return texts with a decimal point, and without marks between thousands."""
+        marks = marks_of((one for one in values.array if isinstance(one, str)), self.decimal)
+        return values.map(lambda one: one if not isinstance(one, str) else marks.plain(one)
+                          if marks else one.replace(self.decimal, '.'))
 
 
 def no_column_in(tables: Iterable[Table], wanted: str) -> str:
@@ -174,6 +178,8 @@ def _short(text: str) -> str:
 def _number_fix(text: str, decimal: str, name: str) -> str:
     if text.strip() == name:
         return 'a second table begins here: split the file'
+    if are_marked(text):
+        return SENTENCE
     if decimal == '.' and re.fullmatch(r'\s*[+-]?[\d.]*,\d+\s*', text):
         return 'the file mixes decimal points and commas: write one of them everywhere'
     return f'if it stands for a missing value, add --missing {_short(text.strip())}'

@@ -20,6 +20,7 @@ from typing import NamedTuple, TextIO, TYPE_CHECKING
 
 import numpy as np
 from pam_actuation.tables.formats.layout_of_text import COMMENTS, split, TextLayout
+from pam_actuation.tables.thousands import SENTENCE
 from pam_sim.annotations import BoolArray, IntArray
 from pam_sim.errors import InputError
 
@@ -79,8 +80,7 @@ class WatchedText:
             rf'(?<![^{between}\s"])[+-]?\d{{1,3}}(\.\d{{3}})+(?![^{between}\s"])', text)
         if found and self.line + _ends(text[:found.start()]) >= self._layout.first_line:
             raise InputError(
-                f'{found[0]!r} stands beside numbers with decimal commas: are there points '
-                'between thousands? Write numbers without them',
+                f'{found[0]!r} stands beside numbers with decimal commas: {SENTENCE}',
                 f'{self._path}:{self.line + _ends(text[:found.start()])}')
 
     def __iter__(self) -> Iterator[str]:

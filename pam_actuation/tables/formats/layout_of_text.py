@@ -19,6 +19,7 @@ import csv
 from dataclasses import dataclass, field
 import re
 
+from pam_actuation.tables.thousands import with_thousands
 from pam_sim.errors import InputError
 
 SAMPLE_BYTES = 256 * 1024
@@ -124,6 +125,11 @@ def layout_of(head: bytes, source: str) -> TextLayout:
                       line_bytes * WIDTH.get(encoding, 1), remark, called)
 
 
+def _number(decimal: str) -> re.Pattern[str]:
+    """Return the expression of a number with a decimal sign."""
+    return re.compile(f'{_NUMBER.format(re.escape(decimal))}|{with_thousands(decimal)}')
+
+
 def _names(above: list[str], separator: str) -> int:
     """Return how many names the line above the rows holds with a separator, 0 for one alone."""
     fields = split(next((line for line in reversed(above) if line.strip()), ''), separator)
@@ -173,7 +179,7 @@ def _first_row(lines: list[str], separator: str, decimal: str) -> tuple[int, flo
     That is the share of their fields that are numbers, dates or empty, the number of fields of a
     row, and how many numbers all rows hold.
     """
-    number = re.compile(_NUMBER.format(re.escape(decimal)))
+    number = _number(decimal)
     numbers = fitting = of_rows = 0
 
     def kind(line: str, fields: list[str]) -> int:
@@ -239,7 +245,7 @@ def _header(above: list[str], separator: str, count: int, begin: int, source: st
                 f'{count} (separator {_told(separator)}, decimal sign "{decimal}"); correct '
                 'the header, or write decimal points', f'{source}:{begin}')
         return [], ()
-    number = re.compile(_NUMBER.format(re.escape(decimal)))
+    number = _number(decimal)
     if all(number.fullmatch(one) or _DATE.fullmatch(one) or one.lower() in _EMPTY
            for one in last):
         return [], ()               # the first row of a file without names, with empty fields
