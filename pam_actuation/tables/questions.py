@@ -21,7 +21,8 @@ import re
 from pam_actuation.tables.mapping import column_of_text
 from pam_actuation.tables.signals import Signal
 from pam_actuation.tables.units import (
-    DUTY, example_of, filled_unit, form_of, GAIN, is_output, LENGTH, unit_of_text, VOLTAGE, ZERO)
+    ABSOLUTE, bare, DUTY, example_of, filled_unit, form_of, GAIN, GAUGE, is_output, LENGTH,
+    unit_of_text, ZERO)
 from pam_sim.errors import InputError
 
 _NUMBERS = re.compile(r'(?::\s*(?:zero|gain|missing)\s*=[^:]*)+$')
@@ -65,7 +66,7 @@ class Question:
     def choice(self) -> str:
         """Return among which answers a person at a terminal chooses, in words."""
         if self.any_unit:
-            return f'such as {self.answers[0]}, with numbers in place of capitals'
+            return f'such as {" or ".join(self.answers)}, with numbers in place of capitals'
         more = ', where the zero may be another' if any('zero=' in one and ZERO not in one
                                                         for one in self.answers) else ''
         more += ', with numbers in place of capitals' if any(
@@ -104,7 +105,9 @@ def of_output_column(signal: Signal, column: str, shown: str, unit: str) -> Ques
         The text that stands where a unit stands.
 
     """
-    target, form = filled_unit(signal.quantity), form_of(signal.quantity)
+    target = filled_unit(signal.quantity)
+    # A form for each kind of pressure; one for all else.
+    forms = tuple(dict.fromkeys(form_of(signal.quantity, kind) for kind in (GAUGE, ABSOLUTE)))
     share = _share_of(unit, signal.quantity)
     if share:
         return Question(
@@ -112,24 +115,23 @@ def of_output_column(signal: Signal, column: str, shown: str, unit: str) -> Ques
             f'the muscle at rest ({GAIN} is {_SHARES[share]}, in mm)?',
             (f'mm:gain={GAIN}',), True, True)
     example = example_of(unit, signal.quantity)
-    step = unit if example or unit == '%' else 'step'
+    step = bare(unit) if example or bare(unit) == '%' else 'step'
     asked = (f'which reading of it means 0 ({ZERO}), and how many {target.partition("_")[0]} is '
              f'one {step} ({GAIN})?' + (f' Such as {example}.' if example else ''))
     article = 'an' if signal.quantity[0] == 'a' else 'a'
     if needs_gain(unit, signal.quantity):
         return Question(signal.name, column, f'{shown}, in {unit}, which is no unit of {article} '
-                        f'{signal.quantity}: {asked}', (form,), True, True)
+                        f'{signal.quantity}: {asked}', forms, True, True)
     return Question(
         signal.name, column, f'{shown}, but "{unit}" is no known unit of {article} '
         f'{signal.quantity}: {asked} If it is not meant as a unit, state one in place of '
-        f'{form}.', (form,), True)
+        f'{forms[0]}.', forms, True)
 
 
 def needs_gain(unit: str, quantity: str) -> bool:
     """Return whether a text is known to be no unit of a quantity, but what stands for one."""
     return is_output(unit, quantity) or bool(_share_of(unit, quantity)) or (
-        quantity != DUTY and _name_of(unit, DUTY) == '%') or (
-        quantity != VOLTAGE and bool(_name_of(unit, VOLTAGE)))
+        quantity != DUTY and bare(unit) == '%')
 
 
 def _share_of(unit: str, quantity: str) -> str:

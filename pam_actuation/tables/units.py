@@ -16,6 +16,7 @@
 
 from dataclasses import dataclass
 import math
+import re
 
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import did_you_mean, InputError
@@ -63,6 +64,7 @@ _OTHER_STEPS = set("""
     brut grezzo crudo adc adu bit bits step steps stap stappen schritt schritte pas pasos passi
     strich striche code codes dn au a.u. cuentas conteos conteggi punkte points edges
     a ua hz khz uv mv/v v/v uv/v ohm kohm pf""".split())
+_RANGE = re.compile(r'[\s.]+(dc|fs|fso|f\.s\.?|rms|of (range|full scale|span))$', re.IGNORECASE)
 # What is left to be filled in, in the answer to a question.
 ZERO, GAIN = 'ZERO', 'GAIN'
 _FILLED = {PRESSURE: 'bar_gauge', LENGTH: 'mm', FORCE: 'N', ANGLE: 'deg', VOLTAGE: 'V', DUTY: '%'}
@@ -103,7 +105,7 @@ def unit_of_text(text: str, quantity: str) -> Unit | None:
     """
     wanted = text.strip().strip('[]()').strip()
     if quantity != PRESSURE:
-        name = _spelled(wanted, quantity)
+        name = _spelled(_RANGE.sub('', wanted) if quantity == VOLTAGE else wanted, quantity)
         return None if name is None else Unit(name, FACTORS[quantity][name])
     flat = wanted.replace('(', '_').replace(')', '').replace(' ', '_').replace('-', '_')
     base, _, ending = flat.partition('_')
@@ -156,6 +158,7 @@ def of_output(text: str, quantity: str) -> str:
 
 def example_of(text: str, quantity: str) -> str:
     """Return how an output of a usual range is mapped, such as 4 to 20 mA; '' for others."""
+    text = bare(text)
     if text not in _OUTPUTS or quantity not in _SPANS:
         return ''
     (zero, wide), (span, unit) = _OUTPUTS[text], _SPANS[quantity]
@@ -167,7 +170,13 @@ def example_of(text: str, quantity: str) -> str:
 def is_output(text: str, quantity: str) -> bool:
     """Return whether a text names what sensors put out, such as mA, and no unit of a quantity."""
     return unit_of_text(text, quantity) is None and (
-        text in _OUTPUTS or _flat(text) in _STEPS | _OTHER_STEPS)
+        bare(text) in _OUTPUTS or _flat(bare(text)) in _STEPS | _OTHER_STEPS)
+
+
+def bare(text: str) -> str:
+    """Return what a sensor puts out without words on its range: ``V`` for ``Volt DC``."""
+    own = _RANGE.sub('', text.strip().strip('[]()').strip())
+    return _spelled(own, VOLTAGE) or own
 
 
 def ends_a_name(text: str) -> bool:
@@ -175,9 +184,10 @@ def ends_a_name(text: str) -> bool:
     return text == 'mA' or _flat(text) in _STEPS        # `x_ma` may be an average
 
 
-def form_of(quantity: str) -> str:
+def form_of(quantity: str, kind: str = GAUGE) -> str:
     """Return unit, zero and gain of an output of a sensor, to be filled in."""
-    return f'{filled_unit(quantity)}:zero={ZERO}:gain={GAIN}'
+    unit = filled_unit(quantity).replace(GAUGE, kind)
+    return f'{unit}:zero={ZERO}:gain={GAIN}'
 
 
 def filled_unit(quantity: str) -> str:

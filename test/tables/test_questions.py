@@ -41,6 +41,9 @@ def guessed(*columns, values=None):
     ('x [V]', 'contraction', 'mm:zero=ZERO:gain=GAIN'),
     ('Position [xyz]', 'contraction', 'mm:zero=ZERO:gain=GAIN'),
     ('p [mA]', 'pressure', 'bar_gauge:zero=ZERO:gain=GAIN'),
+    ('p [mA DC]', 'pressure', 'bar_gauge:zero=ZERO:gain=GAIN'),
+    ('Kraft [% FS]', 'force', 'N:zero=ZERO:gain=GAIN'),
+    ('x_volts', 'contraction', 'mm:zero=ZERO:gain=GAIN'),
     ('p_mA', 'pressure', 'bar_gauge:zero=ZERO:gain=GAIN'),
     ('Druck [Digits]', 'pressure', 'bar_gauge:zero=ZERO:gain=GAIN'),
     ('Kraft [mV/V]', 'force', 'N:zero=ZERO:gain=GAIN'),
@@ -49,7 +52,9 @@ def guessed(*columns, values=None):
     ('Kontraktion [%]', 'contraction', 'mm:gain=GAIN'), ('x [-]', 'contraction', 'mm:gain=GAIN')])
 def test_a_unit_that_is_none_of_the_signal_needs_a_gain(column, signal, answer):
     question, = guessed(column).questions
-    assert (question.signal, question.answers) == (signal, (answer,))
+    answers = (answer, answer.replace('gauge', 'abs')) if signal == 'pressure' else (answer,)
+    assert (question.signal, question.answers) == (signal, answers) and question.is_output == (
+        column != 'Position [xyz]')
 
 
 def test_what_the_question_says():
@@ -57,6 +62,7 @@ def test_what_the_question_says():
     assert 'in counts, which is no unit of a length' in said and 'mm is one step' in said
     said = question_sentence(guessed('p [mA]'))
     assert 'zero=4:gain=0.625 for 10 bar over 4 to 20 mA' in said
+    assert 'one V (GAIN)? Such as mm:gain=10' in question_sentence(guessed('x [Volt DC]'))
     assert '1/100 of that length, in mm' in question_sentence(guessed('Kontraktion [%]'))
     assert 'state one in place of' in question_sentence(guessed('x (left)'))
 
