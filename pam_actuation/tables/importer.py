@@ -28,10 +28,13 @@ from pam_actuation.bags.writer import BagWriter
 from pam_actuation.messages import START_NS, VALVE_NAMES
 from pam_actuation.namespaces import JOINT, MUSCLE, namespace_of
 from pam_actuation.tables.clock import clock_of
+from pam_actuation.tables.guess import unit_of_column
 from pam_actuation.tables.mapping import TableMapping
 from pam_actuation.tables.plausible import Doubt, doubts
 from pam_actuation.tables.signals import are_of_joint, BY_NAME, of_muscles
 from pam_actuation.tables.table import no_column_in, Table
+from pam_actuation.tables.units import of_output
+from pam_actuation.tables.words import unit_in
 from pam_actuation.topics.contents import Make
 from pam_actuation.topics.table import topic_of
 from pam_sim.annotations import FloatArray, IntArray
@@ -146,6 +149,7 @@ def recording_of(tables: Sequence[Table], mapping: TableMapping, *, length_m: fl
         result.told.append(f'{Path(table.source).name}: time from {clock.told}')
         result.found += [Doubt(f'{Path(table.source).name}: {text}')
                          for text in (*table.remarks, *clock.remarks)]
+        result.found += _without_gain(table, mapping, held)
         for name, column in held.items():
             values = mapping.signals[name].to_si(table.numbers(column, missing)[clock.rows])
             pieces.setdefault(name, []).append((clock.stamp_ns, values, table.source))
@@ -155,6 +159,18 @@ def recording_of(tables: Sequence[Table], mapping: TableMapping, *, length_m: fl
         result.signals[name] = _joined(name, pieces[name])
     _check(result, length_m, accept)
     return result
+
+
+def _without_gain(table: Table, mapping: TableMapping, held: Mapping[str, str]) -> list[Doubt]:
+    """Return a doubt on each output of a sensor that is taken for a unit, by signal to column."""
+    found = []
+    for name, column in held.items():
+        one, unit = mapping.signals[name], unit_of_column(table, column)
+        said = of_output(unit, BY_NAME[name].quantity) if one.gain == 1.0 else ''
+        if said and unit_in(one.column) != unit:            # `doubts` sees what is in the name
+            found.append(Doubt(f'{name} (column "{column}" in {one.unit.name}): the file says '
+                               f'{unit}; {said}'))
+    return found
 
 
 def _joined(name: str, pieces: list[tuple[IntArray, FloatArray, str]]

@@ -118,3 +118,27 @@ def test_the_time_in_seconds_goes_before_that_in_ticks(tmp_path, monkeypatch):
         f'{84000 * k},{0.01 * k:.2f},{place}\n' for k, place in enumerate(PLACES)))
     assert main(['import', 'a.csv', '--out', 'bag']) == 0
     assert np.diff(load_run('bag')['contraction'].stamp_ns).max() == 10_000_000
+
+
+@pytest.mark.parametrize('ending', ['csv', 'xlsx'])
+def test_a_row_of_units_may_state_outputs_of_sensors(tmp_path, ending, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    rows = [['t', 'p', 'Encoder'], ['s', 'mA', 'counts'],
+            *([0.01 * k, 4 + place, 500 * place] for k, place in enumerate(PLACES.tolist()))]
+    frame = pd.DataFrame(rows)
+    if ending == 'csv':
+        frame.to_csv('m.csv', header=False, index=False)
+    else:
+        frame.to_excel('m.xlsx', header=False, index=False)
+    assert main(['import', f'm.{ending}', '--out', 'bag']) == 2
+    said = capsys.readouterr().err
+    assert '"p:bar_gauge:zero=ZERO:gain=GAIN"' in said
+    assert '"Encoder:mm:zero=ZERO:gain=GAIN"' in said
+    assert main(['import', f'm.{ending}', '--out', 'bag', '--map',
+                 'pressure=p:bar_gauge:zero=4:gain=0.625', '--map',
+                 'contraction=Encoder:mm:gain=0.005']) == 0
+    # Stated without a gain it is taken, and told.
+    capsys.readouterr()
+    assert main(['import', f'm.{ending}', '--out', 'plain', '--map',
+                 'pressure=p:bar_gauge:zero=4:gain=0.625', '--map', 'contraction=#3:um']) == 1
+    assert 'the file says counts' in capsys.readouterr().out

@@ -256,9 +256,9 @@ def _header(above: list[str], separator: str, count: int, begin: int, source: st
 
 
 def _are_units(fields: list[str]) -> bool:
-    from pam_actuation.tables.units import FACTORS, unit_of_text
-    known = sum(not one or any(unit_of_text(one, quantity) for quantity in FACTORS)
-                for one in fields)
+    from pam_actuation.tables.units import FACTORS, is_output, TIME, unit_of_text
+    known = sum(not one or is_output(one, TIME) or any(
+        unit_of_text(one, quantity) for quantity in FACTORS) for one in fields)
     return any(fields) and 2 * known > len(fields)
 
 
