@@ -33,7 +33,8 @@ _LATE_HOUR_NS = DAY_NS // 2         # back by more than this: midnight passed
 # A date in any order, a time of day of two or three parts, and a half of the day.
 PATTERN = (
     r'^\s*(?:(?P<first>\d{1,4})(?P<mark>[-/.])(?P<second>\d{1,2})[-/.](?P<third>\d{1,4})[T\s,]+)?'
-    r'(?P<hour>\d{1,2}):(?P<minute>\d{2})(?::(?P<second_of>\d{2}))?(?:[.,](?P<part>\d{1,9})\d*)?'
+    r'(?P<hour>\d{1,2}):(?P<minute>\d{2})(?::(?P<second_of>\d{2}))?'
+    r'(?:(?:[.,]|(?<=:\d\d:\d\d):(?=\d{3}))(?P<part>\d{1,9})\d*)?'
     r'\s*(?P<half>[AaPp]\.?[Mm]\.?)?\s*$')
 
 

@@ -53,6 +53,12 @@ def test_minutes_and_seconds_are_told_from_hours_and_minutes():
     assert found.stamp_ns.tolist() == [59_990_000_000, 60_005_000_000]
 
 
+def test_milliseconds_may_stand_behind_a_colon():
+    found = dates_of(pd.Series(['14.03.2026 23:59:59:995', '15.03.2026 00:00:00:000']))
+    assert np.diff(found.stamp_ns).tolist() == [5_000_000]
+    assert dates_of(pd.Series(['09:30:00:12'])) == 0
+
+
 def test_a_date_of_two_meanings_is_left_out_and_one_that_goes_on_is_not():
     said = [f'03/04/2026 09:30:00.{row:03d}' for row in range(0, 100, 5)]
     found = dates_of(pd.Series(said))
