@@ -70,6 +70,9 @@ def add_arguments(parser: Parser) -> None:
                         help='put rows in order whose time runs back')
     parser.add_argument('--missing', action='append', default=[], metavar='TEXT',
                         help='text that stands for a missing value; may be repeated')
+    parser.add_argument('--leave-out', action='append', default=[], metavar='COLUMN',
+                        help='a column that is no signal, so that nothing is asked of it; may be '
+                             'repeated')
     parser.add_argument('--accept', action='store_true',
                         help='take values that cannot be in the unit stated')
     parser.add_argument('--rig', type=source, default=None, metavar='NAME|FILE',
@@ -142,7 +145,8 @@ def _understood(args: argparse.Namespace) -> 'tuple[list[Table], Guess]':
         for done, file in enumerate(args.files):
             tables += read_tables(file, args.every, wanted, partial(_move, bar, done))
     # A file that is kept says everything.
-    found = as_stated(mapping) if args.mapping else guess(tables, mapping, args.missing)
+    found = as_stated(mapping) if args.mapping else guess(
+        tables, mapping, args.missing, args.leave_out)
     if found.questions and not args.preview:
         if sys.stdin.isatty() and sys.stdout.isatty() and not args.json:
             found = ask(found, _asked)

@@ -68,7 +68,7 @@ def as_stated(mapping: TableMapping) -> Guess:
 
 
 def guess(tables: Collection[Table], mapping: TableMapping,
-          missing: Collection[str] = ()) -> Guess:
+          missing: Collection[str] = (), left_out: Collection[str] = ()) -> Guess:
     """
     Complete a mapping from names, units and ranges.
 
@@ -82,12 +82,24 @@ def guess(tables: Collection[Table], mapping: TableMapping,
         What the user said.
     missing : collection of str
         Texts that stand for missing values.
+    left_out : collection of str
+        Columns that are no signals, by name or number.
+
+    Raises
+    ------
+    InputError
+        No table has a column that is left out.
 
     """
+    tables = list(tables)
+    for one in left_out:
+        if tables and all(table.name_of(one) is None for table in tables):
+            tables[0].require(one)
     found = as_stated(mapping)
     seen: dict[str, dict[str, tuple[ColumnMap, str] | Question]] = {}
     for table in tables:
         used = {table.name_of(one.column) for one in mapping.signals.values()}
+        used |= {table.name_of(one) for one in left_out}
         used |= {table.name_of(mapping.time.column)} if mapping.time is not None else set()
         for column in table.columns:
             if column in used or is_called_time(table, column):
@@ -113,17 +125,17 @@ def guess(tables: Collection[Table], mapping: TableMapping,
     measured = {name for name, of_name in seen.items() if not all(
         map(_is_output, of_name.values()))}
     if not joint and 'contraction' not in {*signals, *measured} and (
-            lengths := _of_lengths(tables, found.mapping, missing)):
+            lengths := _of_lengths(tables, found.mapping, missing, left_out)):
         found.questions = [one for one in found.questions if one.signal != 'contraction']
         found.questions += lengths
     return found
 
 
-def _of_lengths(tables: Collection[Table], mapping: TableMapping, missing: Collection[str]
-                ) -> list[Question]:
+def _of_lengths(tables: Collection[Table], mapping: TableMapping, missing: Collection[str],
+                left_out: Collection[str]) -> list[Question]:
     """Return a question where the length of the muscle stands in place of its contraction."""
-    used = {(id(table), table.name_of(one.column)) for table in tables
-            for one in mapping.signals.values()}
+    used = {(id(table), table.name_of(one)) for table in tables
+            for one in (*(own.column for own in mapping.signals.values()), *left_out)}
     lengths: dict[str, LengthColumn] = {}
     for table in tables:
         for column in table.columns:

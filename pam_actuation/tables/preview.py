@@ -90,7 +90,8 @@ def questions_text(found: Guess) -> str:
 
 def question_sentence(found: Guess) -> str:
     """Return the questions as one sentence, for the end of a call that cannot ask."""
-    return ' '.join(f'{one.text} Add {one.options()}.' for one in found.questions)
+    return ' '.join(f'{one.text} Add {one.options()}, or --leave-out "{one.column or "COLUMN"}".'
+                    for one in found.questions)
 
 
 def how_to_begin(tables: Collection[Table], found: Guess) -> str:

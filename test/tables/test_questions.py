@@ -57,6 +57,19 @@ def test_a_unit_that_is_none_of_the_signal_needs_a_gain(column, signal, answer):
         column != 'Position [xyz]')
 
 
+def test_a_column_that_is_no_signal_may_be_left_out(tmp_path, capsys):
+    path = tmp_path / 'm.csv'
+    path.write_text('t_s,p_bar_gauge,x [V],Weg (Ink)\n' + ''.join(
+        f'{0.01 * k:.2f},{k / 100},{k / 50},{k}\n' for k in range(200)))
+    words = ['import', str(path), '--out', str(tmp_path / 'bag')]
+    assert main(words) == 2
+    assert '--leave-out' in capsys.readouterr().err
+    assert main([*words, '--leave-out', 'x [V]', '--leave-out', 'nothing']) == 2
+    assert 'nothing' in capsys.readouterr().err
+    assert main([*words, '--leave-out', 'x [V]', '--leave-out', '#4']) == 0
+    assert 'contraction' not in load_run(tmp_path / 'bag')
+
+
 def test_what_the_question_says():
     said = question_sentence(guessed('Encoder [counts]'))
     assert 'in counts, which is no unit of a length' in said and 'mm is one step' in said
