@@ -73,7 +73,7 @@ def _arrays(content: dict[str, Any], prefix: str = '', depth: int = 0
 
 
 def write(frame: 'pd.DataFrame', path: str) -> None:
-    """Write a data frame as a MAT file, one array a column; dot and stroke become ``_``."""
+    """Write a data frame as a MAT file, one array a column; dot and slash become ``_``."""
     from scipy.io import savemat
     with open(path, 'wb') as stream:
         savemat(stream, {re.sub('[./]', '_', str(name)): frame[name].to_numpy()
