@@ -162,10 +162,12 @@ def start_contraction_m(rig: Rig, read_m: float, pressure_pa: float) -> float:
     stop. From where it is read the load would fall, and its load cell would show no force.
     """
     contraction_m = min(max(read_m, 0.0), rig.muscle.stroke_m)
-    if (0.0 < contraction_m < NEAR_STOP_M and LOADS[rig.load].MOVES_FREELY
-            and rig.static_contraction_m(pressure_pa) == 0.0):
-        return 0.0
-    return contraction_m
+    if not 0.0 < contraction_m < NEAR_STOP_M or not LOADS[rig.load].MOVES_FREELY:
+        return contraction_m
+    # In every simulation of a fit: the force at full length alone, and no search for the rest.
+    full_n = rig.parameters['force_map_gain'] * rig.muscle.law.law.force_n(
+        pressure_pa - P_ATM_PA, 0.0, outside='allow')
+    return 0.0 if full_n <= rig.tension_n(0.0) else contraction_m
 
 
 def simulate(rig: Rig, recording: Recording, valve_signal: FloatArray, start_error_pa: float = 0.0
