@@ -20,6 +20,7 @@ from pathlib import Path
 from pam_actuation.tables.formats.layout_of_text import encoding_of, layout_of, split
 from pam_sim.errors import InputError
 from pam_sim.files import refuse_pipe, StrPath
+from pam_sim.muscle.lookup_table import lines_and_source
 
 
 def rows_of_text(path: StrPath) -> tuple[list[list[str]], str]:
@@ -41,9 +42,7 @@ def rows_of_text(path: StrPath) -> tuple[list[list[str]], str]:
     except OSError as error:
         raise InputError(f'cannot be read as a table: {error}', str(path)) from None
     text = raw.decode(encoding_of(raw, str(path)), errors='replace').removeprefix('\ufeff')
-    lines = [line for line in text.splitlines() if line.strip()]
-    source = '\n'.join(line[1:].strip() for line in lines if line.startswith('#'))
-    lines = [line for line in lines if not line.startswith('#')]
+    lines, source = lines_and_source(text.splitlines())
     try:
         layout = layout_of('\n'.join([*lines, '']).encode(), str(path))
     except InputError:

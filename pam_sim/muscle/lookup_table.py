@@ -14,7 +14,7 @@
 
 """The table behind the lookup law: contraction and air mass against pressure and load."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 import csv
 from dataclasses import dataclass
 import os
@@ -112,6 +112,13 @@ class LookupTable:
                         pressure, load, self.strain[i, j], self.air_mass_kg[i, j])])
 
 
+def lines_and_source(lines: Iterable[str]) -> tuple[list[str], str]:
+    """Return (lines that hold cells, text of the ``#`` lines) of a table."""
+    held = [line for line in lines if line.strip()]
+    source = '\n'.join(line[1:].strip() for line in held if line.startswith('#'))
+    return [line for line in held if not line.startswith('#')], source
+
+
 def read_commented_csv(path: str | os.PathLike[str]) -> tuple[list[list[str]], str]:
     """
     Return (rows, text of the ``#`` lines) of a CSV file.
@@ -127,9 +134,8 @@ def read_commented_csv(path: str | os.PathLike[str]) -> tuple[list[list[str]], s
         lines = Path(path).read_text(encoding='utf-8').splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f'cannot be read as a table: {error}', str(path)) from None
-    source = '\n'.join(line[1:].strip() for line in lines if line.startswith('#'))
-    return list(csv.reader(
-        line for line in lines if line.strip() and not line.startswith('#'))), source
+    cells, source = lines_and_source(lines)
+    return list(csv.reader(cells)), source
 
 
 def read_table(path: str | os.PathLike[str]) -> LookupTable:
