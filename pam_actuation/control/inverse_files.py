@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """The static inverse of a controller file: its own table, or that of the mode or the rig."""
 
 from typing import TYPE_CHECKING

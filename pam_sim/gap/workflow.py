@@ -20,7 +20,7 @@ import time
 from pam_sim.gap.criteria import CRITERIA, Criteria
 from pam_sim.gap.data.commanded import all_commanded
 from pam_sim.gap.data.health import check_for, without_dead
-from pam_sim.gap.data.holes import cut_at_holes
+from pam_sim.gap.data.holes import split_at_holes
 from pam_sim.gap.data.overlap import check_apart
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.resting import rest_of
@@ -114,7 +114,7 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     if certify is not None:
         check_apart(runs, certify, criteria)
     runs, certify, told = all_commanded(runs, certify, rig)
-    runs, certify, holes, refusals = cut_at_holes(
+    runs, certify, holes, refusals = split_at_holes(
         runs, certify, criteria.min_duration_s, rig.is_driven)
     health = [check_for(run, rig, criteria)
               for run in [*runs, *([certify] if certify else [])]]

@@ -29,8 +29,8 @@ from pam_sim.run import HELD_TOPICS, Run, Series
 # A hole is longer than this, and than so many periods of a slow log: within less, a straight line
 # between readings does less harm than a new start.
 HOLE_S, HOLE_PERIODS = 0.25, 5.0
-LONE = ('the recording has {holes}, so that no stretch of {least_s:g} s is left; repair the '
-        'logger, or record again')
+NONE_LEFT = ('the recording has {holes}, so that no stretch of {least_s:g} s is left; repair the '
+             'logger, or record again')
 COUNT = '{path}: {holes}; the stretches without a hole count as {count} recordings'
 SHORT = ', without those of less than {least_s:g} s'
 
@@ -60,7 +60,7 @@ def stretches(run: Run, least_s: float, driven: bool = False) -> tuple[list[Run]
     ends = [*(begin for begin, _ in every), run.end_ns]
     kept = [(begin, end) for begin, end in zip(begins, ends) if end - begin >= least_s * 1e9]
     if not kept:
-        return [], LONE.format(holes=told, least_s=least_s)
+        return [], NONE_LEFT.format(holes=told, least_s=least_s)
     kept.sort(key=lambda ends: ends[0] - ends[1])
     text = COUNT.format(path=run.path or 'recording', holes=told, count=len(kept))
     if len(kept) < len(begins):
@@ -68,8 +68,9 @@ def stretches(run: Run, least_s: float, driven: bool = False) -> tuple[list[Run]
     return [between(run, *one) for one in kept], text
 
 
-def cut_at_holes(runs: Sequence[Run], certify: Run | None, least_s: float, driven: bool = False
-                 ) -> tuple[list[Run], Run | None, list[str], list[str]]:
+def split_at_holes(runs: Sequence[Run], certify: Run | None, least_s: float,
+                   driven: bool = False
+                   ) -> tuple[list[Run], Run | None, list[str], list[str]]:
     """
     Return (runs, certify, remarks, refusals) of a question: stretches stand for runs with holes.
 
