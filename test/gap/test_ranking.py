@@ -14,6 +14,7 @@
 
 """Which rivals the data tell apart, and which experiment would."""
 
+from dataclasses import replace
 import math
 from types import SimpleNamespace
 
@@ -175,6 +176,20 @@ def test_a_friction_is_not_replaced_by_the_loop_that_has_turned_into_it(
     named = [NamedEffect(n, 'muscle', [], (n,)) for n in ('coulomb_friction', 'hysteresis')]
     gone, without = backward._simpler(given, both, named[0], narrow, named)
     assert gone.name == goes and without is (dry if goes == 'hysteresis' else narrow)
+
+
+@pytest.mark.parametrize('z, best', [(3.5, 'parallel_spring'), (1.0, 'force_gain')])
+def test_what_needs_no_unlikely_number_is_fitted_to_its_end(z, best):
+    """A fit that stopped early is behind one in which a number does what is missing."""
+    problem = Blocks(60)
+    problem.known = [Known('damping_n_s_per_m', 'N s/m', 25.0, 0.5, 0.0, 100.0)]
+    case = Tied(problem, 5.0, {'force_gain': 0.5, 'parallel_spring': 2.0})
+    for r, deviation in zip(case.rivals, (z, 0.0)):
+        r.found = replace(r.found, known_z={'muscle': np.array([deviation])})
+    spring = case.rivals[1].found
+    ended = replace(spring, errors={'muscle': errors(problem, 1, np.zeros(60))})
+    case.polish = lambda found: ended if found is spring else found
+    assert case.names() == [best]
 
 
 @pytest.mark.parametrize('within, names_stand', [(0.99, True), (0.9, False)])

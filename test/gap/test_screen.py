@@ -16,6 +16,7 @@
 
 from gap_runs import nominal, recorded, voltages
 import numpy as np
+from pam_sim.gap.criteria import CRITERIA
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.select.candidates import candidates
@@ -42,6 +43,17 @@ def test_what_a_lasting_misfit_hides_promises_at_full_weight():
     base, found = screened(softer, nominal(), voltages(24.0))
     assert base.temper['muscle'][0] > 30.0            # the weight of contraction has gone
     assert first([s.flat for s in found], 'muscle') == 'thermal_softening'
+
+
+def test_what_a_number_at_the_end_of_its_range_cannot_do_is_promised():
+    """More damping than a number that is inexact may have: it stops, and does not explain it."""
+    damped = nominal().with_(effects=[
+        {'name': 'viscous_damping', 'parameters': {'damping_n_s_per_m': 2.5}}])
+    base, found = screened(damped, nominal(), voltages(24.0))
+    deviations = {abs(float(z)) for z in base.known_z['muscle']}
+    assert max(deviations) == pytest.approx(CRITERIA.max_prior_sd, abs=1e-3)
+    assert next(s for s in found if s.candidate.effect == 'viscous_damping'
+                ).promise['muscle'] > 0.3
 
 
 def test_switching_times_are_tried_one_by_one():

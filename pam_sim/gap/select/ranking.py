@@ -99,6 +99,7 @@ class Ranking:
         near = max(near, 1.0 - (1.0 - least) / criteria.greater_part)
         self._polish([r for r in ranked if r.share[s] > near and gap(
             problem, r.found.errors[s]) > self.seen_gap])
+        self._polish(self._likelier(ranked, s))
         ranked, is_tied, is_same = self._judged(ranked, current, problem, before)
         # One within the noise counts as behind only where it would not come nearer.
         if self._polish([r for r in ranked if r.share[s] > near and not is_tied(r)]):
@@ -122,6 +123,20 @@ class Ranking:
                 and same_as(r.name) not in names]
         return in_order(tied, ranked, s, uncertain_numbers(self.estimator.problems, criteria),
                         criteria.close_share * max(top - before, 0.0))
+
+    def _likelier(self, ranked: Sequence[Rival], subsystem: str) -> list[Rival]:
+        """
+        Return the rivals with numbers that are likelier for certain than those of the best.
+
+        The numbers of the best may do what is missing.
+        """
+        criteria = self.criteria
+        best = max(ranked, key=lambda r: r.share[subsystem], default=None)
+        if best is None:
+            return []
+        cost = self._prior_cost(best.found) - criteria.certain_sd ** 2
+        return [r for r in ranked if self._prior_cost(r.found) < cost
+                and r.share[subsystem] > criteria.greater_part * best.share[subsystem]]
 
     def _polish(self, rivals: Sequence[Rival]) -> bool:
         """Let those go on that have not yet; return whether there were any."""

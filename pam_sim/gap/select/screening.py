@@ -24,7 +24,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from pam_sim.annotations import FloatArray
+from pam_sim.annotations import BoolArray, FloatArray
 from pam_sim.errors import InputError
 from pam_sim.gap.fit.candidate import Candidate
 from pam_sim.gap.fit.estimator import Estimator
@@ -34,6 +34,7 @@ from pam_sim.gap.subsystems.parallel import parallel_map
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 
 AMPLITUDE_RANGE = (0.05, 30.0)      # of the screening size, for the start of a fit
+_NEAR_END = 0.01                    # numerics: of a number to the end, in deviations
 
 # Parameters that were tried, and what they change by subsystem.
 Changes = Sequence[tuple[Mapping[str, float], Mapping[str, FloatArray]]]
@@ -65,6 +66,8 @@ class ErrorSpace:
         self.problem, self.mask = problem, np.isin(problem.part, estimator.use)
         self.weight = 1.0 / np.sqrt(near.temper[problem.subsystem][problem.signal[self.mask]])
         slopes = estimator.slopes[problem.subsystem][self.mask] * self.weight[:, np.newaxis]
+        # What a number cannot do any more is left to an effect.
+        slopes = slopes * ~_stopped(estimator, problem, near)
         # The priors as further rows: numbers may move only as far as they are uncertain.
         self.basis, _ = np.linalg.qr(np.vstack([slopes, np.eye(slopes.shape[1])]))
         self.left = self.free_of_known(near.errors[problem.subsystem],
@@ -82,6 +85,14 @@ class ErrorSpace:
         signal = self.problem.signal[self.mask]
         return max(float(np.sqrt(np.mean(plain[signal == s] ** 2)))
                    for s in range(len(self.problem.signals)))
+
+
+def _stopped(estimator: Estimator, problem: SubsystemProblem, near: Fit) -> BoolArray:
+    """Return which of the known numbers stopped where a number would be wrong, not inexact."""
+    z = near.known_z[problem.subsystem]
+    ends = np.array([estimator.box if k.of_rig and k.name not in near.hypothesis.numbers
+                     else np.inf for k in problem.known])
+    return np.abs(z) >= ends - _NEAR_END
 
 
 def screen(estimator: Estimator, near: Fit, found: Iterable[Candidate]) -> list[Screened]:
