@@ -33,12 +33,14 @@ sys.path[:0] = [str(ROOT), str(ROOT / 'docs')]
 from generate import pages                      # noqa: E402
 from generate.mathml import add_mathml          # noqa: E402
 from generate.navigation import add_quick_navigation    # noqa: E402
+from generate.tree_search import search_quickly         # noqa: E402
 from pam_actuation import __version__           # noqa: E402
 from sphinx.domains.python import PythonDomain  # noqa: E402
 from sphinx.search.en import SearchEnglish      # noqa: E402
 
 # The trees of all pages are kept: looks for garbage among them took a quarter of the time.
-gc.set_threshold(200_000, 50, 50)
+gc.set_threshold(1_000_000, 50, 50)
+search_quickly()
 
 project = 'pam_actuation'
 author = 'pam_actuation developers'
