@@ -29,6 +29,7 @@ from pam_actuation.experiments.offline import simulate_experiment
 from pam_actuation.report.metrics import run_metrics
 from pam_actuation.tuning.closed_loop import ClosedLoop
 from pam_sim import load_rig
+from pam_sim.compiled import interpreted
 
 RIG, CONTROLLER, SEED = 'dmsp_5_300_realistic', 'sofc_ppr', 1
 CYCLES, LOAD_AT = 40, 20
@@ -122,7 +123,7 @@ def _reference(run, folder):
 def _sets(run, folder):
     universe_mm = 2.0
     grid = np.linspace(-2.0, 2.0, 401)
-    degrees = np.array([memberships(value / universe_mm) for value in grid])
+    degrees = np.array([interpreted(memberships)(value / universe_mm) for value in grid])
     time_s, error = _state(run, 'error_m')
     with drawn(folder / 'control_2_sets.svg', 2) as (left, right):
         for degree, colour in zip(degrees.T, (*PALETTE[1:4], RED, *PALETTE[3:0:-1])):
@@ -188,7 +189,7 @@ def _index(folder):
     error, rate = np.linspace(-2.0, 2.0, 81), np.linspace(-40.0, 40.0, 81)
     with drawn(folder / 'control_5_index.svg', 2, sharey=True) as axes:
         for axis, tau_s in zip(axes, (0.06, 0.001)):
-            values = np.array([[1e3 * index_linear(1e-3 * e, 1e-3 * v, tau_s, 2e-3)
+            values = np.array([[1e3 * interpreted(index_linear)(1e-3 * e, 1e-3 * v, tau_s, 2e-3)
                                 for v in rate] for e in error])
             picture = axis.pcolormesh(rate, error, values, cmap='RdBu_r', vmin=-2, vmax=2,
                                       shading='gouraud', rasterized=True)
@@ -211,8 +212,8 @@ def _credit(run, folder):
         left.set(xlabel='time, s', xlim=(0, 0.8), ylabel='index, mm', title='now: the grey line')
         left.legend()
         offsets = np.arange(-spread, spread + 1)
-        right.bar(5.0 * offsets - 1e3 * delay_s, [kernel_weight(o, spread) for o in offsets],
-                  width=4.0, color=BLUE)
+        weights = [interpreted(kernel_weight)(o, spread) for o in offsets]
+        right.bar(5.0 * offsets - 1e3 * delay_s, weights, width=4.0, color=BLUE)
         right.set(xlabel='time before now, ms', ylabel='weight', title='the kernel')
 
 
