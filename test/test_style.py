@@ -125,15 +125,20 @@ def statements(node):
             yield from statements(one)
 
 
-def out_of_order(file, style):
+def parsed(file):
+    """Return the lines of a file and its module."""
+    text = file.read_text(encoding='utf-8')
+    return text.splitlines(keepends=True), ast.parse(text)
+
+
+def out_of_order(name, lines, module, style):
     """Return the mistakes in the order of the imports of a file, as ament_flake8 names them."""
     from flake8_import_order.checker import ImportOrderChecker
-    text = file.read_text(encoding='utf-8')
     # It looks at no import in a function or class: without those it is ten times as fast.
-    imports = [node for node in ast.parse(text).body
+    imports = [node for node in module.body
                if isinstance(node, (ast.Import, ast.ImportFrom, ast.If))]
-    checker = ImportOrderChecker(str(file), ast.Module(imports, []))
-    checker.lines = text.splitlines(keepends=True)
+    checker = ImportOrderChecker(name, ast.Module(imports, []))
+    checker.lines = lines
     checker.options = {
         'import_order_style': style, 'application_import_names': [],
         'application_package_names': []}
@@ -141,17 +146,79 @@ def out_of_order(file, style):
             if error.code != 'I202']
 
 
-def shadowed(file):
+def shadowed(lines, module):
     """Return the lines on which a class gives a method or an attribute the name of a builtin."""
-    text = file.read_text(encoding='utf-8')
-    meant = {number for number, line in enumerate(text.splitlines(), 1) if 'noqa: A003' in line}
-    of_classes = (one for node in statements(ast.parse(text))
+    of_classes = (one for node in statements(module)
                   if isinstance(node, ast.ClassDef) for one in node.body)
     named = ((one.lineno, name) for one in of_classes for name in (
         [one.name] if isinstance(one, (ast.FunctionDef, ast.AsyncFunctionDef))
         else [getattr(target, 'id', '') for target in getattr(one, 'targets', ())]))
     return [line for line, name in named
-            if hasattr(builtins, name) and not name.startswith('__') and line not in meant]
+            if hasattr(builtins, name) and not name.startswith('__')
+            and 'noqa: A003' not in lines[line - 1]]
+
+
+def first_row(node):
+    """Return the line on which a statement begins, with its decorators."""
+    return min([node.lineno, *(one.lineno for one in getattr(node, 'decorator_list', ()))])
+
+
+def crowded(lines, module):
+    """Return the lines of methods that follow the first line of their class at once, CNL100."""
+    methods = (node.body[0] for node in statements(module) if isinstance(node, ast.ClassDef)
+               and isinstance(node.body[0], (ast.FunctionDef, ast.AsyncFunctionDef)))
+    return [row for row in map(first_row, methods)
+            if lines[row - 2].strip() and not lines[row - 2].lstrip().startswith('#')]
+
+
+def rows_of(node, lines):
+    """Yield (first, last) line of what may be continued lines of a statement."""
+    for one in getattr(node, 'decorator_list', ()):
+        yield one.lineno, one.end_lineno
+    begin = node.pattern.lineno if isinstance(node, ast.match_case) else node.lineno
+    if not getattr(node, 'body', ()):
+        text = getattr(node, 'value', None)
+        if not isinstance(node, ast.Expr) or not isinstance(text, ast.Constant) or (
+                lines[begin - 1].lstrip().startswith('(')):
+            yield begin, node.end_lineno
+        return
+    body = node.body[0]
+    row = first_row(body)
+    # Where the body begins on the last line of the head, it ends these lines.
+    beside = lines[row - 1].encode()[:body.col_offset].strip() and row == body.lineno
+    yield begin, body.end_lineno if beside else row - 1
+
+
+def continued(lines, module):
+    """Return the statements of more than one line, as (first, last) line in their order."""
+    found = []
+    for begin, end in sorted({
+            rows for node in statements(module) for rows in rows_of(node, lines)
+            if rows[0] < rows[1]}):
+        if found and begin <= found[-1][1]:
+            begin, end = found[-1][0], max(end, found.pop()[1])
+        found.append((begin, end))
+    return found
+
+
+def badly_continued(lines, module, options):
+    """
+    Return what pycodestyle says of continuation lines, as (line, code).
+
+    It gets to see the statements of more than one line only. Between them stand lines without
+    indentation, so that each may have its own.
+    """
+    import pycodestyle
+    parts, places = [], []
+    for begin, end in continued(lines, module):
+        parts += ['pass\n', *lines[begin - 1:end]]
+        places += [0, *range(begin, end + 1)]
+    checker = pycodestyle.Checker(lines=parts, options=options)
+    said = []
+    checker.report_error = lambda line, offset, text, check: said.append(
+        (places[line - 1], text[:4]))
+    checker.check_all()
+    return [one for one in said if one[1] in CONTINUATION_LINES]
 
 
 def test_ruff_finds_nothing():
@@ -166,43 +233,65 @@ def test_ruff_finds_nothing():
             for one in found] == []
 
 
-@pytest.mark.slow
-def test_continuation_lines_are_indented():
-    """And a class ends its first line with an empty one where a method follows, CNL100."""
-    pycodestyle = pytest.importorskip('pycodestyle')
-    plug_in = pytest.importorskip('flake8_class_newline')
-    pycodestyle.register_check(plug_in.new_line_checker, ['CNL1'])
-    guide = pycodestyle.StyleGuide(select=[*CONTINUATION_LINES, 'CNL1'], max_line_length=99)
-    assert guide.check_files(map(str, SOURCES)).total_errors == 0
-
-
 @pytest.fixture(scope='module')
 def google():
     styles = pytest.importorskip('flake8_import_order.styles')
     return styles.lookup_entry_point('google')
 
 
-def test_imports_have_the_order_of_google(google):
-    assert {str(path): found for path in SOURCES if (found := out_of_order(path, google))} == {}
+@pytest.fixture(scope='module')
+def continuation():
+    """Return the options of pycodestyle for continuation lines."""
+    pycodestyle = pytest.importorskip('pycodestyle')
+    return pycodestyle.StyleGuide(select=CONTINUATION_LINES, max_line_length=99).options
 
 
-def test_no_attribute_of_a_class_has_the_name_of_a_builtin():
+@pytest.fixture(scope='module')
+def found(google, continuation):
+    """Return {rule: {file: mistakes}} of all sources; each is read and parsed once."""
+    mistakes = {}
+    for path in SOURCES:
+        lines, module = parsed(path)
+        for rule, said in (
+                ('imports', out_of_order(str(path), lines, module, google)),
+                ('builtins', shadowed(lines, module)), ('classes', crowded(lines, module)),
+                ('continued', badly_continued(lines, module, continuation))):
+            mistakes.setdefault(rule, {}).update({str(path): said} if said else {})
+    return mistakes
+
+
+@pytest.mark.slow
+def test_continuation_lines_are_indented(found):
+    assert found['continued'] == {}
+
+
+def test_a_class_ends_its_first_line_with_an_empty_one_where_a_method_follows(found):
+    assert found['classes'] == {}
+
+
+def test_imports_have_the_order_of_google(found):
+    assert found['imports'] == {}
+
+
+def test_no_attribute_of_a_class_has_the_name_of_a_builtin(found):
     """A003 of flake8-builtins; that of Ruff looks only where such an attribute is used."""
-    assert {str(path): found for path in SOURCES if (found := shadowed(path))} == {}
+    assert found['builtins'] == {}
 
 
 def test_the_linters_say_what_flake8_with_its_plug_ins_says(google, tmp_path):
     pytest.importorskip('ruff')
-    for text, wanted, mistakes, lines in (
-            (BAD_SOURCE, FOUND_IN_SOURCE, [(2, 'I100'), (3, 'I100')], [8]),
-            (BAD_DOCSTRINGS, FOUND_IN_DOCSTRINGS, [], [])):
+    for text, wanted, mistakes, attributes, methods in (
+            (BAD_SOURCE, FOUND_IN_SOURCE, [(2, 'I100'), (3, 'I100')], [8], []),
+            (BAD_DOCSTRINGS, FOUND_IN_DOCSTRINGS, [], [], [])):
         file = tmp_path / 'bad.py'
         file.write_text(text, encoding='utf-8')
-        found = sorted((one['location']['row'], one['code']) for one in ruff(str(file)))
+        said = sorted((one['location']['row'], one['code']) for one in ruff(str(file)))
         # Of sections of a docstring Ruff finds more than pydocstyle.
-        assert [one for one in found if one not in ((29, 'D410'), (32, 'D411'))] == wanted
-        assert out_of_order(file, google) == mistakes
-        assert shadowed(file) == lines
+        assert [one for one in said if one not in ((29, 'D410'), (32, 'D411'))] == wanted
+        lines, module = parsed(file)
+        assert out_of_order(str(file), lines, module, google) == mistakes
+        assert shadowed(lines, module) == attributes
+        assert crowded(lines, module) == methods
 
 
 def test_pyproject_holds_the_rules_of_the_ament_linters():
