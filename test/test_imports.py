@@ -19,6 +19,7 @@ from pathlib import Path
 import re
 
 import pytest
+from source_trees import parsed, statements_in
 
 ROOT = Path(__file__).resolve().parent.parent
 # From the bottom: a room imports from its own row and from those above it in this table.
@@ -38,10 +39,9 @@ ABOVE_THE_PHYSICS = ('identify', 'characterise', 'gap', 'catalogue')
 
 
 def modules():
-    """Return {name: syntax tree} of all modules of both packages."""
+    """Return {name: file} of all modules of both packages."""
     return {
-        '.'.join(path.relative_to(ROOT).with_suffix('').parts).removesuffix('.__init__'):
-        ast.parse(path.read_text(encoding='utf-8'))
+        '.'.join(path.relative_to(ROOT).with_suffix('').parts).removesuffix('.__init__'): path
         for top in ('pam_sim', 'pam_actuation') for path in sorted((ROOT / top).rglob('*.py'))}
 
 
@@ -66,7 +66,7 @@ def imported(tree, known):
         found.update(name for name in names if name in known)
         if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
             found = within
-        waiting += [(child, found) for child in ast.iter_child_nodes(node)]
+        waiting += [(child, found) for child in statements_in(node)]
     return at_top, within
 
 
@@ -74,7 +74,7 @@ def imported(tree, known):
 def imports():
     """Return {module: (modules it imports at the top, those its functions import)}."""
     known = modules()
-    return {name: imported(tree, known) for name, tree in known.items()}
+    return {name: imported(parsed(path), known) for name, path in known.items()}
 
 
 @pytest.fixture(scope='module')

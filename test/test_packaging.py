@@ -16,6 +16,7 @@
 
 import ast
 import fnmatch
+import functools
 from pathlib import Path
 import re
 import subprocess
@@ -32,6 +33,7 @@ from pam_actuation.topics.table import RECORDED
 from pam_sim.errors import InputError
 import pytest
 from rosbags.typesys import get_typestore, Stores
+from source_trees import imports, parsed
 import yaml
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -84,16 +86,15 @@ def setup_keywords():
     return seen
 
 
+@functools.cache
 def imported_modules(folder):
     """Return {top-level module: files that import it} for all sources below a folder."""
     found = {}
     for path in sorted((ROOT / folder).rglob('*.py')):
-        for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'))):
-            names = []
+        for node in imports(parsed(path)):
+            names = [node.module] if isinstance(node, ast.ImportFrom) and node.level == 0 else []
             if isinstance(node, ast.Import):
                 names = [alias.name for alias in node.names]
-            elif isinstance(node, ast.ImportFrom) and node.level == 0:
-                names = [node.module]
             for name in names:
                 found.setdefault(name.split('.')[0], set()).add(path)
     return {k: v for k, v in found.items() if k not in sys.stdlib_module_names}

@@ -32,6 +32,7 @@ from pathlib import Path
 import re
 
 import pytest
+from source_trees import imports, parsed
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ('pam_sim', 'pam_actuation')
@@ -70,27 +71,32 @@ def numbered(tree):
 def imported(tree):
     """Return {name here: (module, name there)} of what a module imports by name."""
     found = {}
-    for node in ast.walk(tree):
+    for node in imports(tree):
         if isinstance(node, ast.ImportFrom) and node.module:
             found.update({one.asname or one.name: (node.module, one.name) for one in node.names})
     return found
 
 
-def refused(tree, numbers, own):
+def reads(tree):
+    """Return (what a module imports by name, its subscripts): all that is needed of its tree."""
+    return imported(tree), [node for node in ast.walk(tree) if isinstance(node, ast.Subscript)]
+
+
+def refused(of_module, numbers, own):
     """
     Return the lines of a module with a subscript that reads a record by number.
 
     Parameters
     ----------
-    tree : ast.Module
-        The module.
+    of_module : tuple
+        What ``reads`` says of the module.
     numbers : dict of str -> set of str
         Names of whole numbers of each module.
     own : set of str
         Those of this module.
 
     """
-    known = imported(tree)
+    known, subscripts = of_module
 
     def is_number(node):
         """Tell whether a name stands for a whole number set somewhere in the packages."""
@@ -103,8 +109,8 @@ def refused(tree, numbers, own):
         return False
 
     lines = set()
-    for node in ast.walk(tree):
-        if not isinstance(node, ast.Subscript) or UPPER.fullmatch(name_of(node.value)):
+    for node in subscripts:
+        if UPPER.fullmatch(name_of(node.value)):
             continue
         of_record = name_of(node.value).split('_')[-1] in RECORDS
         names, written = places(node.slice)
@@ -137,19 +143,16 @@ def terms(node):
     return [node]
 
 
-def sources():
-    """Return {file: syntax tree} of both packages."""
-    return {path: ast.parse(path.read_text(encoding='utf-8'))
-            for package in PACKAGES for path in sorted((ROOT / package).rglob('*.py'))}
-
-
 @pytest.fixture(scope='module')
 def found():
     """Return {file: lines that read a record by number} of both packages."""
-    trees = sources()
-    numbers = {module_of(path): numbered(tree) for path, tree in trees.items()}
-    lines = {path.relative_to(ROOT).as_posix(): refused(tree, numbers, numbers[module_of(path)])
-             for path, tree in trees.items()}
+    numbers, subscripts = {}, {}
+    for package in PACKAGES:
+        for path in sorted((ROOT / package).rglob('*.py')):
+            tree = parsed(path)
+            numbers[module_of(path)], subscripts[path] = numbered(tree), reads(tree)
+    lines = {path.relative_to(ROOT).as_posix(): refused(one, numbers, numbers[module_of(path)])
+             for path, one in subscripts.items()}
     return {name: where for name, where in lines.items() if where}
 
 
@@ -170,4 +173,4 @@ def test_what_counts_as_a_number(line, is_refused):
         'from pam_sim.rollout import layout\nP_GAIN, P_RATE = range(2)\nHEAD_SIZE = 2\n'
         f'S_HEAD, S_TIME = 3, 4\nNAME = "gain"\n{line}\n')
     numbers = {'pam_sim.rollout.layout': {'OUT_FORCE'}}
-    assert bool(refused(tree, numbers, numbered(tree))) is is_refused
+    assert bool(refused(reads(tree), numbers, numbered(tree))) is is_refused

@@ -24,6 +24,7 @@ import sys
 import tomllib
 
 import pytest
+from source_trees import statements
 
 ROOT = Path(__file__).resolve().parent.parent
 HIDDEN = ('build', 'install', 'log')        # of colcon, beside what begins with a dot
@@ -115,14 +116,6 @@ def ruff(*arguments):
         cwd=ROOT, capture_output=True, text=True)
     assert done.returncode in (0, 1), done.stderr
     return json.loads(done.stdout)
-
-
-def statements(node):
-    """Return all statements within a node; expressions, most of a module, hold none."""
-    for name in ('body', 'orelse', 'finalbody', 'handlers', 'cases'):
-        for one in getattr(node, name, ()):
-            yield one
-            yield from statements(one)
 
 
 def parsed(file):

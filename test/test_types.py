@@ -25,6 +25,7 @@ import tomllib  # noqa: I201
 
 import numpy as np
 import pytest
+from source_trees import parsed, statements
 
 ROOT = Path(__file__).resolve().parent.parent
 CONFIG = tomllib.loads((ROOT / 'pyproject.toml').read_text(encoding='utf-8'))['tool']['mypy']
@@ -40,13 +41,13 @@ def modules():
 def bare_parts(path):
     """Return the functions of a file with parameters or results that are not annotated."""
     bare = []
-    tree = ast.parse(path.read_text(encoding='utf-8'))
-    methods = {id(function) for parent in ast.walk(tree) if isinstance(parent, ast.ClassDef)
+    all_of_it = list(statements(parsed(path)))
+    methods = {id(function) for parent in all_of_it if isinstance(parent, ast.ClassDef)
                for function in parent.body
                if isinstance(function, (ast.FunctionDef, ast.AsyncFunctionDef))
                and not any(getattr(d, 'id', '') == 'staticmethod'
                            for d in function.decorator_list)}
-    for function in ast.walk(tree):
+    for function in all_of_it:
         if not isinstance(function, (ast.FunctionDef, ast.AsyncFunctionDef)):
             continue
         said = function.args
