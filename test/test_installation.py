@@ -90,7 +90,9 @@ def run(command, **keywords):
 def colcon_build(workspace, *options):
     """Build the copied sources in a workspace with this Python's colcon."""
     copy_sources(workspace / 'src' / 'pam_actuation')
-    run([sys.executable, '-m', 'colcon', 'build', *options], cwd=workspace)
+    # Byte code is written by whoever imports a file: most of them are not run from here.
+    run([sys.executable, '-m', 'colcon', 'build', *options], cwd=workspace,
+        env={**os.environ, 'PYTHONDONTWRITEBYTECODE': '1'})
     return workspace / 'install'
 
 
