@@ -63,14 +63,28 @@ LOOK = """
 from pam_sim.rollout.mistakes import first_mistake
 print(first_mistake())
 """
-# The right effect, and of all that ships one function of each kind.
-SHIPPED = """
+# Effects with a mistake each; then the right one, and of all that ships one function of each kind.
+EACH = """
 from pam_sim.rollout import mistakes
-kinds = {part.what: part for part in mistakes._parts()}
-kinds |= {part.what: part for part in mistakes._parts() if part.file.stem == 'drift'}
+parts = list(mistakes._parts())
+for number in range(4):
+    for part in parts:
+        if part.file.stem == f'wrong_{number}':
+            print(mistakes._mistake(part))
+kinds = {part.what: part for part in parts if 'wrong' not in part.file.stem}
+kinds |= {part.what: part for part in parts if part.file.stem == 'drift'}
 assert 'hook `sensor`' in kinds and '`tension_n`' in kinds and len(kinds) > 20
 print([told for told in map(mistakes._mistake, kinds.values()) if told is not None])
 """
+WRONG = (
+    ('par.drift_n', 'par.drif_n', 11, 'hook `sensor` cannot be compiled: there is no number '
+     '`drif_n` (did you mean `drift_n`?); allowed: drift_n, steps, '),
+    ('pressure_pa, contraction_m, force_n\n', 'force_n\n', 10, 'hook `sensor` returns 1 number; '
+     'write `return pressure_pa, contraction_m, force_n` with a number for each'),
+    ('    return pressure_pa, contraction_m, force_n\n', '', 10,
+     'hook `sensor` returns nothing; write `return pressure_pa, '),
+    ('par.drift_n', 'math.exp(1.0)', 11,
+     "hook `sensor` cannot be compiled: NameError: name 'math' is not defined"))
 RUN = """
 import numpy as np
 from pam_sim import InputError, load_rig
@@ -93,20 +107,23 @@ def told(folder, name, text, script):
     return done.stdout.removesuffix('\n')
 
 
-@pytest.mark.parametrize('old, new, line, sentence', [
-    ('par.drift_n', 'par.drif_n', 11, 'hook `sensor` cannot be compiled: there is no number '
-     '`drif_n` (did you mean `drift_n`?); allowed: drift_n, steps, '),
-    ('pressure_pa, contraction_m, force_n\n', 'force_n\n', 10, 'hook `sensor` returns 1 number; '
-     'write `return pressure_pa, contraction_m, force_n` with a number for each'),
-    ('    return pressure_pa, contraction_m, force_n\n', '', 10,
-     'hook `sensor` returns nothing; write `return pressure_pa, '),
-    ('par.drift_n', 'math.exp(1.0)', 11,
-     "hook `sensor` cannot be compiled: NameError: name 'math' is not defined")])
-def test_a_mistake_in_a_hook_is_told_with_its_file(tmp_path, old, new, line, sentence):
-    assert old in EFFECT
-    found = told(tmp_path, 'drift', EFFECT.replace(old, new), LOOK)
-    assert found.startswith(f'{tmp_path / "drift.py"}:{line}: {sentence}')
-    assert '\n' not in found
+@pytest.fixture(scope='module')
+def each(tmp_path_factory):
+    """Return the folder of all these effects, and what is said of them, all in one process."""
+    folder = tmp_path_factory.mktemp('each')
+    for number, (old, new, _, _) in enumerate(WRONG):
+        assert old in EFFECT
+        text = EFFECT.replace(old, new).replace('name="drift"', f'name="wrong_{number}"')
+        (folder / f'wrong_{number}.py').write_text(text)
+    return folder, told(folder, 'drift', EFFECT, EACH).split('\n')
+
+
+@pytest.mark.parametrize('number', range(len(WRONG)))
+def test_a_mistake_in_a_hook_is_told_with_its_file(each, number):
+    folder, found = each
+    *_, line, sentence = WRONG[number]
+    assert len(found) == len(WRONG) + 1
+    assert found[number].startswith(f'{folder / f"wrong_{number}.py"}:{line}: {sentence}')
 
 
 def test_a_mistake_in_a_law_is_told_with_its_file(tmp_path):
@@ -121,5 +138,5 @@ def test_a_simulation_ends_with_this_sentence(tmp_path):
         '`shar` (did you mean `share`?)')
 
 
-def test_what_ships_has_no_mistake(tmp_path):
-    assert told(tmp_path, 'drift', EFFECT, SHIPPED) == '[]'
+def test_what_ships_has_no_mistake(each):
+    assert each[1][-1] == '[]'
