@@ -102,9 +102,13 @@ seen = rig.simulate(np.load('volts.npy').repeat(5), initial_pressure_pa=501325.0
 np.savez('seen.npz', pressure_pa=seen.pressure_pa, contraction_m=seen.contraction_m)
 """
 
-# The page on the keys of a rig file, as the documentation site has it.
-REFERENCE = f"""
+# The verb in its other ways; then the page on the keys of a rig file, as the site has it.
+SHOWN = f"""
 import sys
+from pam_actuation.cli.main import main
+assert main(['models', 'notched_rail']) == 0
+assert main(['models', '--markdown', 'models.md']) == 0
+assert main(['models', '--html', 'models.html']) == 0
 sys.path.insert(0, {str(ROOT / 'docs')!r})
 from generate import yaml_files
 print(yaml_files.rig_page())
@@ -158,19 +162,15 @@ def test_a_file_in_a_folder_is_listed_loaded_and_simulated(tmp_path):
         assert done.returncode == 0, done.stderr
         return done.stdout
 
-    verb = ('-m', 'pam_actuation.cli.main', 'models')
-    listed = run(*verb)
+    listed = run('-m', 'pam_actuation.cli.main', 'models')
     assert 'notched_rail' in listed and 'Force proportional to pressure.' in listed
-    shown = run(*verb, 'notched_rail')
+    shown, section = run('-c', SHOWN).split('### `notched_rail`')
     assert 'sin(x / 0.6 mm)' in shown and 'Depth of a notch.' in shown
     assert 'force_n 0 to 9.5, typically 0.4' in shown
     assert re.search('look-alikes.*guide_friction', shown)
-    run(*verb, '--markdown', 'models.md')
     assert 'force\\_n 0 to 9.5, typically 0.4' in (tmp_path / 'models.md').read_text()
-    run(*verb, '--html', 'models.html')
     assert 'id="effect-notched_rail"' in (tmp_path / 'models.html').read_text()
     row = '| `force_n` | N | `1` | 0 to 10 | Depth of a notch. |'
-    _, _, section = run('-c', REFERENCE).partition('### `notched_rail`')
     assert row in section.partition('###')[0]
     # To interpret a short recording is quicker than to compile the equations anew.
     assert run('-c', ROLLOUT + RANKING).split() == ['True', 'notched_rail', 'True']
