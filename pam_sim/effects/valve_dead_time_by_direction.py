@@ -90,10 +90,11 @@ EFFECT = Effect(
         Reported('fill_delay_s', 's', lambda values, rig: _delays_s(values)[0]),
         Reported('vent_delay_s', 's', lambda values, rig: _delays_s(values)[1]),
     ),
-    states=record('position', ('past_signal', SLOTS)),
+    states=record('position', 'extreme', ('past_signal', SLOTS)),
     packed=record('first_steps', 'first_share', 'last_steps', 'last_share', 'fill_first'),
     pack=_pack,
-    initial=lambda values, numbers: {'past_signal': numbers.signal[0]},       # all of them
+    initial=lambda values, numbers: {
+        'extreme': numbers.signal[0], 'past_signal': numbers.signal[0]},      # all of them
     valves=('ppr',),
     order=_SIBLING.order,
     fitting=Fitting(
@@ -114,6 +115,37 @@ def _signal_before(position: int, steps: int, share: float, state: np.record) ->
 
 
 @compiled
+def _follow_window(position: int, first: int, last: int, state: np.record,
+                   par: np.record) -> None:
+    """
+    Let ``extreme`` be the highest (lowest) signal of ``first + 1`` to ``last`` steps ago.
+
+    Only where it has left this window all of it is read again; until another one is as high.
+    """
+    entering = state.past_signal[(position - first - 1) & _WRAP]
+    left = state.extreme
+    if par.fill_first > 0.0:
+        if entering >= left:
+            state.extreme = entering
+        elif state.past_signal[(position - last - 1) & _WRAP] >= left:
+            highest = entering
+            for steps in range(last, first + 1, -1):
+                highest = max(highest, state.past_signal[(position - steps) & _WRAP])
+                if highest >= left:     # held, as most commands are
+                    break
+            state.extreme = highest
+    elif entering <= left:
+        state.extreme = entering
+    elif state.past_signal[(position - last - 1) & _WRAP] <= left:
+        lowest = entering
+        for steps in range(last, first + 1, -1):
+            lowest = min(lowest, state.past_signal[(position - steps) & _WRAP])
+            if lowest <= left:
+                break
+        state.extreme = lowest
+
+
+@compiled
 def command(signal_0: float, signal_1: float, state: np.record,
             par: np.record) -> tuple[float, float]:
     """Return the highest or lowest command between both delays ago."""
@@ -123,12 +155,8 @@ def command(signal_0: float, signal_1: float, state: np.record,
     first, last = int(par.first_steps), int(par.last_steps)
     late = _signal_before(position, first, par.first_share, state)
     oldest = _signal_before(position, last, par.last_share, state)
-    if par.fill_first > 0.0:
-        late = max(late, oldest)
-        for steps in range(first + 1, last + 1):
-            late = max(late, state.past_signal[(position - steps) & _WRAP])
-    else:
-        late = min(late, oldest)
-        for steps in range(first + 1, last + 1):
-            late = min(late, state.past_signal[(position - steps) & _WRAP])
+    late = max(late, oldest) if par.fill_first > 0.0 else min(late, oldest)
+    if last > first:
+        _follow_window(position, first, last, state, par)
+        late = max(late, state.extreme) if par.fill_first > 0.0 else min(late, state.extreme)
     return late, signal_1
