@@ -98,22 +98,27 @@ def test_candidates_fill_a_minute_and_none_could_take_in_more():
         assert min(lengths) > 0.7 * protocols.LONGEST_S
 
 
-def test_a_name_that_cannot_be_tried_is_told_and_alone_refused(capsys):
+def short_experiment(folder):
+    """Write an experiment of some seconds into a folder; return its path."""
+    path = folder / 'short.yaml'
+    path.write_text(dump_yaml({'name': 'short', 'domain': 'pressure', 'segments': [
+        {'rest': {'duration_s': 1.0}}, *protocols.pieces('ppr')['quick']]}))
+    return str(path)
+
+
+def test_a_name_that_cannot_be_tried_is_told_and_alone_refused(tmp_path, capsys):
     run = recorded(nominal(), voltages(4.0), topics=('pressure', 'contraction'))
     recording = Recording(run, 'ppr')
     told = '`thermal` was asked for and is not tried: it acts with valve hsv, the model has ppr'
     assert Sensitivities(nominal(), recording, ['thermal', 'creep']).left_out == [f'{told}.']
-    assert main(['gap', '--plan', 'sine_quarter_hz', '--effects', 'thermal']) == 2
+    assert main(['gap', '--plan', short_experiment(tmp_path), '--effects', 'thermal']) == 2
     assert capsys.readouterr().err.endswith(f'{nominal().name}: {told}\n')
 
 
 def test_the_verb_writes_an_experiment_that_runs(monkeypatch, tmp_path, capsys):
-    whole = protocols.pieces('ppr')
+    short, whole = short_experiment(tmp_path), protocols.pieces('ppr')
     monkeypatch.setattr(protocols, 'pieces', lambda valve: {'slow': whole['slow']})
-    short = tmp_path / 'short.yaml'
-    short.write_text(dump_yaml({'name': 'short', 'domain': 'pressure', 'segments': [
-        {'rest': {'duration_s': 1.0}}, *whole['quick']]}))
-    done = main(['gap', '--plan', str(short), '--model', 'dmsp_5_300_hanging_mass',
+    done = main(['gap', '--plan', short, '--model', 'dmsp_5_300_hanging_mass',
                  '--effects', 'coulomb_friction,viscous_damping', '--out', str(tmp_path),
                  '--json'])
     said = json.loads(capsys.readouterr().out)

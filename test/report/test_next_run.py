@@ -16,10 +16,12 @@
 
 from pam_actuation.cli import gap as gap_verb
 from pam_actuation.cli.main import build_parser, main
+from pam_actuation.experiments import protocols
 from pam_actuation.report.next_run import before_it, command_on_rig, is_of_muscle, is_simulated
 from pam_sim import load_rig
 from pam_sim.gap.result import GapResult
 from pam_sim.joint import load_joint
+from pam_sim.located_yaml import dump_yaml
 from pam_sim.run import Run
 import pytest
 
@@ -75,7 +77,12 @@ def test_a_gap_is_measured_on_where_it_was_recorded(tmp_path):
 
 def test_a_plan_says_how_it_is_run_for_real_and_simulated(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert main(['gap', '--plan', 'staircase', '--model', 'dmsp_5_300_hanging_mass', '--effects',
+    quick = protocols.pieces('ppr')['quick']
+    monkeypatch.setattr(protocols, 'pieces', lambda valve: {'quick': quick})
+    (tmp_path / 'short.yaml').write_text(dump_yaml({
+        'name': 'short', 'domain': 'pressure', 'segments': [
+            {'rest': {'duration_s': 1.0}}, *quick]}), encoding='utf-8')
+    assert main(['gap', '--plan', 'short.yaml', '--model', 'dmsp_5_300_hanging_mass', '--effects',
                  'leakage', '--out', 'planned']) == 0
     out = capsys.readouterr().out
     assert ('run it with: pam up rig --hardware my_hardware.yaml --model dmsp_5_300_hanging_mass '
