@@ -25,6 +25,7 @@ from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.subsystems.simulation import free_run
 from pam_sim.model_file import load_rig
 import pytest
+from shorter import halved
 import truth_bags
 import truth_cases
 import truth_commands
@@ -164,16 +165,19 @@ def test_every_effect_moves_what_is_measured(effect):
                for s in truth_sensors.SIGMA) > 1.0
 
 
+def short_runs(numbers, names):
+    """Return a Truth behind the regulator of each protocol, half as long as it is."""
+    return [truth_run.run_rig(numbers, 'ppr', halved(name, 3)) for name in names]
+
+
 def test_a_gap_after_refit_is_small_for_a_wrong_number_and_large_for_friction():
-    fit, certify = (truth_run.run_rig(
-        {'dry': 2.0}, 'ppr', truth_commands.protocol(name, 3)) for name in ('steps', 'triangle'))
+    fit, certify = short_runs({'dry': 2.0}, ('steps', 'triangle'))
     chain = truth_sensors.Chain()
     found = truth_gap.gap_in_sigma({'dry': 2.0}, {}, chain, fit, certify, 'ppr')
     assert found['tempered']['pressure'] < 0.1 and found['tempered']['contraction'] > 20.0
     # At full weight numbers of the valve are bent for the friction as well.
     assert found['plain']['contraction'] > max(15.0, 4.0 * found['plain']['pressure'])
-    fit, certify = (truth_run.run_rig(
-        {'mass': 5.05}, 'ppr', truth_commands.protocol(name, 3)) for name in ('steps', 'triangle'))
+    fit, certify = short_runs({'mass': 5.05}, ('steps', 'triangle'))
     found = truth_gap.gap_in_sigma({'mass': 5.05}, {}, chain, fit, certify, 'ppr')
     assert max(max(signals.values()) for signals in found.values()) < 0.3
 
@@ -181,8 +185,7 @@ def test_a_gap_after_refit_is_small_for_a_wrong_number_and_large_for_friction():
 def test_what_numbers_of_the_rig_can_take_up_is_no_gap_at_full_weight():
     # The load cell 2 % too low: mass and force map 2 % lower say nearly the same.
     chain = truth_sensors.Chain(effects={'force_gain': -0.02})
-    fit, certify = (truth_run.run_rig(
-        {}, 'ppr', truth_commands.protocol(name, 3)) for name in ('minimum', 'multisine'))
+    fit, certify = short_runs({}, ('minimum', 'multisine'))
     found = truth_gap.gap_in_sigma({}, {}, chain, fit, certify, 'ppr')
     assert max(found['plain'].values()) < 0.2 * max(found['tempered'].values())
 

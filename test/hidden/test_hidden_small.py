@@ -17,8 +17,8 @@
 from asking import pam_gap
 import pytest
 from scoring_judge import is_false_alarm, is_right, read_answer, wrong_names
+from shorter import halved
 from truth_cases import build, Case
-from truth_commands import protocol
 
 # Recordings of half the length that the examination has: each is searched in a few seconds.
 CASES = (
@@ -29,20 +29,9 @@ CASES = (
     Case('thermal', 'single', 'hsv', (77, 5), ('thermal',), 'triangle'))
 
 
-def half(name, seed):
-    """Return a protocol of which each motion lasts half as long."""
-    experiment = protocol(name, seed)
-    for segment in experiment['segments']:
-        for keys in segment.values():
-            for key in {'duration_s', 'cycles'} & set(keys):
-                if keys[key] > 1.5:         # a start or a way to the first level is left whole
-                    keys[key] //= 2
-    return experiment
-
-
 @pytest.mark.parametrize('case', CASES, ids=lambda case: case.name)
 def test_pam_gap_finds_what_is_hidden(case, tmp_path, monkeypatch):
-    monkeypatch.setattr('truth_cases.commands.protocol', half)
+    monkeypatch.setattr('truth_cases.commands.protocol', halved)
     key = build(case, tmp_path / 'case', with_gap=False)
     answer = read_answer(pam_gap(tmp_path / 'case', [tmp_path / 'case' / 'fit'], tmp_path / 'out'))
     assert not wrong_names(answer, key)
