@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from pam_sim.rig import Rig
 
 
-def _finite(row: FloatArray) -> bool:
+def all_finite(row: FloatArray) -> bool:
     """Return whether all numbers are finite; in a third of the time of ``np.isfinite``."""
     return math.isfinite(row.dot(row))      # beyond 1e154 nothing is physical either
 
@@ -136,12 +136,12 @@ class Plant:
         self._given.external_force_n[...] = external_force_n
         if contraction_m is not None:
             self._given.contraction_m[...] = contraction_m
-        if not _finite(self._inp):
+        if not all_finite(self._inp):
             raise InputError('is not finite', 'valve signal, force or contraction')
 
     def _check(self) -> None:
         """Refuse outputs that are not finite."""
-        if not _finite(self._out):
+        if not all_finite(self._out):
             raise InputError(f'the simulation is not finite from {self.time_s:g} s on; the '
                              'numbers of the model make no rig that can be stepped',
                              f'rig {self.rig.name}')

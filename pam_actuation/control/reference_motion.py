@@ -35,6 +35,7 @@ wanted position is at its tick, and how fast it changes there:
 
 from collections import deque
 import math
+from operator import attrgetter
 from typing import NamedTuple
 
 LONGEST_S = 0.25            # between two messages; after more the motion is forgotten
@@ -45,6 +46,7 @@ _FORETOLD_S = 0.1           # how far ahead positions are foretold, about what a
 _BETTER = 0.8               # of its mean square error, for another filter to count
 _WRONG, _WRONG_JUMPS = 0.25, 0.05       # the same for told rates, whose error is also this large
 _ALIKE = 0.5                # part by which the steps of two such jumps differ at most
+_SQUARE = attrgetter('square')
 _STRAIGHT, _BENT = (0.0, 0.5, 0.7, 0.85), (0.0, 0.5, 0.7, 0.8, 0.88, 0.93)     # what each keeps
 
 
@@ -69,10 +71,6 @@ class _Motion:
     def take(self, position: float, rate: float, interval_s: float, scale: Scale) -> None:
         """Go on to the next message."""
         self.position = position
-
-    def judge(self, missed: float, kept: float) -> None:
-        """Take note of by how much a position was foretold wrongly."""
-        self.square = kept * self.square + (1.0 - kept) * missed * missed
 
 
 class _Filter(_Motion):
@@ -160,9 +158,11 @@ class ReferenceMotion:
             return
         self._bend_s = min(HELD_INTERVALS * interval_s, LONGEST_BEND_S)
         self._compare(stamp_ns, position, interval_s)
-        for motion in (self._told, *self._filters):
-            motion.take(position, rate, interval_s, self._scale)
-        self._note(stamp_ns)
+        scale, now = self._scale, []
+        for motion in self._motions:
+            motion.take(position, rate, interval_s, scale)
+            now.append((motion.position, motion.rate, motion.acceleration))
+        self._past.append((stamp_ns, now))      # to compare them later
         self._choose()
 
     def _begin(self, position: float, rate: float) -> None:
@@ -171,6 +171,7 @@ class ReferenceMotion:
         self._filters: list[_Motion] = [_Motion(position)]
         self._filters += [_Filter(kept, False, position) for kept in _STRAIGHT]
         self._filters += [_Filter(kept, True, position) for kept in _BENT]
+        self._motions: tuple[_Motion, ...] = (self._told, *self._filters)
         self._best = self._told if math.isfinite(rate) else self._filters[0]
         # Stamp, and of each motion position, rate and acceleration.
         self._past: deque[tuple[int, list[tuple[float, float, float]]]] = deque()
@@ -181,31 +182,28 @@ class ReferenceMotion:
             self._past.popleft()
         if not self._past:
             return
-        then_ns, motions = self._past[0]
+        then_ns, foretold = self._past[0]
         ahead_s = (stamp_ns - then_ns) * 1e-9
+        half_s, jump = 0.5 * ahead_s, self._scale.jump
         kept = math.exp(-interval_s / _MEMORY_S)
-        for motion, (value, rate, acceleration) in zip((self._told, *self._filters), motions):
-            missed = abs(position - value - ahead_s * (rate + 0.5 * ahead_s * acceleration))
-            if math.isfinite(missed):           # else no rate was told
-                motion.judge(min(missed, self._scale.jump), kept)
-
-    def _note(self, stamp_ns: int) -> None:
-        """Keep the motions to compare them later."""
-        self._past.append((stamp_ns, [
-            (motion.position, motion.rate, motion.acceleration)
-            for motion in (self._told, *self._filters)]))
+        lost = 1.0 - kept
+        for motion, (value, rate, acceleration) in zip(self._motions, foretold):
+            missed = abs(position - value - ahead_s * (rate + half_s * acceleration))
+            if missed < math.inf:               # else no rate was told
+                missed = min(missed, jump)
+                motion.square = kept * motion.square + lost * missed * missed
 
     def _choose(self) -> None:
         """Choose the motion that counts."""
-        least = min(self._filters, key=lambda motion: motion.square)
         told = self._told
-        if math.isfinite(told.rate):
-            wrong = (told.square > (_WRONG_JUMPS * self._scale.jump) ** 2
-                     and least.square < _WRONG * told.square)
-            if not wrong:
-                self._best = told
-                return
-        if self._best is told or least.square < _BETTER * self._best.square:
+        is_told = math.isfinite(told.rate)
+        if is_told and told.square <= (_WRONG_JUMPS * self._scale.jump) ** 2:
+            self._best = told
+            return
+        least = min(self._filters, key=_SQUARE)
+        if is_told and least.square >= _WRONG * told.square:
+            self._best = told
+        elif self._best is told or least.square < _BETTER * self._best.square:
             self._best = least
 
     def at(self, time_ns: int) -> tuple[float, float]:

@@ -19,14 +19,13 @@ import itertools
 import math
 from typing import Any, TYPE_CHECKING
 
-import numpy as np
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.joint import kernel, layout
 from pam_sim.joint.packing import pack_joint
 from pam_sim.joint.parameters import SIDES
 from pam_sim.joint.step import Arrays
-from pam_sim.plant import Plant
+from pam_sim.plant import all_finite, Plant
 from pam_sim.records import cells, zeros
 
 if TYPE_CHECKING:
@@ -142,7 +141,7 @@ class JointPlant:
         arrays = self.arrays
         for _ in range(steps):
             kernel.joint_step(*arrays)
-        if not all(np.isfinite(out).all() for *_, out in arrays):
+        if not all(all_finite(out) for *_, out in arrays):
             raise InputError(f'the simulation is not finite from {self.time_s:g} s on; the '
                              'numbers of the model make no joint that can be stepped',
                              f'joint {self.joint.name}')
