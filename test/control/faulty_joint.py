@@ -76,15 +76,22 @@ class FaultyJoint:
 
     def _spoiled(self, topic, take):
         def taken(message):
-            arrives = self.spoil.get(topic, lambda sound: sound)(message)
-            if arrives is not None:
-                take(arrives)
+            if topic in self.spoil:
+                message = self.spoil[topic](message)
+            if message is not None:
+                take(message)
         return taken
 
     def _driver(self, side, driver):
-        tick = driver_tick(self._bus, driver, f'{side}/',
-                           lambda now_ns: self.faults[side].add(
-                               dict(driver.status().values)['fault']))
+        told = None
+
+        def note_fault(now_ns):
+            nonlocal told
+            if told != driver.state():          # the values cost more than the tick itself
+                told = driver.state()
+                self.faults[side].add(dict(driver.values())['fault'])
+
+        tick = driver_tick(self._bus, driver, f'{side}/', note_fault)
 
         def tick_unless_stopped(now_ns):
             if side not in self.stopped:
