@@ -20,6 +20,7 @@ Numbers follow YAML 1.2: ``2e-10`` is a number, ``on`` is a text. Duplicate keys
 """
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
+import functools
 import math
 import os
 import re
@@ -188,6 +189,11 @@ class Located(Mapping[str, Any]):
             return default
         return self.require(key, type, lower, upper, choices, unit)
 
+    def copy(self) -> 'Located':
+        """Return a copy, with copies of all mappings and sequences below."""
+        return Located({key: _copied(value) for key, value in self._values.items()}, self._lines,
+                       self.name, self.line)
+
     def plain(self) -> dict[str, Any]:
         """Return nested plain dicts and lists."""
         return {key: _plain(value) for key, value in self._values.items()}
@@ -203,6 +209,10 @@ class LocatedList(list[Any]):
         self._lines = list(lines)
         self.name = name
         self.line = line
+
+    def copy(self) -> 'LocatedList':
+        """Return a copy, with copies of all mappings and sequences below."""
+        return LocatedList(map(_copied, self), self._lines, self.name, self.line)
 
     def where(self, index: int | None = None) -> str:
         """Return ``file:line`` of an item, or of the sequence itself."""
@@ -290,6 +300,10 @@ def _range_text(lower: float | None, upper: float | None, unit: str) -> str:
     return f'; allowed up to {upper:g}{unit}' if upper is not None else ''
 
 
+def _copied(value: Any) -> Any:
+    return value.copy() if isinstance(value, (Located, LocatedList)) else value
+
+
 def _plain(value: Any) -> Any:
     if isinstance(value, Located):
         return value.plain()
@@ -335,6 +349,12 @@ def load_yaml(path_or_text: StrPath, name: str | None = None) -> Located:
     except UnicodeDecodeError as error:
         raise InputError('is not a text file (UTF-8 expected)',
                          _line_at(name, raw[:error.start])) from error
+    return _parsed(text, name).copy()
+
+
+@functools.lru_cache(maxsize=64)        # presets, and what a bag holds, are read again and again
+def _parsed(text: str, name: str) -> Located:
+    """Return the mapping that a text is."""
     try:
         loader = _Loader(text)
         node = loader.get_single_node()
@@ -444,8 +464,25 @@ class _Conversion:
 
 def dump_yaml(data: Mapping[str, Any]) -> str:
     """Return deterministic YAML text of nested dicts, lists and scalars (keys keep order)."""
-    return yaml.safe_dump(
-        _dumpable(data), sort_keys=False, default_flow_style=False, allow_unicode=True, width=99)
+    plain = _dumpable(data)
+    return str(yaml.dump(
+        plain, Dumper=_FAST_DUMPER if _is_simple(plain) else yaml.SafeDumper, sort_keys=False,
+        default_flow_style=False, allow_unicode=True, width=99))
+
+
+# libyaml takes a tenth of the time. It writes long keys, and texts to be escaped, another way.
+_FAST_DUMPER: type[Any] = getattr(yaml, 'CSafeDumper', yaml.SafeDumper)
+_LONGEST_KEY = 60
+
+
+def _is_simple(value: Any) -> bool:
+    """Return whether libyaml writes the same bytes as Python: keys and texts are plain ASCII."""
+    if isinstance(value, dict):
+        return all(isinstance(key, str) and 0 < len(key) <= _LONGEST_KEY and _is_simple(key)
+                   and _is_simple(item) for key, item in value.items())
+    if isinstance(value, list):
+        return all(_is_simple(item) for item in value)
+    return not isinstance(value, str) or value.isascii() and value.isprintable()
 
 
 def _dumpable(value: Any) -> Any:

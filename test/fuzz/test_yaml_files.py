@@ -15,8 +15,9 @@
 """A sample of wrong YAML files: loaded, or refused with file and line, and never anything else."""
 
 from pam_sim.errors import InputError
-from pam_sim.located_yaml import load_yaml, MAX_BYTES
+from pam_sim.located_yaml import dump_yaml, load_yaml, MAX_BYTES
 import pytest
+import yaml
 from yaml_mutations import BOMB, mutated, outcome, run, sources
 
 
@@ -78,3 +79,24 @@ def test_bytes_that_are_no_text_have_a_line(tmp_path):
     path.write_bytes(b'a: 1\nb: 2\nc: \xff\n')
     with pytest.raises(InputError, match=r'a\.yaml:3: is not a text file'):
         load_yaml(path)
+
+
+def test_a_text_read_twice_is_not_shared():
+    text = 'a: 1\nb: [1, {c: [2, 3]}]\n'
+    first = load_yaml(text)
+    first['b'][1]['c'].append(4)
+    first['b'].clear()
+    again = load_yaml(text, name='again')
+    assert load_yaml(text).plain() == again.plain() == {'a': 1, 'b': [1, {'c': [2, 3]}]}
+    assert again['b'][1].where('c') == 'again:2' and first.where('b') == '<text>:2'
+
+
+@pytest.mark.parametrize('tree', [
+    *({'text': text, 'texts': [text, {'a': [text]}]} for text in (
+        '', 'null', '1e5', "it's #1", ' x', 'a: b', 'µm', 'two\nlines', '\x85', 'word ' * 60,
+        "'" + 'x y' * 60, 'é "x" ' * 30)),
+    {'': 1}, {'k' * 130: 1}, {'key ' * 40: [1]}, {1: {2.5: None}},
+    {'a': [], 'b': {}, 'c': [[1.5, -2], [True]], 'd': float('nan'), 'e': 1e-9}])
+def test_what_is_written_fast_has_the_same_bytes(tree):
+    assert dump_yaml(tree) == yaml.safe_dump(
+        tree, sort_keys=False, default_flow_style=False, allow_unicode=True, width=99)
