@@ -33,8 +33,8 @@ if TYPE_CHECKING:
 GC_THRESHOLD = 100_000, 20, 20
 
 
-def build_parser() -> 'Parser':
-    """Return the argument parser with one sub-parser per verb."""
+def build_parser(only: str | None = None) -> 'Parser':
+    """Return the argument parser with one sub-parser per verb, or with that of one verb only."""
     from pam_actuation import __version__
     from pam_actuation.cli.options import Parser
     from pam_actuation.cli.overview import one_line, VERBS
@@ -43,7 +43,7 @@ def build_parser() -> 'Parser':
         epilog='Start with "pam demo", or "pam simulate sine_quarter_hz --out runs/first".')
     parser.add_argument('--version', action='version', version=f'pam_actuation {__version__}')
     verbs = parser.add_subparsers(dest='verb', metavar='VERB', required=True)
-    for name in VERBS:
+    for name in VERBS if only is None else (only,):
         module = importlib.import_module(f'pam_actuation.cli.{name}')
         sub = verbs.add_parser(
             name, help=one_line(name), description=module.HELP,
@@ -106,17 +106,20 @@ def _parsed_and_run(argv: list[str] | None, begin: Callable[[], object]) -> int:
     from pam_actuation.cli import completion
     from pam_actuation.cli.options import (
         complain, EXIT_BAD_INPUT, EXIT_DONE, EXIT_FINDING, EXIT_INTERRUPTED)
-    from pam_actuation.cli.overview import overview
+    from pam_actuation.cli.overview import overview, VERBS
     from pam_sim.compile_notice import tell_when_compiling
     from pam_sim.errors import InputError
     from pam_sim.files import reason, shown
     # BLAS threads only get in the way of small matrices and worker processes.
     os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
-    if not (sys.argv[1:] if argv is None else argv) and not completion.asked():
+    words = sys.argv[1:] if argv is None else argv
+    if not words and not completion.asked():
         print(overview())
         return EXIT_DONE
+    # The other verbs take longer to import than most verbs need for their work.
+    named = words[0] if words and words[0] in VERBS and not completion.asked() else None
     try:
-        parser = build_parser()
+        parser = build_parser(named)
         completion.complete(parser)
         args = parser.parse_args(argv)
     except SystemExit as ended:     # --help, or an option that is not allowed
