@@ -40,11 +40,11 @@ def pam_here(*arguments):
 
 @pytest.fixture(scope='module')
 def bags(tmp_path_factory):
-    """Return the folder of two simulated bags, PPR and HSV."""
+    """Return the folder of two simulated bags, PPR of this process and HSV of another."""
     folder = tmp_path_factory.mktemp('bags')
-    for valve in ('ppr', 'hsv'):
-        done = pam('simulate', 'short_sine', '--valve', valve, '--out', folder / valve)
-        assert done.returncode == 0, done.stderr
+    assert pam_here('simulate', 'short_sine', '--valve', 'ppr', '--out', folder / 'ppr') == 0
+    done = pam('simulate', 'short_sine', '--valve', 'hsv', '--out', folder / 'hsv')
+    assert done.returncode == 0, done.stderr
     return folder
 
 
@@ -56,8 +56,8 @@ def test_help_has_an_example(verb):
 
 
 def test_simulate_gives_the_same_bytes_twice(bags, tmp_path):
-    assert pam('simulate', 'short_sine', '--valve', 'hsv', '--out', tmp_path / 'hsv'
-               ).returncode == 0
+    assert pam_here(
+        'simulate', 'short_sine', '--valve', 'hsv', '--out', tmp_path / 'hsv') == 0
     digests = []
     for folder in (bags, tmp_path):
         content = next((folder / 'hsv').glob('*.mcap')).read_bytes()
@@ -72,18 +72,31 @@ def test_simulate_follows_the_seed(bags, tmp_path):
     assert first != other
 
 
-def test_simulate_refuses_an_existing_bag(bags):
+def test_simulate_refuses_an_existing_bag(bags, capsys):
     before = next((bags / 'ppr').glob('*.mcap')).read_bytes()
-    done = pam('simulate', 'short_sine', '--out', bags / 'ppr')
-    assert done.returncode == 2 and done.stderr.count('\n') == 1
+    assert pam_here('simulate', 'short_sine', '--out', bags / 'ppr') == 2
+    assert capsys.readouterr().err.count('\n') == 1
     assert next((bags / 'ppr').glob('*.mcap')).read_bytes() == before
 
 
+def _twice(arguments, valve, capsys):
+    """Return what ``pam`` says twice, of an HSV once in a process of its own."""
+    assert pam_here(*arguments) == 0
+    said = capsys.readouterr().out
+    if valve == 'hsv':
+        done = pam(*arguments)
+        assert done.returncode == 0, done.stderr
+        assert done.stdout == said
+    else:
+        assert pam_here(*arguments) == 0
+        assert capsys.readouterr().out == said
+    return said
+
+
 @pytest.mark.parametrize('valve', ('ppr', 'hsv'))
-def test_info_finds_nothing_wrong(bags, valve):
-    done = pam('info', bags / valve, '--json')
-    assert done.returncode == 0, done.stdout
-    topics = {t['name']: t for t in json.loads(done.stdout)['topics']}
+def test_info_finds_nothing_wrong(bags, valve, capsys):
+    said = _twice(('info', bags / valve, '--json'), valve, capsys)
+    topics = {t['name']: t for t in json.loads(said)['topics']}
     wanted = ['pressure', 'contraction', 'force', 'valve_signal', 'pressure_command',
               'controller_state', 'reference', 'reference_trajectory']
     assert {f'/muscle/{name}' for name in wanted} <= set(topics)
@@ -92,10 +105,7 @@ def test_info_finds_nothing_wrong(bags, valve):
 
 @pytest.mark.parametrize('valve', ('ppr', 'hsv'))
 def test_replay_is_identical_to_the_bit_twice(bags, valve, capsys):
-    done = pam('replay', bags / valve, '--json')
-    assert done.returncode == 0 == pam_here('replay', bags / valve, '--json')
-    assert done.stdout == capsys.readouterr().out
-    found = json.loads(done.stdout)
+    found = json.loads(_twice(('replay', bags / valve, '--json'), valve, capsys))
     # Six seconds at 200 Hz; the controller begins 0.1 s ahead of the experiment.
     assert found['controller']['identical'] and found['controller']['ticks'] == 1221
     assert found['plant']['rmse']['contraction'] < 1e-3
@@ -119,7 +129,7 @@ def test_report_is_one_file_without_network(bags, tmp_path):
 
 def test_gap_writes_its_folder(bags, tmp_path):
     done = pam('gap', bags / 'ppr', '--model', 'dmsp_5_300_hanging_mass', '--effects',
-               'hysteresis,creep', '--out', tmp_path / 'gap', '--json')
+               'hysteresis', '--out', tmp_path / 'gap', '--json')
     assert done.returncode == 0, done.stderr          # the realistic rig differs: an answer
     assert json.loads(done.stdout)['signals']['contraction']['rmse_before'] > 1e-4
     made = {path.name for path in (tmp_path / 'gap').iterdir()}
@@ -128,13 +138,13 @@ def test_gap_writes_its_folder(bags, tmp_path):
         'gap.json', 'model.yaml', 'compare.mcap', 'report.html'}
 
 
-def test_tune_writes_a_controller_that_runs(bags, tmp_path):
-    done = pam('tune', bags / 'ppr', '--controller', 'sofc_untuned', '--rollouts', 60,
-               '--out', tmp_path / 'tuned.yaml', '--json')
-    assert done.returncode in (0, 1), done.stderr
-    found = json.loads(done.stdout)
+def test_tune_writes_a_controller_that_runs(bags, tmp_path, capsys):
+    code = pam_here('tune', bags / 'ppr', '--controller', 'sofc_untuned', '--rollouts', 30,
+                    '--out', tmp_path / 'tuned.yaml', '--json')
+    assert code in (0, 1)
+    found = json.loads(capsys.readouterr().out)
     assert found['improved'] == (found['held_out_after_mm'] < found['held_out_before_mm'])
-    assert (done.returncode == 0) == found['improved']
+    assert (code == 0) == found['improved']
     assert pam_here('simulate', 'short_sine', '--controller', tmp_path / 'tuned.yaml',
                     '--out', tmp_path / 'bag') == 0
 
@@ -194,12 +204,12 @@ def test_a_mistake_ends_the_process_with_exit_code_2(what, bags, tmp_path):
     assert not (tmp_path / 'out').exists(), what
 
 
-def test_a_broken_off_recording_can_still_be_read(bags, tmp_path):
+def test_a_broken_off_recording_can_still_be_read(bags, tmp_path, capsys):
     whole = next((bags / 'ppr').glob('*.mcap')).read_bytes()
     (tmp_path / 'cut.mcap').write_bytes(whole[:2 * len(whole) // 3])
-    done = pam('info', tmp_path / 'cut.mcap', '--recover', '--json')
-    assert done.returncode == 1, done.stderr
-    assert sum(t['count'] for t in json.loads(done.stdout)['topics']) > 500
+    assert pam_here('info', tmp_path / 'cut.mcap', '--recover', '--json') == 1
+    said = json.loads(capsys.readouterr().out)
+    assert sum(t['count'] for t in said['topics']) > 500
 
 
 @pytest.mark.ros
