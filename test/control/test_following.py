@@ -33,36 +33,36 @@ EVERY = [(valve, name) for valve, names in CONTROLLERS.items() for name in names
 def test_a_healed_pressure_sensor_brings_the_muscle_back_without_shooting_over(
         valve, controller):
     """Before, the integral wound up for 3 s and the muscle went 12 to 20 mm too far."""
-    rig = FaultyRig(valve, controller).run(4.0, hold)
+    rig = FaultyRig(valve, controller).run(3.0, hold)
     rng = random.Random(controller)
     for fault in rng.sample(('nan', 'silent', 'past', 'future'), 2):
         rig.run(rng.uniform(0.2, 3.0), hold, fault, ('pressure',))
         assert rig.gauge_pa[-1] < 260e3                     # it is, or was being, vented
         rig.run(3.0 + rng.uniform(0.0, 0.1), hold)
-    assert rig.excursion_m(4.0) < 1e-3
-    assert max(rig.gauge_pa[1000:]) < 440e3
+    assert rig.excursion_m(3.0) < 1e-3
+    assert max(rig.gauge_pa[750:]) < 440e3
     assert rig.error_m(0.5) < 5e-4
 
 
 @pytest.mark.parametrize('valve', CONTROLLERS)
 def test_a_controller_that_was_stopped_or_blind_comes_back_calmly(valve):
     for controller in CONTROLLERS[valve][:2]:
-        rig = FaultyRig(valve, controller).run(9.3, slow_sine)
-        before = rig.excursion_m(4.0)
+        rig = FaultyRig(valve, controller).run(5.3, slow_sine)
+        before = rig.excursion_m(3.0)
         rig.run(1.3, slow_sine, 'stopped')
         rig.run(3.6, slow_sine)
         rig.run(0.5, slow_sine, 'nan', ('contraction',))
         rig.run(4.0, slow_sine)
-        assert rig.excursion_m(9.3) < before + 1e-3
+        assert rig.excursion_m(5.3) < before + 1e-3
 
 
 @pytest.mark.parametrize('valve, controller, at_s, lasts_s', [
-    ('hsv', 'pid_hsv', 10.13, 0.9), ('ppr', 'pid', 10.21, 2.7)])
+    ('hsv', 'pid_hsv', 6.13, 0.9), ('ppr', 'pid', 6.21, 2.7)])
 def test_an_integral_does_not_remember_the_way_back_to_a_moving_reference(
         valve, controller, at_s, lasts_s):
     """Before, the muscle went 0.6 and 1.1 mm too far: the integral had grown on that error."""
     rig = FaultyRig(valve, controller).run(at_s, slow_sine)
-    before = rig.excursion_m(5.0)
+    before = rig.excursion_m(3.0)
     rig.run(lasts_s, slow_sine, 'stopped')
     rig.run(2.0, slow_sine)
     assert rig.excursion_m(at_s) < before + 4e-4
@@ -88,7 +88,7 @@ def test_a_controller_that_its_driver_does_not_hear_yet_does_not_wind_up(valve, 
 def test_both_sensors_frozen_in_motion_are_noticed(valve):
     """The pressure that should have moved the muscle is that of the driver, not the reading."""
     for controller in CONTROLLERS[valve][:2]:
-        rig = FaultyRig(valve, controller).run(9.3, slow_sine)
+        rig = FaultyRig(valve, controller).run(5.3, slow_sine)
         rig.reasons.clear()
         rig.run(2.0, slow_sine, 'frozen', ('pressure', 'contraction'))
         assert any('stands still' in reason for reason in rig.reasons), controller
