@@ -14,10 +14,9 @@
 
 """Where tasks run: threads, processes and a Dask cluster give the same, mistakes a sentence."""
 
-import os
-import signal
 import sys
 
+from divisions import divided
 from pam_actuation.control.config import load_controller
 from pam_actuation.experiments.experiment import load_experiment
 from pam_actuation.tuning.loops_of_rigs import loops_of
@@ -91,15 +90,6 @@ def test_results_keep_the_order_of_the_items():
 
     with Workers(jobs=2) as workers:
         assert workers.map(cost_of, Square(), range(20)) == [i * i for i in range(20)]
-
-
-def divided(folder, item):
-    """Return 10 / item; 3 ends its process the first time, 5 always."""
-    mark = folder / str(item)
-    if item == 5 or item == 3 and not mark.exists():
-        mark.touch()
-        os.kill(os.getpid(), signal.SIGKILL)
-    return 10 / item
 
 
 def test_a_lost_process_costs_its_own_task_only(tmp_path):
