@@ -66,7 +66,7 @@ SCRIPT = ('import sys, signal; signal.signal(signal.SIGINT, signal.SIG_DFL); '
 # A signal that comes later tells nothing.
 WORKS_S = {'simulate': 2.2, 'replay': 1.3, 'tune': 1.8, 'gap': 1.1, 'report': 0.9, 'info': 0.6,
            'models': 0.8, 'valves': 4.0, 'rules': 0.9, 'nodes': 1.0, 'up': 6.0,
-           'characterise': 5.0, 'run': 10.0, 'demo': 10.0}
+           'characterise': 2.5, 'run': 10.0, 'demo': 10.0}
 NODE_WORKS_S = 4.0
 # A node that compiles, a session that ends all its nodes in order, at a low priority.
 ENDED_AFTER_S = 40.0
