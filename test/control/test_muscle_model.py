@@ -79,7 +79,7 @@ def observed(controller, contraction_m, pressure_pa):
     return np.array(innovations)
 
 
-def slow_motion(seconds=60.0):
+def slow_motion(seconds=30.0):
     """Return a contraction [m] of many amplitudes, so slow that only its path matters."""
     t = np.arange(0.0, seconds, PERIOD_S)
     return 0.014 + 0.005 * np.sin(1.3 * t) + 0.003 * np.sin(0.41 * t)
@@ -107,7 +107,7 @@ def test_path_rules_learn_a_friction_loop_and_know_it_on_another_motion(inverse)
     x = slow_motion()
     static = np.array([inverse_pressure_pa(inverse, one) for one in x])
     observed(controller, x, static + play_pressure_pa(x))
-    t = np.arange(0.0, 20.0, PERIOD_S)
+    t = np.arange(0.0, 10.0, PERIOD_S)
     other = 0.013 + 0.004 * np.sin(0.9 * t) + 0.002 * np.sin(2.3 * t)
     static = np.array([inverse_pressure_pa(inverse, one) for one in other])
     taught = controller.rules.path.copy()
@@ -223,7 +223,7 @@ def test_the_damping_found_grows_no_further_beyond_its_rate(inverse):
 
 
 def test_friction_that_grows_with_the_pressure_is_found_at_400_kpa(inverse):
-    x, paths = slow_motion(40.0), {}
+    x, paths = slow_motion(30.0), {}
     for growth in (0.0, 1.0):
         controller = controller_with(
             inverse, path_learning=0.0, model_noise_pa=5e3, integral_growth_per_m=12.0,
@@ -274,7 +274,7 @@ def test_creep_is_told_apart_and_begins_anew_after_a_move(inverse, time_s, expec
     controller = controller_with(
         inverse, path_learning=0.0, model_noise_pa=5e3, creep_time_s=time_s, creep_pa=expected_pa)
     par, st = fields(controller.parameters, PARAMETERS), fields(zeros(MODEL), MODEL)
-    x, slow = slow_motion(40.0), 0.014
+    x, slow = slow_motion(25.0), 0.014
     st.slow_m = slow
     for one in x:
         slow += PERIOD_S / (1.0 + PERIOD_S) * (one - slow)
