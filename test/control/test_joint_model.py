@@ -42,7 +42,7 @@ def moves(kind, segments):
 
 def random_motion(kind, seed):
     return moves(kind, f'  - multisine: {{center_rad: {PRESETS[kind][2]}, amplitude_rad: 0.3, '
-                 f'min_hz: 0.02, max_hz: 1.0, lines: 40, duration_s: 30.0, seed: {seed}}}\n')
+                 f'min_hz: 0.02, max_hz: 1.0, lines: 40, duration_s: 20.0, seed: {seed}}}\n')
 
 
 def errors_deg(joint, nominal, experiment, controller, preview_s=0.0):
