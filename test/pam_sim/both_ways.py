@@ -17,7 +17,9 @@
 import os
 import subprocess
 import sys
+from unittest import mock
 
+from numba import config
 import numpy as np
 
 
@@ -25,13 +27,13 @@ def compiled_and_not(script, folder):
     """
     Return the arrays a script saves to its first argument, [compiled, not compiled].
 
-    Each runs in a process of its own, since the compiler is switched at import.
+    The compiler is switched at import: the second run has a process of its own.
     """
-    results = []
-    for disabled in ('0', '1'):
-        path = folder / f'{disabled}.npy'
-        subprocess.run([sys.executable, '-c', script, str(path)], check=True,
-                       env={**os.environ, 'NUMBA_DISABLE_JIT': disabled,
-                            'PYTHONPATH': os.pathsep.join(sys.path)})
-        results.append(np.load(path))
-    return results
+    assert not config.DISABLE_JIT, 'NUMBA_DISABLE_JIT is set: nothing is compiled'
+    compiled, interpreted = str(folder / 'compiled.npy'), str(folder / 'interpreted.npy')
+    with mock.patch('sys.argv', ['-c', compiled]):
+        exec(compile(script, 'script', 'exec'), {'__name__': '__main__'})
+    subprocess.run([sys.executable, '-c', script, interpreted], check=True,
+                   env={**os.environ, 'NUMBA_DISABLE_JIT': '1',
+                        'PYTHONPATH': os.pathsep.join(sys.path)})
+    return [np.load(compiled), np.load(interpreted)]
