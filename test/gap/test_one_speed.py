@@ -38,7 +38,7 @@ def triangle(period_s, time_s=TIME_S):
     return np.abs(2.0 * np.mod(time_s / period_s, 1.0) - 1.0)
 
 
-def loop(period_s, seconds=16.0):
+def loop(period_s, seconds=12.0):
     """Return a voltage per millisecond: a second of rest, then one triangle after another."""
     t = np.arange(int(seconds * 1000)) * 1e-3
     return np.where(t < 1.0, 3.0, 3.0 + 2.4 * (1.0 - triangle(period_s, t - 1.0)))

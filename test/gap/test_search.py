@@ -39,7 +39,7 @@ from pam_sim.gap.subsystems.problems import subsystem_problems
 import pytest
 
 
-def result_of(name, seconds=14.0, **parameters):
+def result_of(name, seconds=11.0, **parameters):
     rig = nominal().with_(effects=[{'name': name, 'parameters': parameters}])
     return find_gap(recorded(rig, voltages(seconds)), nominal())
 
@@ -268,7 +268,7 @@ def test_friction_that_bends_first_is_named_as_friction():
     """And leaves nothing that a second effect would have to explain."""
     rig = nominal().with_(effects=[{'name': 'coulomb_friction_presliding', 'parameters': {
         'force_n': 2.0, 'presliding_m': 2.5e-5}}])
-    result = find_gap(recorded(rig, voltages(14.0)), nominal())
+    result = find_gap(recorded(rig, voltages(11.0)), nominal())
     assert result.verdict == 'effects'
     assert [e['name'] for e in result.effects] == ['coulomb_friction']
     assert result.effects[0]['formulation'] == 'coulomb_friction_presliding'

@@ -37,7 +37,7 @@ def two_effects(tmp_path_factory):
         {'name': 'valve_dead_time', 'parameters': {'delay_s': 0.03}},
         {'name': 'coulomb_friction', 'parameters': {'force_n': 1.5}}])
     folder = tmp_path_factory.mktemp('two_effects') / 'gap'
-    return folder, write_gap([recorded(rig, voltages(20.0))], NOMINAL, folder)
+    return folder, write_gap([recorded(rig, voltages(14.0))], NOMINAL, folder)
 
 
 def shares(result, signal, condition='all'):
@@ -46,7 +46,7 @@ def shares(result, signal, condition='all'):
 
 
 def test_noise_alone_is_no_gap():
-    result = find_gap(recorded(nominal(), voltages(16.0)), nominal())
+    result = find_gap(recorded(nominal(), voltages(11.0)), nominal())
     assert result.verdict == 'no_gap'
     assert_form(result)
     assert result.parameters == [] and result.unexplained_fraction == 0.0
@@ -88,7 +88,7 @@ def test_shares_by_condition_add_up(two_effects):
 
 
 def test_a_wrong_mass_is_a_parameter():
-    run = recorded(nominal().with_(parameters={'mass_kg': 5.75}), voltages(16.0))
+    run = recorded(nominal().with_(parameters={'mass_kg': 5.75}), voltages(11.0))
     result = find_gap(run, nominal())
     assert result.verdict == 'parameter'
     assert_form(result)
@@ -104,7 +104,7 @@ def test_a_wrong_mass_is_a_parameter():
 
 
 def test_a_small_error_within_tolerance_is_calibrated_silently():
-    run = recorded(nominal().with_(parameters={'mass_kg': 5.15}), voltages(16.0))
+    run = recorded(nominal().with_(parameters={'mass_kg': 5.15}), voltages(11.0))
     result = find_gap(run, nominal())
     assert result.verdict == 'no_gap'
     assert result.signals['contraction'].rmse_before > result.signals[
@@ -113,7 +113,7 @@ def test_a_small_error_within_tolerance_is_calibrated_silently():
 
 
 def test_a_hair_of_latency_is_no_gap():
-    run = recorded(nominal(), voltages(16.0))
+    run = recorded(nominal(), voltages(11.0))
     for topic in ('pressure', 'contraction', 'force'):
         run.topics[topic].stamp_ns += 1_500_000
     assert find_gap(run, nominal()).verdict == 'no_gap'
@@ -284,7 +284,7 @@ def test_the_comparison_opens_with_an_independent_reader(two_effects):
 
 
 def test_an_overlay_of_the_true_model_stays_near():
-    run = recorded(load_rig('dmsp_5_300_realistic'), voltages(16.0))
+    run = recorded(load_rig('dmsp_5_300_realistic'), voltages(11.0))
     overlays = {o.signal: o for o in free_run_overlay(run, load_rig('dmsp_5_300_realistic'))}
     contraction = overlays['contraction']
     assert np.sqrt(np.mean((contraction.recorded - contraction.simulated) ** 2)) < 1e-4
