@@ -32,7 +32,7 @@ def statuses(found):
 
 def test_mass_and_spring_are_determined_from_contraction_and_known_muscle():
     rig = RIG.with_(parameters={'mass_kg': 3.3}, effects=[spring(700.0)])
-    run = record(rig)
+    run = record(rig, hold_s=0.5)
     found = identify(run, RIG, ['mass_kg', 'spring_n_per_m'])
     assert set(statuses(found).values()) == {'determined'} and not found.incomplete
     assert inside(found['mass_kg'], 3.3) and inside(found['spring_n_per_m'], 700.0)
@@ -51,7 +51,7 @@ def test_a_far_start_and_a_wide_range_end_at_the_same_mass():
 
 def test_without_a_load_cell_load_and_strength_are_known_together_and_a_mass_more_tells():
     rig = RIG.with_(parameters={'mass_kg': 6.0, 'force_map_gain': 1.15})
-    run = record(rig, keep=('pressure', 'contraction'), hold_s=1.2)
+    run = record(rig, keep=('pressure', 'contraction'), hold_s=0.8)
     unknown = ['mass_kg', 'force_map_gain', 'damping_n_s_per_m']
     found = identify(run, RIG, unknown)
     assert {statuses(found)[n] for n in ('mass_kg', 'force_map_gain')} == {'only together'}
@@ -141,19 +141,19 @@ def test_recordings_at_several_held_lengths_are_told_to_count_as_one():
 def test_a_missing_effect_widens_the_intervals_and_is_said():
     rig = RIG.with_(parameters={'mass_kg': 3.3}, effects=[
         {'name': 'coulomb_friction', 'parameters': {'force_n': 4.0}}])
-    found = identify(record(rig), RIG, ['mass_kg'])
+    found = identify(record(rig, hold_s=0.5), RIG, ['mass_kg'])
     assert found.incomplete and 'effects of the library were fitted along' in found.text()
     assert inside(found['mass_kg'], 3.3)
 
 
 def test_a_stiffness_of_the_muscle_counts_as_spring_where_no_force_is_measured():
     rig = RIG.with_(effects=[spring(400.0), {'name': 'valve_dead_time'}])
-    found = identify(record(rig, keep=('pressure', 'contraction')), RIG, ['spring_n_per_m'],
-                     advise=False)
+    found = identify(record(rig, hold_s=0.5, keep=('pressure', 'contraction')), RIG,
+                     ['spring_n_per_m'], advise=False)
     assert found.incomplete and inside(found['spring_n_per_m'], 400.0)
     assert statuses(found)['spring_n_per_m'] == 'determined'
     assert 'bladder_stiffness would look the same' in found.text()
-    with_force = record(RIG.with_(effects=[spring(400.0)]))
+    with_force = record(RIG.with_(effects=[spring(400.0)]), hold_s=0.5)
     assert 'would look the same' not in identify(with_force, RIG, ['spring_n_per_m']).text()
 
 

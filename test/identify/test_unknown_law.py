@@ -119,7 +119,7 @@ def test_a_static_map_is_no_possible_effect_beside_an_unknown_law():
 
 def test_beside_a_missing_effect_the_law_is_left_to_the_look_for_it():
     creeping = RIG.with_(effects=['creep', 'coulomb_friction'])
-    run = record(creeping, gauge_pa=(50e3, 400e3, 150e3), hold_s=1.5,
+    run = record(creeping, gauge_pa=(50e3, 400e3, 150e3), hold_s=1.0,
                  keep=('pressure', 'contraction'))
     found = identify(run, RIG, ['law.a3', 'spring_n_per_m'], advise=False)
     assert [one.number.name for one in found.found] == ['spring_n_per_m']
