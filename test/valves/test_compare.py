@@ -45,7 +45,7 @@ def bench(name, rig='dmsp_5_300_hanging_mass', effects=None):
 
 @pytest.fixture(scope='module')
 def result():
-    return compare(load_rig('dmsp_5_300_realistic'), hold_s=3.0)
+    return compare(load_rig('dmsp_5_300_realistic'), hold_s=2.0)
 
 
 @pytest.mark.parametrize('name', CHAINS)
@@ -192,7 +192,7 @@ def test_numbers_are_plain_and_shown(result):
 
 def test_the_page_on_valves_has_the_numbers_of_today(result):
     page = PAGE.read_text(encoding='utf-8')
-    # The holds of the page last 60 s, those here 3 s.
+    # The holds of the page last 60 s, those here 2 s.
     held = {label for label, *_, part, _ in NUMBERS if part.startswith('hold')}
     missing = [row(cells) for cells in number_rows(result)
                if cells[0] not in held and row(cells) not in page]
@@ -207,7 +207,7 @@ def test_what_cannot_be_compared_is_refused():
 
 
 def test_the_verb_writes_and_repeats(tmp_path, capsys, result):
-    arguments = ['valves', 'compare', '--hold', '3', '--json', '--html', str(tmp_path / 'v.html')]
+    arguments = ['valves', 'compare', '--hold', '2', '--json', '--html', str(tmp_path / 'v.html')]
     assert main(arguments) == 0
     shown = json.loads(capsys.readouterr().out)
     assert shown.pop('statements') == statements(result)
