@@ -97,7 +97,6 @@ TEST_REQUIRES = [
     # The rules of ament_flake8 and ament_pep257, as far as each has them.
     'ruff>=0.12',
     'pycodestyle>=2.11',
-    'flake8-class-newline>=1.6',
     'flake8-import-order>=0.18.2',
     'mypy>=1.15',
     'types-PyYAML>=6.0',

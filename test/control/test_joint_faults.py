@@ -82,9 +82,13 @@ def _device_refuses(rig, side):
     rig.drivers[side].on_device('no such device')
 
 
-def _second_sender(rig, side):
-    """Tell of each kind, one after the other: the driver judges all of them alike."""
-    for key in SENDERS if side == 'flexor' else reversed(SENDERS):
+def _second_driver(rig, side):
+    rig.drivers[side].set_sender_fault(('second_driver', 'two nodes send'))
+
+
+def _two_senders(rig, side):
+    """Tell of both kinds, one after the other: the driver judges them alike."""
+    for key in TWO_SENDERS if side == 'flexor' else reversed(TWO_SENDERS):
         rig.drivers[side].set_sender_fault((key, f'{key}: two nodes send'))
         rig.run(0.05)
 
@@ -140,7 +144,7 @@ def _nothing(rig, side):
     """Do nothing: the fault ends by itself."""
 
 
-SENDERS = 'two_publishers', 'second_driver', 'two_sensors'
+TWO_SENDERS = 'two_publishers', 'two_sensors'
 # Key in the fault table: (how it begins, how it ends) of a muscle under pressure.
 ROWS = {
     'emergency_stop': _latched(_emergency_stop),
@@ -148,7 +152,8 @@ ROWS = {
     'device_refuses': _latched(_device_refuses),
     'no_command': (_no_command, _silent('')[1]),
     'command_timeout': _silent('pressure_command'),
-    'second_sender': (_second_sender, _one_sender),
+    'second_driver': (_second_driver, _one_sender),
+    'two_senders': (_two_senders, _one_sender),
     'valve_command_interrupted': _latched(_interrupted),
     'pressure_timeout': _silent('pressure'),
     'pressure_frozen': _readings(lambda sound: Pressure(sound.stamp_ns, P_ATM_PA + 3e5)),
@@ -158,7 +163,7 @@ ROWS = {
     'driver_killed': (_stopped, _go_on)}
 OF_PAIRS_OF_VALVES = ('valve_command_interrupted', 'pressure_frozen', 'no_pressure')
 # What the driver tells, where that is not the key.
-TELLS = {'second_sender': SENDERS, 'driver_ends': (), 'driver_killed': ()}
+TELLS = {'two_senders': TWO_SENDERS, 'driver_ends': (), 'driver_killed': ()}
 FROM_THE_START = {
     'no_pressure': _silent('pressure'),
     'no_command': _silent('pressure_command'),
@@ -175,7 +180,7 @@ UNUSABLE = [
 
 def test_every_row_that_vents_a_muscle_is_tested_for_a_joint():
     assert {fault.key for fault in FAULT_TABLE if fault.reaction in (VENT, HOLD)} == {
-        *ROWS, *SENDERS, *FROM_THE_START} - {'second_sender'}
+        *ROWS, *TWO_SENDERS, *FROM_THE_START} - {'two_senders'}
 
 
 def under_pressure(valve, **options):
@@ -240,7 +245,7 @@ def test_a_joint_of_which_one_driver_does_not_follow_does_not_begin(valve, key, 
 @pytest.mark.parametrize('side, problems', UNUSABLE)
 def test_a_pressure_that_cannot_be_used_vents_both_muscles(valve, side, problems):
     rig = under_pressure(valve)
-    for arrives in problems:
+    for arrives in problems if valve == 'ppr' else reversed(problems):
         _pressure(rig, side, arrives)
         both_stay_vented(rig, side)
     rig.spoil.clear()
