@@ -38,7 +38,7 @@ MUSCLE = {'contraction': SignalGap('m', 2e-5, 6e-4, 4e-4, 1e-4),
 def test_a_valve_without_a_name_takes_none_from_the_muscle(own_proof):
     rig = nominal().with_(effects=[STICKY, RUBBING])
     certify = None if own_proof else recorded(rig, voltages(12.0, seed=5), seed=8)
-    result = find_gap(recorded(rig, voltages()), nominal(), certify,
+    result = find_gap(recorded(rig, voltages(14.0)), nominal(), certify,
                       effects=['coulomb_friction'], unnamed=())
     assert_form(result)
     # Much of the gap is of the valve, so the name in the muscle is a part of the answer.

@@ -40,7 +40,7 @@ def rig(friction_n, sticky_pa=0.0):
 def test_what_makes_a_signal_worse_is_not_added_and_the_rest_is():
     """The regulator of the proof does not stick; its muscle rubs more than that of the search."""
     result = find_gap(
-        recorded(rig(2.0, 1.5e3), voltages()), nominal(),
+        recorded(rig(2.0, 1.5e3), voltages(16.0)), nominal(),
         recorded(rig(4.0), voltages(16.0, seed=5), seed=8),
         effects=['coulomb_friction', 'valve_hysteresis'], unnamed=())
     assert_form(result)

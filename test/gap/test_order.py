@@ -33,7 +33,8 @@ WITHOUT_CELL = ('pressure', 'contraction')
 @pytest.mark.parametrize('effects', [['contraction_bias'], None])
 def test_a_wrong_load_is_not_an_offset_of_the_encoder(effects):
     """Far off, its prior holds it: the misfit is so large that the data have little weight."""
-    run = recorded(nominal().with_(parameters={'mass_kg': 3.0}), voltages(), topics=WITHOUT_CELL)
+    run = recorded(nominal().with_(parameters={'mass_kg': 3.0}), voltages(14.0),
+                   topics=WITHOUT_CELL)
     result = find_gap(run, nominal(), effects=effects)
     assert result.verdict == 'parameter' and result.effects == []
     assert [p.name for p in result.parameters] == ['mass_kg']
@@ -43,7 +44,7 @@ def test_a_wrong_load_is_not_an_offset_of_the_encoder(effects):
 
 def test_an_offset_of_the_encoder_is_named_where_no_number_explains_it():
     rig = nominal().with_(effects=[{'name': 'contraction_bias', 'parameters': {'bias_m': 5e-4}}])
-    result = find_gap(recorded(rig, voltages(), topics=WITHOUT_CELL), nominal())
+    result = find_gap(recorded(rig, voltages(14.0), topics=WITHOUT_CELL), nominal())
     assert 'contraction_bias' in result.ambiguity_set
     assert result.parameters == []
 

@@ -25,7 +25,7 @@ NAMES = ['coulomb_friction', 'pressure_friction', 'viscous_damping']
 
 def run_with(name, **parameters):
     effect = {'name': name, 'parameters': parameters}
-    return recorded(nominal().with_(effects=[effect]), voltages(14.0))
+    return recorded(nominal().with_(effects=[effect]), voltages(10.0))
 
 
 @pytest.fixture(scope='module')
@@ -49,7 +49,7 @@ def test_it_is_named_by_whoever_asks_for_it(smooth):
 def test_one_that_the_model_has_is_not_held_against_a_name():
     model = nominal().with_(effects=[{'name': 'smooth_friction', 'parameters': {'force_n': 2.0}}])
     dry = {'name': 'coulomb_friction', 'parameters': {'force_n': 3.0}}
-    result = find_gap(recorded(model.with_(effects=[*model.effects, dry]), voltages(14.0)),
+    result = find_gap(recorded(model.with_(effects=[*model.effects, dry]), voltages(10.0)),
                       model, effects=NAMES)
     assert [e['name'] for e in result.effects] == ['coulomb_friction']
 
