@@ -77,11 +77,9 @@ def test_a_gap_is_measured_on_where_it_was_recorded(tmp_path):
 
 def test_a_plan_says_how_it_is_run_for_real_and_simulated(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    quick = protocols.pieces('ppr')['quick']
-    monkeypatch.setattr(protocols, 'pieces', lambda valve: {'quick': quick})
     (tmp_path / 'short.yaml').write_text(dump_yaml({
         'name': 'short', 'domain': 'pressure', 'segments': [
-            {'rest': {'duration_s': 1.0}}, *quick]}), encoding='utf-8')
+            {'rest': {'duration_s': 1.0}}, *protocols.pieces('ppr')['quick']]}), encoding='utf-8')
     assert main(['gap', '--plan', 'short.yaml', '--model', 'dmsp_5_300_hanging_mass', '--effects',
                  'leakage', '--out', 'planned']) == 0
     out = capsys.readouterr().out
