@@ -27,12 +27,13 @@ import numpy as np
 
 from pam_actuation.bags import renamed, series
 from pam_actuation.bags.markers import is_marker, markers_of
-from pam_actuation.bags.plausibility import Implausible, recorded_length_m, topic_findings
+from pam_actuation.bags.plausibility import (
+    Implausible, not_finite, recorded_length_m, topic_findings)
 from pam_actuation.bags.source import Bag, read_bag, TopicData
 from pam_actuation.messages import Marker, ReferenceTrajectory, VALVE_NAMES, valve_of
 from pam_actuation.topics.codec import decode
 from pam_actuation.topics.table import (
-    BY_NAME, KEPT, OF_A_RUN, OFTEN_EMPTY, RECORDED, short_name, TOLD)
+    BY_NAME, KEPT, OF_A_RUN, RECORDED, short_name, TOLD)
 from pam_sim.annotations import BoolArray, FloatArray, IntArray
 from pam_sim.errors import InputError
 from pam_sim.files import StrPath
@@ -300,8 +301,8 @@ def _held(stamp_ns: IntArray, values: Mapping[str, FloatArray], name: str,
 
 def _remark_not_finite(values: Mapping[str, FloatArray], name: str, remarks: list[str]) -> None:
     for key, column in values.items():
-        count = int((~np.isfinite(column)).sum())
-        if count and not (key in OFTEN_EMPTY and count == len(column)):
+        count = not_finite(name, key, column)
+        if count:
             remarks.append(f'{name}: {count} of {len(column)} {key} are not finite, kept as NaN.')
 
 

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pam_actuation.topics.table import (
-    NEEDED, OF_A_RUN, OFTEN_EMPTY, RECORDED, RECORDED_OF_JOINT, short_name, Topic, USED)
+    BY_NAME, NEEDED, OF_A_RUN, OFTEN_EMPTY, RECORDED, RECORDED_OF_JOINT, short_name, Topic, USED)
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.joint.parameters import SIDES
 from pam_sim.units import allowed_range, gauge_kpa, P_ATM_PA
@@ -228,8 +228,8 @@ def value_findings(topic: str, name: str, column: FloatArray,
     """
     finite = column[np.isfinite(column)]
     found = []
-    bad = len(column) - len(finite)
-    if bad and not (name in OFTEN_EMPTY and not len(finite)):
+    bad = not_finite(topic, name, column)
+    if bad:
         what = 'none' if not len(finite) else f'{len(finite)} of {len(column)}'
         found.append(Implausible(
             f'{topic}: {bad} values of {name} are not finite (nan or inf), {what} can be used; '
@@ -247,6 +247,19 @@ def value_findings(topic: str, name: str, column: FloatArray,
         if sentence:
             found.append(Implausible(f'{topic}: {sentence}', unusable))
     return found
+
+
+def not_finite(topic: str, name: str, column: FloatArray) -> int:
+    """
+    Return how many values of a column are not finite, those not counted that may be left empty.
+
+    Parameters are those of ``value_findings``.
+    """
+    row = BY_NAME.get(short_name(topic))
+    if row is not None and name in row.optional:
+        return int(np.isinf(column).sum())
+    bad = int((~np.isfinite(column)).sum())
+    return 0 if name in OFTEN_EMPTY and bad == len(column) else bad
 
 
 def _usual_length() -> float:

@@ -75,6 +75,8 @@ class Topic:
         Whether it comes at 100 Hz or more, so that a lower rate and gaps are told.
     missing : {'told', 'kept', 'allowed'}
         What a number that is not there means.
+    optional : tuple of str
+        Values that any message may leave empty, however many others tell them.
     internals : bool
         Whether its numbers are internals of a node, which may be anything.
     drawn : bool
@@ -99,6 +101,7 @@ class Topic:
     need: str = EXTRA
     steady: bool = False
     missing: str = TOLD
+    optional: tuple[str, ...] = ()
     internals: bool = False
     drawn: bool = False
     valves: tuple[str, ...] = VALVES
@@ -149,7 +152,8 @@ TOPICS = (
           ('plant_simulator',), drawn=True),
     Topic('reference', Numbers(
         JOINT_STATE, messages.Reference, _MOTION, (Value('force_n', 'effort'),)),
-          'wanted contraction, now', REFERENCE, LAWS, held=True, need=USED, drawn=True),
+          'wanted contraction, now', REFERENCE, LAWS, held=True, need=USED, drawn=True,
+          optional=('velocity_m_per_s',)),
     Topic('reference_trajectory', Trajectory(
         messages.ReferenceTrajectory, 'contraction_m', 'velocity_m_per_s', 'force_n'),
           'wanted contraction, known ahead', REFERENCE, LAWS),
@@ -175,7 +179,8 @@ TOPICS = (
           ('joint_controller', 'joint_trajectory_server'), place=JOINT),
     Topic('joint_reference', Numbers(JOINT_STATE, messages.AngleReference, (
         Value('angle_rad', 'position'), Value('rate_rad_per_s', 'velocity'))),
-          'wanted angle, now', REFERENCE, ('joint_controller',), place=JOINT, held=True),
+          'wanted angle, now', REFERENCE, ('joint_controller',), place=JOINT, held=True,
+          optional=('rate_rad_per_s',)),
     Topic('joint_trajectory', AnyJoints(messages.AngleTrajectory, 'angle_rad', 'rate_rad_per_s'),
           'wanted angle, known ahead', (*REFERENCE, 'joint_trajectory_server'),
           ('joint_controller',), place=JOINT),

@@ -19,6 +19,7 @@ import json
 import numpy as np
 from pam_actuation.bags.info import bag_info
 from pam_actuation.bags.load import load_run
+from pam_actuation.bags.load_joint import load_recording
 from pam_actuation.bags.plausibility import value_findings
 from pam_actuation.bags.source import read_bag
 from pam_actuation.bags.writer import BagWriter
@@ -26,7 +27,9 @@ from pam_actuation.cli.main import main
 from pam_actuation.control.config import load_controller
 from pam_actuation.experiments import load_experiment
 from pam_actuation.experiments.offline import simulate_experiment
+from pam_actuation.messages import AngleReference, JointAngle
 from pam_actuation.topics import codec
+from pam_actuation.topics.table import BY_NAME
 from pam_sim import load_rig
 from pam_sim.gap.data.health import check_health
 from pam_sim.units import P_ATM_PA
@@ -96,7 +99,7 @@ def test_values_that_are_not_finite_are_counted():
 
 
 def converted(source, target, change):
-    """Copy a bag with the values of ``pressure`` and ``contraction`` changed."""
+    """Copy a bag with the values of sensors and reference changed."""
     bag = read_bag(source)
     with BagWriter(target, bag.experiment) as writer:
         for name, topic in bag.topics.items():
@@ -105,7 +108,7 @@ def converted(source, target, change):
             short = name.rsplit('/', 1)[-1]
             for payload, log_ns, sent_ns in zip(
                     topic.payloads, topic.log_time_ns.tolist(), topic.publish_time_ns.tolist()):
-                if short in ('pressure', 'contraction'):
+                if short in ('pressure', 'contraction', 'reference'):
                     message = codec.decode(short, payload)
                     payload = codec.encode(short, change(short, message))
                 writer.write(name, payload, log_ns, sent_ns)
@@ -120,6 +123,11 @@ def in_kpa(short, message):
 def in_mm(short, message):
     return message if short != 'contraction' else type(message)(
         message.stamp_ns, message.contraction_m * 1e3, message.velocity_m_per_s)
+
+
+def without_some_rates(short, message):
+    left_empty = short == 'reference' and message.stamp_ns // 10**7 % 3 == 0
+    return type(message)(message.stamp_ns, message.contraction_m) if left_empty else message
 
 
 def with_nan(short, message):
@@ -175,6 +183,28 @@ def test_a_good_bag_is_not_warned_of(bags, tmp_path, capsys):
     assert main(['report', bags['good'], '--out', str(tmp_path / 'page.html')]) == 0
     assert 'warning' not in capsys.readouterr().out
     assert 'What cannot be right' not in (tmp_path / 'page.html').read_text()
+
+
+def test_rates_of_references_may_be_left_empty(bags, tmp_path):
+    some = converted(bags['good'], tmp_path / 'some', without_some_rates)
+    rates = load_run(some)['reference']['velocity_m_per_s']
+    assert 0 < np.isnan(rates).sum() < len(rates)
+    for found, usual in ((load_run(some), load_run(bags['good'])),
+                         (bag_info(some), bag_info(bags['good']))):
+        assert found.remarks == usual.remarks
+    assert load_run(some).implausible == ()
+    with BagWriter(tmp_path / 'joint', {}) as writer:
+        for name in ('joint_state', 'joint_reference'):
+            writer.add_topic(f'/knee/{name}', BY_NAME[name].type_name)
+        for i in range(30):
+            for name, message in (('joint_state', JointAngle(10**9 + i, 0.1)),
+                                  ('joint_reference', AngleReference(10**9 + i, 0.1))):
+                writer.write(f'/knee/{name}', codec.encode(name, message), 10**9 + i, 10**9 + i)
+    joint = load_recording(tmp_path / 'joint')
+    assert np.isnan(joint['joint_reference']['rate_rad_per_s']).all()
+    assert joint.findings == () and joint.remarks == ()
+    # A sender that divides by zero is told all the same.
+    assert 'not finite' in look('velocity_m_per_s', [0.0, np.inf], '/muscle/reference')[0]
 
 
 def test_page_json_and_gap_carry_the_sentence(bags, tmp_path, capsys):
