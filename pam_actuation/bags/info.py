@@ -33,6 +33,7 @@ from pam_actuation.bags.ending import Ending, ending_of
 from pam_actuation.bags.facts import recorded_rig_title
 from pam_actuation.bags.info_text import render_text
 from pam_actuation.bags.load import is_rig_topic, namespaces
+from pam_actuation.bags.load_joint import is_joint_topic
 from pam_actuation.bags.losses import count_of, missing_messages, PublishedCounts
 from pam_actuation.bags.markers import markers_of
 from pam_actuation.bags.recorder import RECORDING_RECORD
@@ -40,7 +41,7 @@ from pam_actuation.bags.recover import RECOVERY_RECORD
 from pam_actuation.bags.source import Bag, read_bag, TopicData
 from pam_actuation.topics.cdr import CdrError
 from pam_actuation.topics.definitions import typestore
-from pam_actuation.topics.table import OF_A_RUN, short_name, TOPICS
+from pam_actuation.topics.table import BY_NAME, OF_A_RUN, short_name, TOPICS
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.errors import InputError
 from pam_sim.files import StrPath
@@ -259,14 +260,15 @@ def _topic_info(topic: TopicData,
 
 def _stamps_and_values(topic: TopicData,
                        remarks: list[str]) -> tuple[IntArray, dict[str, FloatArray]]:
-    """Return header stamps in file order (receive times if there are none) and values."""
+    """Return header stamps in file order (receive times if these tell more) and values."""
     short = short_name(topic.name)
     if is_rig_topic(topic) and short in OF_A_RUN and OF_A_RUN[short].numeric is not None:
         stamp_ns, values, bad = series.table(short, topic.payloads)
         if bad.any():
             remarks.append(f'{topic.name}: {int(bad.sum())} messages cannot be decoded.')
         return stamp_ns[~bad], {name: column[~bad] for name, column in values.items()}
-    if _has_header(topic):
+    row = BY_NAME.get(short)
+    if _has_header(topic) and (row is None or row.stamped or not is_joint_topic(topic)):
         try:
             return series.stamps(topic.payloads), {}
         except CdrError:

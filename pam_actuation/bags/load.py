@@ -33,7 +33,7 @@ from pam_actuation.bags.source import Bag, read_bag, TopicData
 from pam_actuation.messages import Marker, ReferenceTrajectory, VALVE_NAMES, valve_of
 from pam_actuation.topics.codec import decode
 from pam_actuation.topics.table import (
-    BY_NAME, KEPT, OF_A_RUN, RECORDED, short_name, TOLD)
+    BY_NAME, KEPT, OF_A_RUN, RECORDED, short_name, TOLD, Topic)
 from pam_sim.annotations import BoolArray, FloatArray, IntArray
 from pam_sim.errors import InputError
 from pam_sim.files import StrPath
@@ -242,7 +242,7 @@ def read_series(short: str, topic: TopicData, remarks: list[str]) -> Series:
     if bad.any():
         remarks.append(
             f'{topic.name}: {int(bad.sum())} messages are not {topic.type_name}, left out.')
-    stamp_ns, keep = _checked_stamps(stamp_ns, keep, topic, remarks)
+    stamp_ns, keep = _checked_stamps(row, stamp_ns, keep, topic, remarks)
     if row.missing == KEPT:
         values = {name: values[name] for name in _SIGNAL_NAMES if name in values}
         if not values and len(stamp_ns):
@@ -264,14 +264,20 @@ def read_series(short: str, topic: TopicData, remarks: list[str]) -> Series:
     if row.missing == KEPT:
         stamp_ns, values = _held(stamp_ns, values, topic.name, remarks)
     elif row.missing == TOLD and not row.internals and len(stamp_ns):
-        _remark_not_finite(values, topic.name, remarks)
+        _remark_not_finite(row.name, values, topic.name, remarks)
     return Series(stamp_ns, values, {name: unit_of(name) for name in values}, held=row.held)
 
 
-def _checked_stamps(stamp_ns: IntArray, keep: BoolArray, topic: TopicData,
+def _checked_stamps(row: Topic, stamp_ns: IntArray, keep: BoolArray, topic: TopicData,
                     remarks: list[str]) -> tuple[IntArray, BoolArray]:
-    """Treat messages that nobody stamped: all of them by receive time, single ones left out."""
+    """
+    Treat messages that nobody stamped: all of them by receive time, single ones left out.
+
+    Where a stamp may be zero, such messages count by receive time.
+    """
     unset = keep & (stamp_ns == 0)
+    if not row.stamped:
+        return np.where(unset, topic.log_time_ns, stamp_ns), keep
     if int(unset.sum()) > 1 and not (stamp_ns[keep] != 0).any():
         remarks.append(f'{topic.name}: no message has a header stamp, receive times are used.')
         return topic.log_time_ns, keep
@@ -299,9 +305,10 @@ def _held(stamp_ns: IntArray, values: Mapping[str, FloatArray], name: str,
     return stamp_ns[known], {key: column[known] for key, column in held.items()}
 
 
-def _remark_not_finite(values: Mapping[str, FloatArray], name: str, remarks: list[str]) -> None:
+def _remark_not_finite(short: str, values: Mapping[str, FloatArray], name: str,
+                       remarks: list[str]) -> None:
     for key, column in values.items():
-        count = not_finite(name, key, column)
+        count = not_finite(short, key, column)
         if count:
             remarks.append(f'{name}: {count} of {len(column)} {key} are not finite, kept as NaN.')
 

@@ -78,7 +78,8 @@ class RecordedTopic:
                     f'{topic.name}: {int(bad.sum())} messages are not {topic.type_name}',
                     str(path))
         received_ns = np.asarray(topic.log_time_ns, dtype=np.int64)
-        _check_clocks(stamp_ns, received_ns, topic, path)
+        if BY_NAME[short].stamped:
+            _check_clocks(stamp_ns, received_ns, topic, path)
         time_ns = stamp_ns if by_stamp else received_ns
         self._order = np.argsort(time_ns, kind='stable')
         self.time_ns = time_ns[self._order]

@@ -77,6 +77,9 @@ class Topic:
         What a number that is not there means.
     optional : tuple of str
         Values that any message may leave empty, however many others tell them.
+    stamped : bool
+        Whether the header stamp tells when a message was measured or sent. Otherwise it may be
+        zero: a trajectory begins then, now for zero, or nobody reads it.
     internals : bool
         Whether its numbers are internals of a node, which may be anything.
     drawn : bool
@@ -102,6 +105,7 @@ class Topic:
     steady: bool = False
     missing: str = TOLD
     optional: tuple[str, ...] = ()
+    stamped: bool = True
     internals: bool = False
     drawn: bool = False
     valves: tuple[str, ...] = VALVES
@@ -183,11 +187,11 @@ TOPICS = (
           optional=('rate_rad_per_s',)),
     Topic('joint_trajectory', AnyJoints(messages.AngleTrajectory, 'angle_rad', 'rate_rad_per_s'),
           'wanted angle, known ahead', (*REFERENCE, 'joint_trajectory_server'),
-          ('joint_controller',), place=JOINT),
+          ('joint_controller',), place=JOINT, stamped=False),
     Topic('joint_effort', NamedNumbers(messages.NamedEfforts, 'efforts', 'effort'),
           'wanted torque of both tendons', (), ('joint_controller',), place=JOINT, held=True),
     Topic('co_contraction', _PRESSURE, 'wanted mean pressure of both muscles', (),
-          ('joint_controller',), place=JOINT, held=True),
+          ('joint_controller',), place=JOINT, held=True, stamped=False),
 )
 
 BY_NAME = {topic.name: topic for topic in TOPICS}

@@ -20,18 +20,22 @@ import math
 import numpy as np
 from pam_actuation import messages
 from pam_actuation.bags import series
+from pam_actuation.bags.info import bag_info
 from pam_actuation.bags.load import load_run, topics_of
+from pam_actuation.bags.load_joint import load_recording
 from pam_actuation.bags.source import read_bag
 from pam_actuation.bags.writer import BagWriter
 from pam_actuation.loops.bus import Bus
-from pam_actuation.replay.arrivals import ORDER, recorded_topics, TICKED
+from pam_actuation.replay.arrivals import (
+    ORDER, recorded_topics, recorded_topics_of_joint, TICKED)
 from pam_actuation.topics import codec
-from pam_actuation.topics.table import RECORDED
+from pam_actuation.topics.table import BY_NAME, RECORDED
 from pam_sim.errors import InputError
 from process_replay import bag_of
 import pytest
 
 START_NS = 1_000_000_000_000
+WALL_NS = 1_790_000_000_000_000_000
 
 
 def arrivals(run, topics):
@@ -130,6 +134,33 @@ def test_a_message_that_is_none_is_refused(tmp_path):
             writer.write('/muscle/pressure', raw[:9] if i == 1 else raw, START_NS, START_NS)
     with pytest.raises(InputError, match='1 messages are not sensor_msgs/msg/FluidPressure'):
         recorded_topics(load_run(tmp_path / 'run'), ORDER)
+
+
+@pytest.mark.parametrize('stamp_ns', [0, WALL_NS + 20_000_000_000])
+def test_a_stamp_that_tells_no_time_of_sending_is_no_other_clock(tmp_path, stamp_ns):
+    # Zero: the trajectory begins now. Otherwise it begins later, here after 20 s.
+    with BagWriter(tmp_path / 'run', {}) as writer:
+        for name in ('joint_state', 'joint_trajectory', 'co_contraction'):
+            writer.add_topic(f'/knee/{name}', BY_NAME[name].type_name)
+        for i in range(10):
+            now_ns = WALL_NS + i * 5_000_000
+            sent = {'joint_state': messages.JointAngle(now_ns, 0.1)}
+            if i in (4, 7):
+                sent['joint_trajectory'] = messages.AngleTrajectory(
+                    stamp_ns, (0, 10), (0.1, 0.2), (0.0, 0.0))
+                sent['co_contraction'] = messages.Pressure(0, 3e5)
+            for name, message in sent.items():
+                writer.write(f'/knee/{name}', codec.encode(name, message), now_ns, now_ns)
+    run = load_recording(tmp_path / 'run')
+    assert run.remarks == () and run.start_ns == WALL_NS
+    assert not any('stamp' in one for one in bag_info(tmp_path / 'run').remarks)
+    received = [WALL_NS + 20_000_000, WALL_NS + 35_000_000]
+    assert list(run['co_contraction'].stamp_ns) == received
+    topics = recorded_topics_of_joint(run)
+    for name in ('joint_trajectory', 'co_contraction'):
+        assert list(topics[name].times()) == received
+    # As it was sent: the controller reads the stamp of zero as it did.
+    assert [one.stamp_ns for one in topics['joint_trajectory']] == [stamp_ns] * 2
 
 
 def test_only_the_named_values_are_read():
