@@ -54,6 +54,9 @@ from pam_sim.short_repr import short_repr
 if TYPE_CHECKING:
     from pam_actuation.control.config import Controller
 
+# What can ask something of a controller: one of them is enough.
+WANTED = ('reference', 'reference_trajectory')
+WANTED_OF_JOINT = ('joint_reference', 'joint_trajectory', 'joint_effort')
 SENSORS = ('pressure', 'contraction', 'force', 'supply_pressure')
 _UNITS = {'pressure_pa': 'Pa', 'contraction_m': 'm', 'force_n': 'N', 'ppr_voltage': 'V',
           'fill_duty': '1', 'vent_duty': '1', 'angle_rad': 'rad'}
@@ -286,14 +289,17 @@ def replay_chain(run: Run,
     of_muscle = '' in rig.muscles
     for place in rig.muscles:
         run.require(f'{place}valve_signal')
-    law = _controller(run, rig, controller, 'reference' if of_muscle else 'joint_reference')
-    chain = RepeatedLoops(rig, law, recorded_seed(run), run.namespace.rpartition('/')[2],
-                          changes=as_recorded(run.metadata, run.path))
+    law = _controller(run, rig, controller)
     if of_muscle:
         topics = set(ORDER) if law is not None else set(ORDER) - {'controller_state'}
-        chain.run(recorded_topics(run, topics))
+        recorded = recorded_topics(run, topics)
     else:
-        chain.run(recorded_topics_of_joint(run))
+        recorded = recorded_topics_of_joint(run)
+    if law is not None:
+        _check_wanted(recorded, WANTED if of_muscle else WANTED_OF_JOINT, run)
+    chain = RepeatedLoops(rig, law, recorded_seed(run), run.namespace.rpartition('/')[2],
+                          changes=as_recorded(run.metadata, run.path))
+    chain.run(recorded)
     return ChainReplay(rig.name, *chain.signals(), run.start_ns)
 
 
@@ -305,15 +311,24 @@ def recorded_seed(run: Run) -> int:
     return int(seed)
 
 
-def _controller(
-        run: Run, rig: Rig | JointRig, controller: 'Controller | str | os.PathLike[str] | None',
-        reference: str) -> 'Controller | None':
+def _check_wanted(recorded: Mapping[str, RecordedTopic], wanted: tuple[str, ...],
+                  run: Run) -> None:
+    """Raise InputError where a recording holds nothing that asks anything of a controller."""
+    if not any(len(recorded[name]) for name in wanted if name in recorded):
+        have = sorted(name for name, messages in recorded.items() if len(messages))
+        raise InputError(
+            f'has no messages on {", ".join(wanted[:-1])} or {wanted[-1]}, so nothing tells the '
+            f'controller what to do; topics with messages: {", ".join(have) or "none"}',
+            str(run.path))
+
+
+def _controller(run: Run, rig: Rig | JointRig,
+                controller: 'Controller | str | os.PathLike[str] | None') -> 'Controller | None':
     """Return the controller of the loop, None for an experiment without one."""
     own = run.metadata.get('controller')
     if controller is None and not own:
         return None
     run.require('controller_state')
-    run.require(reference)
     if isinstance(controller, (str, os.PathLike)):
         return load_controller(controller, rig)
     if controller is not None:

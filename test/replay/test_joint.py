@@ -26,10 +26,11 @@ from pam_actuation.control import tick as codes
 from pam_actuation.control.config import load_controller
 from pam_actuation.control.joint_law import ADDED_NAMES
 from pam_actuation.control.loop import ControllerLoop
-from pam_actuation.experiments import load_experiment
+from pam_actuation.experiments import load_experiment, offline
 from pam_actuation.experiments.joint_offline import JointLoops
 from pam_actuation.experiments.offline import simulate_experiment
-from pam_actuation.messages import AngleReference, ControllerState, NamedEfforts, Pressure
+from pam_actuation.messages import (
+    AngleReference, AngleTrajectory, ControllerState, NamedEfforts, Pressure)
 from pam_actuation.replay.joint import is_joint, PARTS, replay_joint
 from pam_actuation.replay.joint_controller import COMMANDS
 from pam_sim import load_rig
@@ -177,6 +178,48 @@ def test_torques_faults_and_co_contraction_are_reproduced_from_the_states_alone(
     assert states['follows_torque'].max() == 1.0 and states['flexor_proves'].max() == 1.0
     found = replay_joint(run, only='controller')
     assert found.parts['controller'].identical and found.internals == {}
+
+
+def sent_instead(messages):
+    """Return what stands in for ``reference_tick``: it sends these messages on its first tick."""
+    def instead(bus, loop):
+        waiting = list(messages)
+
+        def tick(now_ns):
+            while waiting:
+                bus.send(*waiting.pop(0), now_ns)
+
+        return tick
+
+    return instead
+
+
+TRAJECTORY = AngleTrajectory(0, (100_000_000, 300_000_000), (0.1, 0.2), (0.0, 0.0))
+
+
+@pytest.mark.parametrize('messages', [
+    [('joint_trajectory', TRAJECTORY), ('co_contraction', Pressure(0, 351325.0))],
+    [('joint_effort', NamedEfforts(offline.START_NS, ('knee',), (0.1,)))]])
+def test_a_joint_moved_without_references_is_repeated(messages, tmp_path, monkeypatch):
+    joint = load_joint('joint_dmsp_5_300_realistic', valve='ppr')
+    monkeypatch.setattr(offline, 'reference_tick', sent_instead(messages))
+    simulate_experiment(
+        load_experiment('name: x\ndomain: joint_angle\nsegments: [rest: {duration_s: 0.4}]'),
+        joint, load_controller('sofc_joint_ppr', joint), tmp_path / 'bag', seed=3)
+    run = load_recording(tmp_path / 'bag')
+    assert 'joint_reference' not in run and run.remarks == ()
+    assert np.ptp(run['flexor/pressure_command']['pressure_pa']) > 1e4
+    assert replay_joint(run, chain=True).parts['chain'].identical
+
+
+def test_without_any_reference_the_chain_says_what_it_needs(tmp_path, monkeypatch):
+    joint = load_joint('joint_dmsp_5_300', valve='ppr')
+    monkeypatch.setattr(offline, 'reference_tick', sent_instead([]))
+    simulate_experiment(
+        load_experiment('name: x\ndomain: joint_angle\nsegments: [rest: {duration_s: 0.1}]'),
+        joint, load_controller('sofc_joint_ppr', joint), tmp_path / 'bag')
+    with pytest.raises(InputError, match='no messages on joint_reference, joint_trajectory or '):
+        replay_joint(load_recording(tmp_path / 'bag'), chain=True)
 
 
 def series_of(messages):
