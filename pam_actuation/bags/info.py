@@ -17,10 +17,10 @@ What is in a bag, whether it is complete and whether it can be true: ``bag_info(
 
 Completeness is judged twice. One measure is the count of the recorder, kept in the bag as
 ``pam_recording``. The other is the number of published messages that every node reports in
-/diagnostics as ``published.<full topic>``.
+/diagnostics as ``published.<full topic>``. A logger of one's own leaves no ``pam_recording`` and
+may begin long after the nodes: then only what they published since counts.
 """
 
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cache
 from pathlib import Path
@@ -29,12 +29,13 @@ from typing import Any
 import numpy as np
 
 from pam_actuation.bags import plausibility, series
+from pam_actuation.bags.completeness import (
+    add_counts, count_from_first_report, loss_remarks, reported_counts)
 from pam_actuation.bags.ending import Ending, ending_of
 from pam_actuation.bags.facts import recorded_rig_title
 from pam_actuation.bags.info_text import render_text
 from pam_actuation.bags.load import is_rig_topic, namespaces
 from pam_actuation.bags.load_joint import is_joint_topic
-from pam_actuation.bags.losses import count_of, missing_messages, PublishedCounts
 from pam_actuation.bags.markers import markers_of
 from pam_actuation.bags.recorder import RECORDING_RECORD
 from pam_actuation.bags.recover import RECOVERY_RECORD
@@ -63,7 +64,8 @@ class TopicInfo:
     stamp intervals from their median) are None with fewer than three messages.
     ``published`` is None where no node reports it. ``lost`` is the larger of
     what the recorder missed by sequence numbers and what published counts say,
-    None where neither is known.
+    None where neither is known. ``sent_before`` is what nodes published before the bag of a
+    logger of one's own begins, None for bags of this package.
     """
 
     name: str
@@ -79,6 +81,7 @@ class TopicInfo:
     lost: int | None = None
     dropped: int | None = None
     missed_at_start: int | None = None
+    sent_before: int | None = None
     ranges: dict[str, tuple[float, float]] = field(default_factory=dict)
 
 
@@ -138,10 +141,12 @@ class BagInfo:
         """Return whether all published messages are in the bag, None if unknown."""
         if self.missing or self.ending.early:
             return False
-        # Diagnostics come from every node there is, also from those not of the rig.
+        # Diagnostics come from every node there is, also from those not of the rig. Before the
+        # first report in a bag of another logger nothing can be checked.
         rig = [
             topic for topic in self.topics if short_name(topic.name) in OF_A_RUN]
-        return True if rig and all(topic.lost is not None for topic in rig) else None
+        return True if rig and all(
+            topic.lost is not None and not topic.sent_before for topic in rig) else None
 
     @property
     def has_findings(self) -> bool:
@@ -183,7 +188,9 @@ def bag_info(path: StrPath, recover: bool = False) -> BagInfo:
     """
     bag = read_bag(path, recover=recover)
     recording = bag.records.get(RECORDING_RECORD, {})
-    published = _published(bag)
+    published = reported_counts(bag)
+    # Of any other bag nobody knows that it began with the nodes.
+    simulated = bool(bag.experiment) and bag.experiment.get('origin') != 'live'
     remarks = list(bag.remarks)
     if recording.get('write_error'):
         remarks.append(f'The recorder could not go on: {recording["write_error"]}.')
@@ -197,8 +204,10 @@ def bag_info(path: StrPath, recover: bool = False) -> BagInfo:
     for name in sorted(bag.topics):
         topic = bag.topics[name]
         info, stamp_ns, values = _topic_info(topic, remarks)
-        _add_counts(info, topic, recording, *published.of(name))
-        remarks += _loss_remarks(info)
+        add_counts(info, topic, recording, published)
+        if not recording and not simulated:
+            count_from_first_report(info, topic, published)
+        remarks += loss_remarks(info)
         remarks += plausibility.topic_remarks(
             topic, info, stamp_ns, values, length_m)
         topics.append(info)
@@ -212,6 +221,10 @@ def bag_info(path: StrPath, recover: bool = False) -> BagInfo:
     if bag.experiment.get('controller_other_rig'):
         notes.append(f'The controller was {bag.experiment["controller_other_rig"]}; '
                      'this was accepted.')
+    before = sum(topic.sent_before or 0 for topic in topics)
+    if before:
+        notes.append(f'{before} messages were published before this bag begins; losses are '
+                     'counted from the first report of each node in it.')
     start_ns, end_ns = _span(bag)
     return BagInfo(
         path=str(path), storage=bag.storage, size_bytes=_size(Path(path)), start_ns=start_ns,
@@ -283,45 +296,3 @@ def _has_header(topic: TopicData) -> bool:
     return bool(
         topic.encoding == 'cdr' and fields and fields[1]
         and fields[1][0][1][1] == 'std_msgs/msg/Header')
-
-
-def _published(bag: Bag) -> PublishedCounts:
-    """Return the PublishedCounts of a bag's diagnostics."""
-    published = PublishedCounts()
-    topic = bag.topics.get('/diagnostics')
-    if topic is not None and is_rig_topic(topic):
-        for raw, sent_ns in zip(topic.payloads, topic.publish_time_ns.tolist()):
-            published.hear(raw, sent_ns)
-    return published
-
-
-def _add_counts(info: TopicInfo, topic: TopicData, recording: Mapping[str, str],
-                published: int | None, sent_ns: int) -> None:
-    def recorded(key: str) -> int | None:
-        return count_of(recording.get(f'{topic.name}.{key}', ''))
-
-    info.dropped = recorded('dropped')
-    info.missed_at_start = recorded('missed_at_start')
-    info.published = published
-    by_then = info.count
-    # Not every bag knows send times.
-    if topic.name != '/diagnostics' and (topic.publish_time_ns != topic.log_time_ns).any():
-        by_then = int((topic.publish_time_ns <= sent_ns).sum())
-    info.lost = missing_messages(
-        recorded('lost'), published, by_then, (info.dropped or 0) + (info.missed_at_start or 0))
-
-
-def _loss_remarks(info: TopicInfo) -> list[str]:
-    remarks = []
-    if info.lost:
-        of = '' if info.published is None else f' of {info.published} published'
-        remarks.append(f'{info.name}: {info.lost} messages{of} never arrived.')
-    if info.dropped:
-        remarks.append(
-            f'{info.name}: {info.dropped} messages arrived but the recorder could not write '
-            'them.')
-    if info.missed_at_start:
-        remarks.append(
-            f'{info.name}: {info.missed_at_start} messages were sent before the recorder was '
-            'connected.')
-    return remarks

@@ -17,10 +17,12 @@ How many messages are missing, counted in one way by the recorder and by ``pam i
 
 Every node says in /diagnostics how many messages it has published, as
 ``published.<full topic>``. What a node had published by its last report must be in the
-bag from before that report; so a node that died early is checked too.
+bag from before that report; so a node that died early is checked too. A logger of one's own may
+begin long after the nodes: then the first report of a node in the bag is what counts are from.
 """
 
 from array import array
+from collections.abc import Mapping
 
 from pam_actuation.topics.codec import decode
 from pam_sim.errors import InputError
@@ -63,9 +65,19 @@ class PublishedCounts:
     What the nodes last reported, by full topic.
 
     Reports of several nodes on one topic add up; the latest report's time counts.
+
+    Parameters
+    ----------
+    begins_ns : mapping of str to int, optional
+        Send time [ns] of the first message of each topic in a bag, by full name, for
+        ``first_of``.
+
     """
 
-    def __init__(self) -> None:
+    def __init__(self, begins_ns: Mapping[str, int] | None = None) -> None:
+        self._begins_ns = begins_ns or {}
+        # As _last, of the first report since the topic begins.
+        self._baseline: dict[str, dict[str, tuple[int, int]]] = {}
         # Topic -> status name -> (number, send time).
         self._last: dict[str, dict[str, tuple[int, int]]] = {}
         # Status name -> number of its first report on /diagnostics.
@@ -88,6 +100,9 @@ class PublishedCounts:
                 if key.startswith(PUBLISHED) and number is not None:
                     topics.add(topic := key[len(PUBLISHED):])
                     self._last.setdefault(topic, {})[status.name] = (number, sent_ns)
+                    if sent_ns >= self._begins_ns.get(topic, sent_ns + 1):
+                        self._baseline.setdefault(topic, {}).setdefault(
+                            status.name, (number, sent_ns))
                     if topic == DIAGNOSTICS:
                         self._first.setdefault(status.name, number)
         return topics
@@ -108,6 +123,21 @@ class PublishedCounts:
         if not last:
             return None, 0
         return sum(number for number, _ in last.values()), max(sent for _, sent in last.values())
+
+    def first_of(self, topic: str) -> tuple[int, int] | None:
+        """
+        Return (published, send time) of the first report since a topic begins in the bag.
+
+        Numbers of several nodes add up; the earliest of their times counts. None where nobody
+        reported since.
+        """
+        baseline = self._baseline.get(topic)
+        if not baseline:
+            return None
+        # Of a node that ended before, nothing is published since.
+        numbers = {**self._last[topic], **baseline}
+        return (sum(number for number, _ in numbers.values()),
+                min(sent for _, sent in baseline.values()))
 
 
 class SentTimes:

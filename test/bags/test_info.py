@@ -184,6 +184,49 @@ def test_reports_before_the_recorder_are_told_from_lost_ones(tmp_path):
         assert (counts.lost, counts.missed_at_start) == (1, 3)
 
 
+@pytest.mark.parametrize('metadata', [{}, {**METADATA, 'origin': 'live'}])
+@pytest.mark.parametrize('lost', [(), (150, 151, 299)])
+def test_a_logger_that_began_after_the_nodes_has_lost_what_is_missing_since(
+        tmp_path, metadata, lost):
+    def change(short, i, message):
+        return None if i < 100 or short == 'valve_signal' and i in lost else message
+
+    info = bag_info(write_bag(tmp_path / 'run', 300, metadata=metadata, change=change))
+    signal = info.topic('/muscle/valve_signal')
+    assert (signal.published, signal.sent_before, signal.lost) == (300, 100, len(lost))
+    assert info.has_findings == bool(lost) and info.missed_at_start == 0
+    assert said(info, '3 messages of 300 published never arrived') == bool(lost)
+    assert info.complete is (False if lost else None)
+    assert any('100 messages were published before this bag' in note for note in info.notes)
+    assert json.loads(json.dumps(info.to_dict()))['topics'][-1]['sent_before'] == 100
+
+
+def test_a_logger_is_not_blamed_for_late_nodes_and_unknown_send_times(tmp_path):
+    # Two nodes publish on one topic, the second from the middle on. Receive times scatter.
+    random, name = np.random.default_rng(4), full_name('valve_signal')
+    with BagWriter(tmp_path / 'run', {}) as writer:
+        for short in ('valve_signal', 'diagnostics'):
+            writer.add_topic(full_name(short), RECORDED[short].type_name)
+        arrivals, late = [], int(30e6)
+        for i in range(50, 200):
+            now_ns = START_NS + i * STEP_NS
+            for node, since in (('driver', 0), ('watchdog', 120)):
+                if i >= since:
+                    arrivals.append((now_ns + int(random.integers(late)), 'valve_signal',
+                                     example_messages(i)['valve_signal']))
+                if i >= since and i % 20 == 5:
+                    values = ((f'published.{name}', str(i + 1 - since)),
+                              (f'published.{full_name("diagnostics")}', str(i // 20 + 1)))
+                    arrivals.append((now_ns + int(random.integers(late)), 'diagnostics', [
+                        messages.Status(now_ns, 0, f'/muscle/{node}', 'ok', values)]))
+        for received_ns, short, message in sorted(arrivals, key=lambda one: one[0]):
+            writer.write(full_name(short), codec.encode(short, message), received_ns, received_ns)
+    info = bag_info(tmp_path / 'run')
+    assert info.lost == 0 and not info.topic(name).missed_at_start
+    assert 40 <= info.topic(name).sent_before <= 90
+    assert not said(info, 'never arrived')
+
+
 @pytest.mark.parametrize('short, message, words', [
     ('pressure', messages.Pressure(0, 2.5e5 - 101325.0 - 1.2e5), ('mostly below', 'gauge')),
     ('contraction', messages.Contraction(0, 0.09, 0.0), ('leaves 0 to 75 mm',)),
