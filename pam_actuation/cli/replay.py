@@ -31,6 +31,10 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument('bag', type=source, help='bag directory, or a lone .mcap file')
     parser.add_argument(
         '--namespace', default=None, help='namespace of the muscle or joint in the bag')
+    parser.add_argument(
+        '--model', type=source, default=None, metavar='NAME|FILE',
+        help='model YAML or preset of the rig or joint that was recorded (default: the one that '
+        'the bag names)')
     what = parser.add_mutually_exclusive_group()
     what.add_argument(
         '--only', choices=('controller', 'driver', 'plant'), default=None,
@@ -56,13 +60,16 @@ def run(args: argparse.Namespace) -> int:
     from pam_actuation.bags.load_joint import load_recording
     from pam_actuation.replay.compare import replay_run
     from pam_actuation.replay.joint import is_joint, replay_joint
+    from pam_actuation.replay.model import model_of, with_model
     from pam_actuation.replay.settings import changed_controller
     check_outputs(args, args.out)
     recorded = load_recording(args.bag, args.namespace, args.recover)
     note_implausible(args, [recorded])
     replayed = replay_joint if is_joint(recorded) else replay_run
-    result = replayed(recorded, changed_controller(
-        recorded, args.changes, args.accept_other_rig), args.only, args.chain)
+    model = model_of(recorded, args.model) if args.model else None
+    changed = changed_controller(
+        with_model(recorded, model), args.changes, args.accept_other_rig)
+    result = replayed(recorded, changed, args.only, args.chain, model)
     if args.out:
         result.save(args.out)
     emit(args, result.to_dict(), result.text())

@@ -92,6 +92,7 @@ def run(args: argparse.Namespace) -> int | None:
     """Tune; exit code 1 where the held-out check did not improve or the model is wrong."""
     from pam_actuation.bags.load_joint import load_recording
     from pam_actuation.experiments.limits import unknown_remarks
+    from pam_actuation.replay.model import check_kind
     from pam_actuation.report.tuning_page import tuning_report
     from pam_actuation.tuning.own_range import with_own_range
     from pam_actuation.tuning.random_rigs import random_rigs
@@ -103,7 +104,7 @@ def run(args: argparse.Namespace) -> int | None:
     runs = [load_recording(bag) for bag in args.bag]
     note_implausible(args, runs, must_be_right=True)
     rig = load_rig_or_joint(_rig_source(args, runs), args.valve)
-    _check_kind(runs, rig)
+    check_kind(runs, rig)
     controller = _controller(args, runs, rig)
     experiments, check = _experiments(args, runs, rig)
     controller, ranges = with_own_range(controller, rig, [*experiments, *check])
@@ -178,21 +179,6 @@ def _rig_source(args: argparse.Namespace, runs: 'list[RecordedRun]') -> str:
         raise InputError(
             'no model to tune on: give a bag that was recorded here, or --model', '--model')
     return source
-
-
-def _check_kind(runs: 'list[RecordedRun]', rig: 'Rig | JointRig') -> None:
-    """Raise InputError for a bag of a muscle where a joint is tuned, or the other way round."""
-    from pam_actuation.replay.joint import is_joint
-    from pam_sim.errors import InputError
-    wanted = '' not in rig.muscles
-    for run in runs:
-        if is_joint(run) == wanted:
-            continue
-        if wanted:
-            raise InputError(f'has no joint_state; it is no recording of a joint such as '
-                             f'{rig.name}', str(run.path))
-        raise InputError(f'is the recording of a joint; {rig.name} is a single muscle',
-                         str(run.path))
 
 
 def _preset(args: argparse.Namespace, rig: 'Rig | JointRig') -> str:

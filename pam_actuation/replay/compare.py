@@ -27,6 +27,7 @@ from pam_actuation.replay.chain import ChainReplay, replay_chain
 from pam_actuation.replay.controller import replay_controller, ReplayResult
 from pam_actuation.replay.difference import Difference, difference
 from pam_actuation.replay.driver import DriverReplay, replay_driver
+from pam_actuation.replay.model import GIVE_MODEL, other_model, with_model
 from pam_actuation.replay.plant import PlantReplay, replay_plant
 from pam_actuation.replay.settings import preview_remark
 from pam_sim.errors import InputError
@@ -35,6 +36,8 @@ from pam_sim.files import whole_file
 if TYPE_CHECKING:
     from pam_actuation.bags.load import RecordedRun
     from pam_actuation.control.config import Controller
+    from pam_sim.joint import JointRig
+    from pam_sim.rig import Rig
 
 PARTS = ('controller', 'driver', 'plant')
 
@@ -148,7 +151,8 @@ def _of_commands(found: ReplayResult, start_ns: int) -> Difference:
 
 
 def replay_run(run: 'RecordedRun', controller: 'Controller | str | os.PathLike[str] | None' = None,
-               only: str | None = None, chain: bool = False) -> Replay:
+               only: str | None = None, chain: bool = False,
+               model: 'Rig | JointRig | None' = None) -> Replay:
     """
     Step the parts of the rig offline on the recorded inputs.
 
@@ -162,6 +166,8 @@ def replay_run(run: 'RecordedRun', controller: 'Controller | str | os.PathLike[s
         Replay this part alone; by default each of the three by itself.
     chain : bool
         Close the loop instead: controller, driver and plant from the recorded reference.
+    model : Rig, optional
+        Take the recording as one of this rig (``model_of``); by default the one it names.
 
     Returns
     -------
@@ -175,8 +181,12 @@ def replay_run(run: 'RecordedRun', controller: 'Controller | str | os.PathLike[s
     """
     preview = () if chain else preview_remark(run, controller)
     result = Replay(counterfactual=controller is not None, start_ns=run.start_ns,
-                    remarks=(*early_sentences([run]), *preview))
+                    remarks=(*early_sentences([run]), *other_model(run, model), *preview))
+    run = with_model(run, model)
     if chain:
+        if not run.metadata.get('rig'):
+            raise InputError(f'the recording does not say which rig it is; {GIVE_MODEL}',
+                             str(run.path))
         result.chain = replay_chain(run, controller)
         return result
     wanted = PARTS if only is None else (only,)
@@ -209,7 +219,7 @@ def _why_not(run: 'RecordedRun', name: str,
         if 'valve_signal' not in run or not os.path.exists(run.path):
             return 'the run has no valve_signal or is not from a bag'
     elif not run.metadata.get('rig'):
-        return 'the bag does not say which rig it is'
+        return f'the bag does not say which rig it is; {GIVE_MODEL}'
     elif 'valve_signal' not in run and not ('pressure' in run and 'contraction' in run):
         return 'the bag has neither a valve_signal nor pressure and contraction'
     return ''

@@ -35,6 +35,7 @@ from pam_actuation.loops.wiring import attach
 from pam_actuation.messages import ValveSignal
 from pam_actuation.replay.arrivals import recorded_topics
 from pam_actuation.replay.difference import Difference, difference
+from pam_actuation.replay.model import GIVE_MODEL
 from pam_sim import load_rig
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.errors import InputError
@@ -154,4 +155,5 @@ def _driver(run: Run, signals: Series) -> tuple[DriverLoop, str]:
     valve = 'ppr' if 'ppr_voltage' in signals.values else 'hsv'
     if not set(signals.values) & set(UNITS):
         raise InputError('valve_signal has none of the known signals', str(run.path))
-    return DriverLoop(valve, changes), 'the bag does not say which rig it is: default settings'
+    return DriverLoop(valve, changes), (
+        f'the bag does not say which rig it is, so with default settings; {GIVE_MODEL}')

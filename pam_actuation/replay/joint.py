@@ -37,10 +37,12 @@ from pam_actuation.drivers.recorded import as_recorded
 from pam_actuation.replay.arrivals import recorded_topics_of_joint
 from pam_actuation.replay.chain import ChainReplay, recorded_seed, RepeatedLoops, replay_chain
 from pam_actuation.replay.joint_controller import replay_joint_controller, states_suffice
+from pam_actuation.replay.model import GIVE_MODEL, other_model, with_model
 from pam_actuation.replay.settings import preview_remark
 from pam_sim.errors import InputError
 from pam_sim.files import whole_file
 from pam_sim.joint import JointRig, load_joint
+from pam_sim.rig import Rig
 from pam_sim.run import Run
 
 if TYPE_CHECKING:
@@ -133,7 +135,8 @@ def is_joint(run: Run) -> bool:
 
 
 def replay_joint(run: Run, controller: 'Controller | str | os.PathLike[str] | None' = None,
-                 only: str | None = None, chain: bool = False) -> JointReplay:
+                 only: str | None = None, chain: bool = False,
+                 model: Rig | JointRig | None = None) -> JointReplay:
     """
     Step the parts of a joint offline on the recorded inputs.
 
@@ -147,6 +150,8 @@ def replay_joint(run: Run, controller: 'Controller | str | os.PathLike[str] | No
         Replay this part alone; by default each of the three by itself.
     chain : bool
         Close the loop instead: all parts from the recorded reference.
+    model : JointRig, optional
+        Take the recording as one of this joint (``model_of``); by default the one it names.
 
     Raises
     ------
@@ -155,10 +160,12 @@ def replay_joint(run: Run, controller: 'Controller | str | os.PathLike[str] | No
 
     """
     path = str(run.path)
+    remarks = (*early_sentences([run]), *other_model(run, model))
+    as_it_ran = not other_model(run, model)     # another joint asks for other commands
+    run = with_model(run, model)
     if not run.metadata.get('rig'):
-        raise InputError('the recording does not say which joint it is', path)
+        raise InputError(f'the recording does not say which joint it is; {GIVE_MODEL}', path)
     joint = load_joint(run.metadata['rig'])
-    remarks = tuple(early_sentences([run]))
     if chain:
         return JointReplay({'chain': replay_chain(run, controller)},
                            counterfactual=controller is not None, remarks=remarks)
@@ -187,7 +194,8 @@ def replay_joint(run: Run, controller: 'Controller | str | os.PathLike[str] | No
         raise InputError('nothing to replay: ' + '; '.join(notes.values()), path)
     return JointReplay(
         parts, {} if controller is not None else internals, controller is not None,
-        states_suffice(run) or run.metadata.get('origin') != 'live', notes, remarks)
+        as_it_ran and (states_suffice(run) or run.metadata.get('origin') != 'live'), notes,
+        remarks)
 
 
 def _law(run: Run, joint: JointRig, controller: 'Controller | str | os.PathLike[str] | None'

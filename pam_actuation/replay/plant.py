@@ -24,6 +24,7 @@ from typing import Any, TYPE_CHECKING
 
 import numpy as np
 from pam_actuation.replay.difference import Difference, difference
+from pam_actuation.replay.model import GIVE_MODEL
 from pam_sim import load_rig
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.errors import InputError
@@ -106,7 +107,8 @@ def replay_plant(run: 'Run') -> PlantReplay:
     """
     text = run.metadata.get('rig')
     if not text:
-        raise InputError('the recording does not say which rig it is', str(run.path))
+        raise InputError(f'the recording does not say which rig it is; {GIVE_MODEL}',
+                         str(run.path))
     rig = load_rig(text)
     given = run
     (run,), _ = commanded([given], rig)

@@ -22,7 +22,7 @@ not how well.
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
@@ -34,6 +34,7 @@ from pam_actuation.replay.controller import replay_controller
 from pam_actuation.replay.joint import replay_joint
 from pam_actuation.replay.joint_controller import (
     COMMANDS, replay_joint_controller, states_suffice)
+from pam_actuation.replay.model import GIVE_MODEL, with_model
 from pam_actuation.replay.plant import replay_plant
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.errors import InputError
@@ -170,7 +171,7 @@ def check_recordings(runs: 'Sequence[RecordedRun | Run]', rig: 'Rig | JointRig',
         except InputError as error:
             notes.append(f'No model check: {error.problem}.')
         try:
-            tuned = counterfactual_of_joint(run, controller) if isinstance(
+            tuned = counterfactual_of_joint(run, controller, rig) if isinstance(
                 controller, JointController) else counterfactual(run, controller)
         except InputError as error:
             notes.append(f'No counterfactual check: {error.problem}.')
@@ -188,7 +189,7 @@ def check_model(run: 'Run', rig: 'Rig | JointRig') -> ModelCheck:
         The recording cannot be simulated with this rig (other valve, signals missing).
 
     """
-    modelled = replace(run, metadata={**run.metadata, 'rig': rig.to_yaml()})
+    modelled = with_model(run, rig)
     differences: list[Difference]
     valve_judged = True
     if isinstance(rig, JointRig):
@@ -243,9 +244,12 @@ def counterfactual(run: 'Run', controller: 'CompiledController') -> Counterfactu
     return _compared(run, again.states, again.stamp_ns, again.recorded_pa, again.replayed_pa)
 
 
-def counterfactual_of_joint(run: 'Run', controller: JointController) -> Counterfactual:
+def counterfactual_of_joint(run: 'Run', controller: JointController,
+                            model: 'Rig | JointRig | None' = None) -> Counterfactual:
     """
     Step the controller of a joint over the inputs of a recording, its rules frozen.
+
+    A recording that names no joint counts as one of ``model``.
 
     Raises
     ------
@@ -258,9 +262,11 @@ def counterfactual_of_joint(run: 'Run', controller: JointController) -> Counterf
     if not states_suffice(run):
         raise InputError('its controller_state does not hold all inputs of a tick',
                          str(run.path))
-    if not run.metadata.get('rig'):
-        raise InputError('the recording does not say which joint it is', str(run.path))
-    joint = load_joint(run.metadata['rig'])
+    own = run.metadata.get('rig')
+    joint = load_joint(own) if own else model
+    if not isinstance(joint, JointRig):
+        raise InputError(f'the recording does not say which joint it is; {GIVE_MODEL}',
+                         str(run.path))
     fresh = load_controller(controller.to_yaml(), joint, accept_other_rig=True)
     assert isinstance(fresh, JointController)
     fresh.freeze_learning = True

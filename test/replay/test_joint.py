@@ -33,6 +33,7 @@ from pam_actuation.messages import (
     AngleReference, AngleTrajectory, ControllerState, NamedEfforts, Pressure)
 from pam_actuation.replay.joint import is_joint, PARTS, replay_joint
 from pam_actuation.replay.joint_controller import COMMANDS
+from pam_actuation.replay.model import model_of
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.joint import load_joint
@@ -145,10 +146,26 @@ def test_a_changed_recording_is_noticed(run):
         values={name: column[1:] for name, column in states.values.items()})})
     with pytest.raises(InputError, match='begins with controller tick 1, not 0'):
         replay_joint(cut)
-    with pytest.raises(InputError, match='which joint'):
+    with pytest.raises(InputError, match='which joint it is; name its model with pam replay --mo'):
         replay_joint(replace(run, metadata={}))
     with pytest.raises(InputError, match='no recorded controller'):
         replay_joint(replace(run, metadata={'rig': run.metadata['rig']}), only='controller')
+
+
+def test_a_bag_that_does_not_say_its_joint_is_replayed_with_a_model(run):
+    bare = replace(run, metadata={'seed': run.metadata['seed']})    # that of the sensor noise
+    joint = model_of(bare, 'joint_dmsp_5_300_realistic')
+    plant = replay_joint(bare, only='plant', model=joint).parts['plant']
+    assert plant.identical and joint.valve == load_joint(run.metadata['rig']).valve
+    with pytest.raises(InputError, match='recording of a joint; .* is a single muscle'):
+        model_of(bare, 'dmsp_5_300_hanging_mass')
+    muscle = Run({'pressure': run.topics['flexor/pressure'],
+                  'valve_signal': run.topics['flexor/valve_signal']}, {}, '/knee/flexor', 'x')
+    assert model_of(muscle, 'joint_dmsp_5_300_realistic').to_yaml() == joint.flexor.to_yaml()
+    # The recorded controller may command otherwise with another joint: that is no finding.
+    other = replace(joint, name='other')
+    found = replay_joint(run, only='controller', model=other)
+    assert not found.exact and 'replayed as other' in found.remarks[0]
 
 
 def test_torques_faults_and_co_contraction_are_reproduced_from_the_states_alone():

@@ -14,6 +14,7 @@
 
 """Driver and chain on pinned bags: to the bit, twice the same bytes, and honest where not."""
 
+from dataclasses import replace
 import json
 import shutil
 
@@ -30,6 +31,7 @@ from pam_actuation.replay.chain import replay_chain
 from pam_actuation.replay.compare import replay_run
 from pam_actuation.replay.difference import difference
 from pam_actuation.replay.driver import replay_driver
+from pam_actuation.replay.model import model_of
 from pam_actuation.replay.plant import replay_plant
 from pam_actuation.replay.settings import changed_controller
 from pam_sim import load_rig
@@ -202,7 +204,9 @@ def test_what_cannot_be_replayed_is_said_in_a_sentence(runs):
     assert 'default settings' in replay_driver(bare).note
     with pytest.raises(InputError, match='which rig'):
         replay_chain(bare)
-    with pytest.raises(InputError, match='nothing to replay'):
+    with pytest.raises(InputError, match='which rig it is; name its model with pam replay --mo'):
+        replay_run(bare, chain=True)
+    with pytest.raises(InputError, match='nothing to replay: .* pam replay --model'):
         replay_run(bare, only='plant')
     with pytest.raises(InputError, match='changes nothing'):
         replay_run(run, controller=object(), only='driver')
@@ -214,6 +218,39 @@ def test_what_cannot_be_replayed_is_said_in_a_sentence(runs):
                  for name, s in run.topics.items()}, run.metadata, run.namespace, run.path)
     with pytest.raises(InputError, match='in common'):
         replay_plant(brief)
+
+
+def test_a_bag_that_does_not_say_its_rig_is_replayed_with_a_model(
+        runs, tmp_path, monkeypatch, capsys):
+    run = runs['sofc_hsv']
+    bare = replace(run, metadata={})
+    assert not replay_run(bare, only='driver').driver.identical
+    model = tmp_path / 'my_rig.yaml'
+    model.write_text(run.metadata['rig'])
+    monkeypatch.setattr('pam_actuation.bags.load_joint.load_recording', lambda *_: bare)
+    assert main(['replay', 'bag', '--model', str(model)]) == 0
+    printed = capsys.readouterr().out
+    assert printed.count('identical to the bit') == 2 and 'default settings' not in printed
+    assert f'plant: {load_rig(run.metadata["rig"]).name}, free run' in printed
+    assert 'remark' not in printed
+    # A preset takes the recorded valve, a file keeps its own.
+    preset = model_of(bare, 'dmsp_5_300_hanging_mass')
+    assert preset.valve == 'hsv'
+    model.write_text(load_rig('dmsp_5_300_hanging_mass', valve='ppr').to_yaml())
+    assert main(['replay', 'bag', '--model', str(model)]) == 2
+    assert 'valve signal is of hsv valves' in capsys.readouterr().err
+    assert main(['replay', 'bag', '--model', 'joint_dmsp_5_300_realistic']) == 2
+    assert 'has no joint_state' in capsys.readouterr().err
+
+
+def test_another_model_than_the_recorded_one_is_told(runs):
+    run = runs['sofc_ppr']
+    own = replay_run(run, only='plant', model=load_rig(run.metadata['rig']))
+    assert not own.remarks and own.plant.lines() == replay_run(run, only='plant').plant.lines()
+    other = replay_run(run, only='plant', model=model_of(run, 'dmsp_5_300_hanging_mass'))
+    assert other.plant.rig == 'dmsp_5_300_hanging_mass'
+    assert other.remarks[0].startswith(
+        'replayed as dmsp_5_300_hanging_mass; the bag itself names dmsp_5_300_realistic')
 
 
 def test_a_folder_that_does_not_exist_is_refused(runs, tmp_path):

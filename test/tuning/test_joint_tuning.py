@@ -14,6 +14,7 @@
 
 """``pam tune`` of a joint: from its bag or a model to a controller that runs on it."""
 
+from dataclasses import replace
 import json
 
 import numpy as np
@@ -28,7 +29,7 @@ from pam_actuation.tuning.joint_loop import JointLoop
 from pam_actuation.tuning.loops_of_rigs import reachable
 from pam_actuation.tuning.problem import Problem, rebuild
 from pam_actuation.tuning.random_rigs import LIMB_FACTOR, random_rigs
-from pam_actuation.tuning.recording import check_recordings
+from pam_actuation.tuning.recording import check_recordings, counterfactual_of_joint
 from pam_actuation.tuning.space import default_axes
 from pam_sim.joint import load_joint
 import pytest
@@ -120,6 +121,10 @@ def test_the_own_model_is_trusted_and_the_own_controller_agrees(bag, joint):
     found, = check_recordings([run], joint, controller)
     assert found.model.verdict == 'trusted' and found.notes == ()
     assert found.counterfactual.rms_pa == 0.0 and found.counterfactual.ticks > 700
+    # A bag that names no joint counts as one of the model.
+    unnamed = {name: text for name, text in run.metadata.items() if name != 'rig'}
+    found = counterfactual_of_joint(replace(run, metadata=unnamed), controller, joint)
+    assert found.rms_pa == 0.0 and found.ticks > 700
     heavy = joint.with_(parameters={'limb_mass_kg': 1.5, 'inertia_kg_m2': 0.03})
     found, = check_recordings([run], heavy, controller)
     assert found.model.verdict != 'trusted' and '°' in found.model.sentence()
