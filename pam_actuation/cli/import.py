@@ -140,6 +140,10 @@ def _understood(args: argparse.Namespace) -> 'tuple[list[Table], Guess]':
         args.maps, args.rate)
     # A mapping file says everything; otherwise all columns are looked at.
     wanted = [one.column for one in mapping.signals.values()] if args.mapping else None
+    as_it_is = _as_it_is(args)
+    if as_it_is and not args.preview:
+        raise InputError(f'{as_it_is}. To import it all the same, say with --map which columns '
+                         'are signals', args.files[0])
     tables = []
     with progress(args, float(len(args.files)), '', 'reading') as bar:
         for done, file in enumerate(args.files):
@@ -157,6 +161,14 @@ def _understood(args: argparse.Namespace) -> 'tuple[list[Table], Guess]':
             'no column is known by its name; --preview shows columns and ranges. Then say which '
             f'are signals, such as {how_to_begin(tables, found)}', args.files[0])
     return tables, found
+
+
+def _as_it_is(args: argparse.Namespace) -> str:
+    """Return a sentence where nothing is said of the columns and no import is needed, else ''."""
+    from pam_actuation.tables.own_bag import needs_no_import
+    if len(args.files) > 1 or args.maps or args.mapping or args.leave_out:
+        return ''
+    return needs_no_import(args.files[0])
 
 
 def _move(bar: Any, done: int, share: float) -> None:
@@ -177,7 +189,9 @@ def _asked(question: 'Question') -> str | None:
 def _show(args: argparse.Namespace, tables: 'list[Table]', found: 'Guess') -> int:
     from pam_actuation.tables.preview import (
         how_to_begin, may_be_signals, preview, questions_text, time_problems)
-    lines = [preview(tables, found, args.missing)]
+    as_it_is = _as_it_is(args)
+    lines = [f'{args.files[0]}: {as_it_is}', ''] if as_it_is else []
+    lines.append(preview(tables, found, args.missing))
     problems = time_problems(tables, found, args.sort)
     if problems:
         lines += ['', 'the time is not read yet:', *(f'    {one}' for one in problems)]
@@ -195,7 +209,8 @@ def _show(args: argparse.Namespace, tables: 'list[Table]', found: 'Guess') -> in
         'files': args.files, 'mapping': found.mapping.to_yaml(), 'time': problems,
         'questions': [{'signal': one.signal, 'column': one.column, 'text': one.text,
                        'answers': list(one.answers)} for one in found.questions],
-        'columns': [list(table.columns) for table in tables]}, '\n'.join(lines))
+        'columns': [list(table.columns) for table in tables], 'as_it_is': as_it_is},
+        '\n'.join(lines))
     return EXIT_DONE
 
 

@@ -23,11 +23,12 @@ from pam_actuation.tables.day_and_time import pair_of
 from pam_actuation.tables.guess import falls_below_atmosphere, Guess, unit_of_column
 from pam_actuation.tables.lengths import length_column
 from pam_actuation.tables.mapping import usual_unit
-from pam_actuation.tables.parts import likely_signals
+from pam_actuation.tables.parts import likely_signals, name_of_parts
 from pam_actuation.tables.signals import are_of_joint, BY_NAME
 from pam_actuation.tables.table import Table
 from pam_actuation.tables.units import ABSOLUTE, DATE, GAUGE, unit_of_text, VOLTAGE
 from pam_actuation.tables.words import words_of
+from pam_actuation.topics.table import OF_A_RUN, short_name
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 
@@ -99,10 +100,12 @@ def how_to_begin(tables: Collection[Table], found: Guess) -> str:
     Return the words of the command line that begin a mapping, with columns of the file.
 
     A column goes with a signal only where its unit, if the file states one, is one of the signal.
+    The name of a topic counts before names of its fields, and these before units.
     """
-    left = {column: table for table in tables for column in unread([table], found)}
+    left = {column: table for table in tables if not _is_of_internals(table)
+            for column in unread([table], found) if not _is_constant(table, column)}
     said: dict[str, str] = {}
-    for fits in (_is_likely, _is_called, _has_the_unit, _has_no_unit):
+    for fits in (_has_the_topic, _is_likely, _is_called, _has_the_unit, _has_no_unit):
         for signal in ('pressure', 'contraction', 'force', 'ppr_voltage'):
             column = next((one for one, table in left.items() if signal not in said
                            and fits(table, one, signal)), None)
@@ -128,6 +131,11 @@ def _likely(table: Table, column: str) -> list[str]:
 
 # Each of these returns whether a column may be a signal, the surest first.
 
+def _has_the_topic(table: Table, column: str, signal: str) -> bool:
+    return (bool(table.topic) and _has_the_unit(table, column, signal)
+            and signal == name_of_parts(words_of(short_name(table.topic))))
+
+
 def _is_likely(table: Table, column: str, signal: str) -> bool:
     return signal in _likely(table, column)
 
@@ -146,6 +154,17 @@ def _has_the_unit(table: Table, column: str, signal: str) -> bool:
 
 def _has_no_unit(table: Table, column: str, signal: str) -> bool:
     return signal in _EXAMPLES and unit_of_column(table, column) in ('', 'mA')
+
+
+def _is_constant(table: Table, column: str) -> bool:
+    finite = _finite(table, column)
+    return bool(finite.size and (finite == finite[0]).all())
+
+
+def _is_of_internals(table: Table) -> bool:
+    """Return whether a table is a topic of internals, such as the states of a controller."""
+    row = OF_A_RUN.get(short_name(table.topic))
+    return row is not None and row.internals
 
 
 def _option(table: Table, column: str, signal: str) -> str:

@@ -17,6 +17,7 @@
 import numpy as np
 from pam_actuation.bags.load import load_run
 from pam_actuation.cli.main import main
+from pam_actuation.tables.own_bag import needs_no_import
 from pam_sim.units import P_ATM_PA
 import pytest
 from rosbags.rosbag1 import Writer as Ros1Writer
@@ -154,6 +155,37 @@ def test_joints_that_change_places_are_told_by_their_names(tmp_path, capsys):
     contraction = load_run(out)['contraction']
     assert contraction.stamp_ns.tolist() == (START_NS + STEP_NS * np.arange(ROWS)).tolist()
     np.testing.assert_allclose(contraction['contraction_m'], 0.412 - LENGTH_M, atol=1e-9)
+
+
+def written_by_our_nodes(path, *namespaces):
+    """Write a bag of our topics with another recorder; return its path."""
+    with Writer(path, version=9) as writer:
+        for place in namespaces:
+            for topic, message in (
+                    ('pressure', made('sensor_msgs/msg/FluidPressure', header=header(START_NS),
+                                      fluid_pressure=2e5, variance=0.0)),
+                    ('contraction', joints(START_NS, ['muscle'], [0.01]))):
+                connection = writer.add_connection(
+                    f'{place}/{topic}', message.__msgtype__, typestore=STORE)
+                writer.write(connection, START_NS,
+                             STORE.serialize_cdr(message, message.__msgtype__))
+    return str(path)
+
+
+def test_a_bag_of_our_topics_needs_no_import(exo, tmp_path, capsys):
+    bag = written_by_our_nodes(tmp_path / 'own bag', '/muscle')
+    assert main(['import', bag, '--out', str(tmp_path / 'out')]) == 2
+    said = capsys.readouterr().err
+    assert 'holds the muscle /muscle in topics of this package' in said
+    assert f"can be read as it is: pam info '{bag}'. To import it" in said
+    assert not (tmp_path / 'out').exists()
+    stack = written_by_our_nodes(tmp_path / 'stack', '/thigh', '/shank')
+    assert main(['import', stack, '--preview']) == 0
+    assert 'holds the muscle /shank and the muscle /thigh in topics' in capsys.readouterr().out
+    # Who says what a column is wants an import; bags of others need one.
+    assert main(['import', stack, '--map', 'pressure=/thigh/no:Pa_abs']) == 2
+    assert 'as it is' not in capsys.readouterr().err
+    assert needs_no_import(exo) == '' and needs_no_import(tmp_path / 'a.csv') == ''
 
 
 def test_a_bag_of_ros_1(tmp_path, capsys):

@@ -287,6 +287,21 @@ def test_how_to_begin_with_names_that_nobody_knows():
         '--map contraction="V_dist_(mA):mm:zero=4:gain=6.25"')
 
 
+def test_how_to_begin_with_topics():
+    rising = pd.Series(np.arange(9.0))
+    tables = []
+    for topic, name, unit in (('controller_state', 'position[tick]', 'm'),
+                              ('followed_pressure', 'fluid_pressure', 'Pa'),
+                              ('pressure', 'variance', ''), ('pressure', 'fluid_pressure', 'Pa'),
+                              ('encoder', 'position[thigh]', 'm')):
+        column = f'/thigh/{topic}.{name}'
+        tables.append(Table('run', {column: rising if unit else 0.0 * rising},
+                            topic=f'/thigh/{topic}', units={column: unit} if unit else {}))
+    assert how_to_begin(tables, Guess(TableMapping())) == (
+        '--map pressure="/thigh/pressure.fluid_pressure:Pa_gauge" '
+        '--map contraction="/thigh/encoder.position[thigh]:m"')
+
+
 def of_pressure(gauge_pa):
     """Return the doubts on a pressure that a person gave as gauge."""
     mapped = column_of_text('pressure', 'p:kPa_gauge', '--map')
