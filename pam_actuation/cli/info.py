@@ -28,6 +28,9 @@ def add_arguments(parser: Parser) -> None:
     """Declare the options of the verb."""
     parser.add_argument('bag', type=source, help='bag directory, or a lone .mcap file')
     parser.add_argument(
+        '--namespace', default=None,
+        help='show only topics in this namespace, of a muscle, a joint or a robot')
+    parser.add_argument(
         '--recover', action='store_true',
         help='first repair a recording that broke off: rebuild the index of its files and '
              'metadata.yaml, so that every tool opens it; a whole bag stays as it is')
@@ -41,6 +44,9 @@ def run(args: argparse.Namespace) -> int:
         from pam_actuation.bags.recover import recover_bag
         recovery = recover_bag(args.bag)
     info = bag_info(args.bag, recover=args.recover)
+    if args.namespace is not None:
+        from pam_actuation.bags.in_namespace import in_namespace
+        info = in_namespace(info, args.namespace)
     payload, lines = info.to_dict(), []
     if recovery is not None:
         payload['recovery'] = recovery.to_dict()

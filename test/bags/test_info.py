@@ -18,10 +18,12 @@ import json
 
 import numpy as np
 from pam_actuation import messages
+from pam_actuation.bags.in_namespace import in_namespace
 from pam_actuation.bags.info import bag_info, render_text
 from pam_actuation.bags.metadata import experiment_metadata, UNITS
 from pam_actuation.bags.recorder import RecorderCore
 from pam_actuation.bags.writer import BagWriter
+from pam_actuation.cli.main import main
 from pam_actuation.topics import codec
 from pam_actuation.topics.table import RECORDED
 from pam_sim.errors import InputError
@@ -78,6 +80,34 @@ def test_gap_and_loss_against_published(tmp_path):
     assert said(info, '/muscle/valve_signal', '10 messages of 400 published never arrived')
     assert said(info, '/muscle/valve_signal', '1 gaps, the longest 55 ms')
     assert 'Incomplete: 10 messages lost' in render_text(info)
+
+
+def test_a_namespace_of_a_bag_is_told_alone(tmp_path, capsys):
+    with BagWriter(tmp_path / 'run', METADATA) as writer:
+        for name in ('/knee/flexor/pressure', '/knee/flexor/contraction', '/arm/pressure',
+                     '/armed/pressure', '/diagnostics'):
+            short = name.rpartition('/')[2]
+            writer.add_topic(name, RECORDED[short].type_name)
+            for i in (*range(50), *range(150, 200)):
+                now_ns = START_NS + i * STEP_NS
+                writer.write(
+                    name, codec.encode(short, example_messages(i)[short]), now_ns, now_ns)
+    bag = str(tmp_path / 'run')
+    whole = bag_info(bag)
+    assert said(whole, '/knee/flexor/pressure: 1 gaps') and said(whole, '/arm has no messages on')
+    assert main(['info', bag, '--namespace', 'knee', '--json']) == 1
+    knee = json.loads(capsys.readouterr().out)
+    assert [one['name'] for one in knee['topics']] == [
+        '/knee/flexor/contraction', '/knee/flexor/pressure']
+    assert knee['namespaces'] == ['/knee/flexor']
+    assert knee['remarks'] == [one for one in whole.remarks if one.startswith('/knee')]
+    assert knee['notes'][-1] == '2 of 5 topics are shown, those in /knee.'
+    assert main(['info', bag, '--namespace', '/arm/']) == 1
+    printed = capsys.readouterr().out
+    assert '/arm has no messages on contraction' in printed and '/armed' not in printed
+    assert in_namespace(whole, '/') == whole
+    assert main(['info', bag, '--namespace', '/ar']) == 2
+    assert 'namespace /ar; the bag has /arm, /armed, /knee/flexor' in capsys.readouterr().err
 
 
 def test_loss_of_a_node_that_died_before_its_last_report(tmp_path):
