@@ -15,16 +15,15 @@
 """Topics of a bag that have other names than those of this project."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
-from pam_actuation.topics.table import OF_A_RUN
+from pam_actuation.bags.source import Bag, read_bag, TopicData
+from pam_actuation.topics.table import BY_NAME, OF_A_RUN, short_name
 from pam_sim.errors import did_you_mean, InputError
-
-if TYPE_CHECKING:
-    from pam_actuation.bags.source import Bag, TopicData
+from pam_sim.files import StrPath
 
 # What a run can hold, by the names of this project.
 NAMES = tuple(OF_A_RUN)
+_MOST = 5                   # topics that are listed
 
 
 def checked(topics: Mapping[str, object] | None) -> dict[str, str]:
@@ -52,7 +51,7 @@ def checked(topics: Mapping[str, object] | None) -> dict[str, str]:
     return found
 
 
-def topics_by_name(bag: 'Bag', wanted: Mapping[str, str]) -> dict[str, 'TopicData']:
+def topics_by_name(bag: Bag, wanted: Mapping[str, str]) -> dict[str, TopicData]:
     """
     Return {own name: TopicData} of the topics that ``wanted`` names in a bag.
 
@@ -75,3 +74,34 @@ def topics_by_name(bag: 'Bag', wanted: Mapping[str, str]) -> dict[str, 'TopicDat
             raise InputError(f'{name} has no messages', bag.path)
         found[short] = topic
     return found
+
+
+def may_be(short: str, types: Mapping[str, str]) -> str:
+    """
+    Return which topics of a bag may be one of ours under another name, as a sentence, or ''.
+
+    Parameters
+    ----------
+    short : str
+        Our name of the topic that the bag lacks.
+    types : mapping of str to str
+        Message type of every topic of the bag, by full name.
+
+    """
+    others = sorted(name for name, type_name in types.items()
+                    if type_name == OF_A_RUN[short].type_name and short_name(name) not in BY_NAME)
+    if not others:
+        return ''
+    more = f' and {len(others) - _MOST} more' if len(others) > _MOST else ''
+    verb = 'has' if len(others) == 1 else 'have'
+    return (f'{short} may have another name in the bag: {", ".join(others[:_MOST])}{more} {verb} '
+            f"its type. In Python load_run(bag, topics={{'{short}': '{others[0]}'}}) reads it")
+
+
+def may_be_in(path: StrPath, short: str) -> str:
+    """Return the sentence of ``may_be`` for a bag on disk; '' where there is none to be read."""
+    try:
+        bag = read_bag(path, wanted=lambda *_: False)
+    except InputError:
+        return ''
+    return may_be(short, {name: topic.type_name for name, topic in bag.topics.items()})

@@ -16,12 +16,18 @@
 
 import argparse
 from pathlib import Path
+import re
+from typing import TYPE_CHECKING
 
 from pam_actuation.cli.common import emit, EXIT_DONE, EXIT_FINDING
 from pam_actuation.cli.options import Parser, source
 
+if TYPE_CHECKING:
+    from pam_actuation.bags.info import BagInfo
+
 HELP = 'Show topics, rates, gaps, losses, metadata and plausibility of a bag.'
 EXAMPLE = 'pam info runs/first'
+_MEASURED = ('pressure', 'contraction', 'force')
 
 
 def add_arguments(parser: Parser) -> None:
@@ -44,15 +50,26 @@ def run(args: argparse.Namespace) -> int:
         from pam_actuation.bags.recover import recover_bag
         recovery = recover_bag(args.bag)
     info = bag_info(args.bag, recover=args.recover)
+    types = {topic.name: topic.type_name for topic in info.topics}      # of the whole bag
     if args.namespace is not None:
         from pam_actuation.bags.in_namespace import in_namespace
         info = in_namespace(info, args.namespace)
+    info.notes += _renamed(info, types)
     payload, lines = info.to_dict(), []
     if recovery is not None:
         payload['recovery'] = recovery.to_dict()
         lines = recovery.sentences()
     emit(args, payload, '\n'.join([*lines, render_text(info)]))
     return EXIT_FINDING if info.has_findings else EXIT_DONE
+
+
+def _renamed(info: 'BagInfo', types: dict[str, str]) -> list[str]:
+    """Return a sentence for each topic that is told as missing and may have another name."""
+    from pam_actuation.bags.renamed import may_be
+    told = [text.partition(' has no messages on ')[2] for text in (*info.remarks, *info.notes)]
+    missing = {*re.split(r'[ ,:.]+', ' '.join(told))}
+    found = (may_be(short, types) for short in _MEASURED if short in missing)
+    return [f'{text}.' for text in found if text]
 
 
 def _is_mcap(path: Path) -> bool:

@@ -27,6 +27,7 @@ import os
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
+from pam_actuation.bags.renamed import may_be_in
 from pam_actuation.control.config import load_controller
 from pam_actuation.control.modes.tracked import TRACKED, Tracked, tracked_by
 from pam_actuation.control.tick import (
@@ -283,9 +284,11 @@ def _inputs(columns: dict[str, FloatArray], row: int, lookups: dict[str, dict[in
             continue
         value = lookups[topic].get(stamp_ns)
         if value is None:
+            renamed = '' if lookups[topic] else may_be_in(path, topic)
             raise InputError(
                 f'the {topic} message of stamp {stamp_ns} ns that controller tick '
-                f'{int(columns["tick"][row])} used is not in the recording', path)
+                f'{int(columns["tick"][row])} used is not in the recording'
+                + (f'; {renamed}' if renamed else ''), path)
         measured[topic] = value
     reference, rate, lead_reference, lead_rate = (
         float(columns[name][row]) for name in reference_names(tracked.unit))

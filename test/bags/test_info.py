@@ -22,6 +22,7 @@ from pam_actuation.bags.in_namespace import in_namespace
 from pam_actuation.bags.info import bag_info, render_text
 from pam_actuation.bags.metadata import experiment_metadata, UNITS
 from pam_actuation.bags.recorder import RecorderCore
+from pam_actuation.bags.renamed import may_be, may_be_in
 from pam_actuation.bags.writer import BagWriter
 from pam_actuation.cli.main import main
 from pam_actuation.topics import codec
@@ -108,6 +109,24 @@ def test_a_namespace_of_a_bag_is_told_alone(tmp_path, capsys):
     assert in_namespace(whole, '/') == whole
     assert main(['info', bag, '--namespace', '/ar']) == 2
     assert 'namespace /ar; the bag has /arm, /armed, /knee/flexor' in capsys.readouterr().err
+
+
+def test_a_topic_under_another_name_is_looked_for(tmp_path, capsys):
+    with BagWriter(tmp_path / 'run', METADATA) as writer:
+        for name, short in (('/hip/pressure', 'pressure'), ('/enc/hip', 'contraction'),
+                            ('/hip/controller_state', 'controller_state')):
+            writer.add_topic(name, RECORDED[short].type_name)
+            writer.write(name, codec.encode(short, example_messages(0)[short]), START_NS, START_NS)
+    for options in ((), ('--namespace', '/hip')):
+        assert main(['info', str(tmp_path / 'run'), *options]) == 1
+        printed = capsys.readouterr().out
+        assert '/hip has no messages on contraction' in printed
+        assert ('Note: contraction may have another name in the bag: /enc/hip has its type. In '
+                "Python load_run(bag, topics={'contraction': '/enc/hip'}) reads it.") in printed
+        assert 'force may have' not in printed
+    types = {f'/enc/{k}': RECORDED['contraction'].type_name for k in range(7)}
+    assert '/enc/4 and 2 more have its type' in may_be('contraction', types)
+    assert may_be('pressure', types) == '' and may_be_in(tmp_path, 'pressure') == ''
 
 
 def test_loss_of_a_node_that_died_before_its_last_report(tmp_path):

@@ -253,6 +253,24 @@ def test_another_model_than_the_recorded_one_is_told(runs):
         'replayed as dmsp_5_300_hanging_mass; the bag itself names dmsp_5_300_realistic')
 
 
+def test_a_measurement_under_another_name_is_looked_for(runs, monkeypatch):
+    run = runs['sofc_ppr']
+    bare = replace(run, topics={name: one for name, one in run.topics.items()
+                                if name != 'contraction'})
+    with pytest.raises(InputError, match=r'contraction message of .* is not in the recording$'):
+        replay_run(bare, only='controller')
+
+    def renamed(path, **options):
+        bag = read_bag(path, **options)
+        bag.topics['/enc/hip'] = bag.topics.pop('/muscle/contraction')
+        return bag
+
+    monkeypatch.setattr('pam_actuation.bags.renamed.read_bag', renamed)
+    with pytest.raises(InputError, match='recording; contraction may have another name in the '
+                                         'bag: /enc/hip has its type'):
+        replay_run(bare, only='controller')
+
+
 def test_a_folder_that_does_not_exist_is_refused(runs, tmp_path):
     result = replay_run(runs['pid_ppr'], only='driver')
     with pytest.raises(InputError, match='folder'):
