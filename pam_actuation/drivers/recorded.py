@@ -23,6 +23,7 @@ from pam_sim.errors import InputError
 
 # Parameters of a driver that a recording tells, and what they were before it told them.
 _BEFORE = {'command_wait_s': '0', 'resume_nearly_pa': '0'}
+_VERSION = 'software_version'       # in each recording of ours, of any version
 
 
 def driver_facts(changes: Mapping[str, object] | None = None) -> dict[str, str]:
@@ -38,9 +39,10 @@ def as_recorded(metadata: Mapping[str, str], where: str) -> dict[str, object]:
     """
     Return the changes with which a driver acts as it did in a recording.
 
-    In recordings that do not say how long commands waited, none did, and one that was nearly met
-    was not met. What the controller of the recording asked of its driver (``drivers/asked.py``)
-    counts too.
+    In our recordings that do not say how long commands waited, none did, and one that was nearly
+    met was not met. A recording of another program says nothing of it; its drivers count as
+    those of this version. What the controller of the recording asked of its driver
+    (``drivers/asked.py``) counts too.
 
     Parameters
     ----------
@@ -56,7 +58,8 @@ def as_recorded(metadata: Mapping[str, str], where: str) -> dict[str, object]:
 
     """
     told: dict[str, object] = {}
-    for name, before in _BEFORE.items():
+    unsaid = _BEFORE if _VERSION in metadata else driver_facts()
+    for name, before in unsaid.items():
         text = metadata.get(name, before)
         try:
             told[name] = float(text)

@@ -225,5 +225,8 @@ def test_a_replay_waits_as_the_recorded_driver_did(at_the_edge):
     assert replay_driver(run).identical
     del run.metadata['command_wait_s']          # as of versions before
     assert not replay_driver(run).identical
+    # Another recorder tells neither: the driver is taken for one of this version.
+    assert as_recorded({'rig': 'text'}, 'a bag') == as_recorded(
+        {**driver_facts(), 'software_version': '0.1.0'}, 'a bag')
     with pytest.raises(InputError, match='command_wait_s is .soon., a number is needed'):
         as_recorded({'command_wait_s': 'soon'}, 'a bag')
