@@ -70,7 +70,7 @@ class JointSetpoint:
         self.references.clear()
         self.efforts = EffortBuffer(self._name)
         self.effort, self.changed = Effort(), False
-        self._trajectory: NamedTrajectory | None = None      # that arrived since the last tick
+        self._trajectories: list[NamedTrajectory] = []      # that arrived since the last tick
 
     def takes(self) -> dict[str, Callable[[Any], object]]:
         """Return what takes each topic; an unusable message is ignored and counted."""
@@ -84,7 +84,7 @@ class JointSetpoint:
             points = zip(message.time_from_start_ns, message.angle_rad, message.rate_rad_per_s)
             message = NamedTrajectory(message.stamp_ns, (self._name,), tuple(
                 (time_ns, (angle,), (rate,)) for time_ns, angle, rate in points))
-        self._trajectory = message
+        self._trajectories.append(message)
 
     def on_efforts(self, message: NamedEfforts) -> None:
         """Take wanted torques; the next tick counts them or, where unusable, refuses them."""
@@ -97,14 +97,18 @@ class JointSetpoint:
 
     def begin(self, now_ns: int, measured: float) -> None:
         """Begin a tick: let what arrived count; ``measured`` is the newest angle [rad]."""
-        if self._trajectory is not None:
-            self._take(self._trajectory, now_ns, measured)
-            self._trajectory = None
-        self.references.refuse_ahead(now_ns)
+        self.references.judge(now_ns)       # a trajectory starts from a reference that counts
+        if self._trajectories:
+            self.refusal = ''
+            for message in reversed(self._trajectories):    # each replaces those before
+                if self._take(message, now_ns, measured):
+                    break
+            self._trajectories.clear()
+            self.references.judge(now_ns)
         self._choose(now_ns)
 
-    def _take(self, message: NamedTrajectory, now_ns: int, present_rad: float) -> None:
-        """Let the trajectory that arrived count from now on."""
+    def _take(self, message: NamedTrajectory, now_ns: int, present_rad: float) -> bool:
+        """Let a trajectory that arrived count from now on; return whether it is usable."""
         references = self.references
         if not self.effort.follows and references.state(now_ns) in (
                 reference_buffer.FRESH, reference_buffer.HELD):
@@ -113,10 +117,11 @@ class JointSetpoint:
             references.set_trajectory(angle_trajectory(
                 message.stamp_ns, message.names, message.points, self._name, self._range, now_ns,
                 present_rad))
-            self.refusal = ''
+            return True
         except InputError as error:
             self.refusal = str(error)
             self._refused_trajectories += 1
+            return False
 
     def _choose(self, now_ns: int) -> None:
         """Let a fresh angle decide, else a fresh torque, else what was followed before."""

@@ -39,8 +39,9 @@ reference (and trajectory) silent              rate trusted for 0.2 s, then stan
 reference silent for more than 0.5 s           holds the last position, learning frozen
 reference silent for more than 2 s             vents
 torque that is followed silent for 0.1 s       vents
-a reference or trajectory that is not finite,  that message is ignored and counted
-out of reach or from the future
+a reference or trajectory that is not finite,  that message is ignored and counted; what was
+out of reach, from the future, long ago, or    held goes on
+older than the reference that is held
 pressure, force missing, stale or not finite   not used (they only guard start and learning)
 followed pressure below or above the command,  integral and rules stand still: the error is
 or silent; pressure lost, where it is unknown  that of a driver that vents or limits

@@ -31,21 +31,23 @@ is interpolated (cubic through positions and rates). Rules:
   once.
 * A reference stamped more than ``MAX_AHEAD_NS`` ahead, or a trajectory whose first point is more
   than ``TRAJECTORY_LIFE_S`` ahead, does not count: it could not grow old.
+* A reference older than the one held, or one that is older than ``HOLD_S``, does not count, nor
+  does a trajectory that ended so long ago. Else a sender with old stamps would vent a muscle that
+  another one moves. After the clock was set back, what is held is ahead, and is dropped first.
 """
 
-from bisect import bisect_right
 import math
 from typing import TYPE_CHECKING
 
+from pam_actuation.control.course import Course
 from pam_actuation.control.modes.tracked import CONTRACTION, FORCE, JOINT, Tracked
 from pam_actuation.control.reference_motion import ReferenceMotion, Scale
 
 if TYPE_CHECKING:
-    from pam_actuation.messages import (
-        AngleReference, AngleTrajectory, Reference, ReferenceTrajectory)
+    from pam_actuation.control.course import Trajectory
+    from pam_actuation.messages import AngleReference, Reference
 
     SetPoint = Reference | AngleReference
-    Trajectory = ReferenceTrajectory | AngleTrajectory
 
 TRAJECTORY_LIFE_S = 1.0
 TRUST_S = 0.2
@@ -68,6 +70,8 @@ NONE, FRESH, HELD, LOST = range(4)      # what ``state`` can be
 class ReferenceBuffer:
     """
     Newest reference and trajectory; answers what is wanted at a time.
+
+    What arrives counts at once. ``judge`` then refuses what its stamp makes unusable.
 
     Parameters
     ----------
@@ -101,17 +105,23 @@ class ReferenceBuffer:
         """Forget everything."""
         self.reference: SetPoint | None = None
         self._accepted: SetPoint | None = None
+        self._arrived: list[SetPoint] = []          # not judged yet
         self._followed: SetPoint | None = None      # the newest of the motion
         self._motion.forget()
-        self.trajectory: Trajectory | None = None
-        self._times_ns: tuple[int, ...] = ()
-        self._values: tuple[float, ...] = ()
-        self._rates: tuple[float, ...] = ()
+        self._course: Course | None = None
+        self._accepted_course: Course | None = None
+        self._arrived_courses: list[Course] = []
+
+    @property
+    def trajectory(self) -> 'Trajectory | None':
+        """Return the trajectory that is held."""
+        return None if self._course is None else self._course.message
 
     def set_reference(self, message: 'SetPoint') -> bool:
         """Take a ``Reference``; one that is not usable is ignored and False returned."""
         if not self._allowed(self._value(message)):
             return self._refuse(f'a reference {self._outside}')
+        self._arrived.append(message)
         self.reference = message
         return True
 
@@ -141,26 +151,64 @@ class ReferenceBuffer:
             and all(map(self._allowed, values)))
         if not usable:
             return self._refuse(f'a trajectory does not rise in time, or {self._outside}')
-        self.trajectory = message
-        self._times_ns = times
-        self._values = values
-        self._rates = getattr(message, self._rate_field) if self._rate_field else ()
+        rates = getattr(message, self._rate_field) if self._rate_field else ()
+        self._course = Course(message, times, values, rates)
+        self._arrived_courses.append(self._course)
         return True
+
+    def judge(self, now_ns: int) -> None:
+        """Refuse what arrived with a stamp that is too far ahead of a time or too old."""
+        self.refuse_ahead(now_ns)
+        self._refuse_old(now_ns)
 
     def refuse_ahead(self, now_ns: int) -> None:
         """Forget what is stamped too far ahead of a time."""
         limit_ns = now_ns + MAX_AHEAD_NS
-        if self.reference is not None and self.reference.stamp_ns > limit_ns:
-            if self.reference is not self._accepted:
+        arrived, self._arrived = self._arrived, []
+        for message in arrived:
+            if message.stamp_ns > limit_ns:
                 self._refuse(f'a reference is stamped more than {MAX_AHEAD_NS * 1e-9:g} s ahead')
-            # The clock may have been set back: then the former one is ahead as well.
-            former = self._accepted
-            self.reference = former if former and former.stamp_ns <= limit_ns else None
-        self._accepted = self.reference
-        if self.trajectory is not None and self._times_ns[0] - now_ns > TRAJECTORY_LIFE_S * 1e9:
-            self._refuse(f'a trajectory begins more than {TRAJECTORY_LIFE_S:g} s ahead')
-            self.trajectory = None
-            self._times_ns = self._values = self._rates = ()
+            else:
+                self._arrived.append(message)
+        # The clock may have been set back: then the former one is ahead as well.
+        if self._accepted is not None and self._accepted.stamp_ns > limit_ns:
+            self._accepted = None
+        self.reference = self._arrived[-1] if self._arrived else self._accepted
+        begin_ns = now_ns + round(TRAJECTORY_LIFE_S * 1e9)
+        courses, self._arrived_courses = self._arrived_courses, []
+        for course in courses:
+            if course.times_ns[0] > begin_ns:
+                self._refuse(f'a trajectory begins more than {TRAJECTORY_LIFE_S:g} s ahead')
+            else:
+                self._arrived_courses.append(course)
+        if self._accepted_course is not None and self._accepted_course.times_ns[0] > begin_ns:
+            self._accepted_course = None
+        self._course = self._arrived_courses[-1] if self._arrived_courses else (
+            self._accepted_course)
+
+    def _refuse_old(self, now_ns: int) -> None:
+        """Of what arrived let count what is not too old; what was held before stays else."""
+        held = self._accepted
+        for message in self._arrived:
+            if held is not None and message.stamp_ns < held.stamp_ns:
+                self._refuse(_reference_too_old(message, now_ns) or (
+                    'a reference is stamped before the newest one; is there a second sender?'))
+            else:
+                held = message
+        if held is not None and held is not self._accepted:
+            why = _reference_too_old(held, now_ns)
+            if why:
+                self._refuse(why)
+                held = self._accepted
+        self.reference = self._accepted = held
+        for course in reversed(self._arrived_courses):      # each replaces those before
+            why = _course_too_old(course, now_ns)
+            if not why:
+                self._accepted_course = course
+                break
+            self._refuse(why)
+        self._course = self._accepted_course
+        self._arrived, self._arrived_courses = [], []
 
     def _value(self, message: 'SetPoint') -> float:
         """Return what a message asks for, of the quantity that counts here."""
@@ -169,21 +217,21 @@ class ReferenceBuffer:
 
     def uses_trajectory(self, now_ns: int) -> bool:
         """Return whether the trajectory is the one that counts now."""
-        if self.trajectory is None or now_ns > self._times_ns[-1]:
+        if self._course is None or now_ns > self._course.times_ns[-1]:
             return False
-        age_s = (now_ns - self.trajectory.stamp_ns) * 1e-9
+        age_s = (now_ns - self._course.message.stamp_ns) * 1e-9
         return age_s <= TRAJECTORY_LIFE_S or self._is_whole_movement()
 
     def _is_whole_movement(self) -> bool:
         """Tell whether the trajectory was sent after the last reference."""
-        return self.trajectory is not None and (
-            self.reference is None or self.reference.stamp_ns < self.trajectory.stamp_ns)
+        return self._course is not None and (
+            self.reference is None or self.reference.stamp_ns < self._course.message.stamp_ns)
 
     def state(self, now_ns: int) -> int:
         """Return ``NONE``, ``FRESH``, ``HELD`` or ``LOST`` for a time."""
         if self.uses_trajectory(now_ns):
             return FRESH
-        if self.reference is None and self.trajectory is None:
+        if self.reference is None and self._course is None:
             return NONE
         age_s = (now_ns - self._last_ns()) * 1e-9
         if age_s <= LOST_S:
@@ -195,8 +243,8 @@ class ReferenceBuffer:
         times: list[int] = []
         if self.reference is not None:
             times.append(self.reference.stamp_ns)
-        if self.trajectory is not None:
-            times.append(self._times_ns[-1])
+        if self._course is not None:
+            times.append(self._course.times_ns[-1])
         return max(times)
 
     def at(self, now_ns: int, time_ns: int) -> tuple[float, float]:
@@ -205,11 +253,12 @@ class ReferenceBuffer:
 
         Only valid unless ``state`` is ``NONE``.
         """
-        if self.uses_trajectory(now_ns):
-            return self._interpolate(time_ns)
+        if self._course is not None and self.uses_trajectory(now_ns):
+            return self._course.at(time_ns, self._jump_per_s)
         reference = self.reference
         if reference is None or self._is_whole_movement():
-            return self._values[-1], 0.0
+            assert self._course is not None     # else there is nothing to ask for
+            return self._course.values[-1], 0.0
         if reference is not self._followed:
             rate = getattr(reference, self._rate_field) if self._rate_field else math.nan
             self._motion.take(reference.stamp_ns, self._value(reference), rate)
@@ -221,32 +270,22 @@ class ReferenceBuffer:
         position, rate = self._motion.at(reference.stamp_ns + round(trusted_s * 1e9))
         return position + rate * ahead_s * fade, rate * fade
 
-    def _interpolate(self, time_ns: int) -> tuple[float, float]:
-        """Return position and rate of the trajectory, straight beyond its ends."""
-        times, values = self._times_ns, self._values
-        after = bisect_right(times, time_ns)
-        if after == 0 or after == len(times):
-            i = 0 if after == 0 else after - 1
-            rate = self._rate(i)
-            return values[i] + rate * (time_ns - times[i]) * 1e-9, rate
-        i = after - 1
-        span_s = (times[after] - times[i]) * 1e-9
-        part = (time_ns - times[i]) * 1e-9 / span_s
-        x0, x1 = values[i], values[after]
-        v0, v1 = self._rate(i, math.nan), self._rate(after, math.nan)
-        if math.isnan(v0) or math.isnan(v1):
-            return x0 + (x1 - x0) * part, (x1 - x0) / span_s
-        if abs((x1 - x0) / span_s - 0.5 * (v0 + v1)) > self._jump_per_s:
-            return x0 + v0 * part * span_s, v0
-        a, b = span_s * v0 - (x1 - x0), (x1 - x0) - span_s * v1
-        bend = part * (1.0 - part) * ((1.0 - part) * a + part * b)
-        slope = ((1.0 - 2.0 * part) * ((1.0 - part) * a + part * b)
-                 + part * (1.0 - part) * (b - a))
-        return x0 + (x1 - x0) * part + bend, ((x1 - x0) + slope) / span_s
 
-    def _rate(self, index: int, missing: float = 0.0) -> float:
-        """Return the rate of a point, ``missing`` where there is none."""
-        rates = self._rates
-        if index < len(rates) and math.isfinite(rates[index]):
-            return rates[index]
-        return missing
+def _reference_too_old(message: 'SetPoint', now_ns: int) -> str:
+    stamp_ns = message.stamp_ns
+    return _too_old('a reference', 'is stamped', stamp_ns, stamp_ns, now_ns)
+
+
+def _course_too_old(course: Course, now_ns: int) -> str:
+    return _too_old(
+        'a trajectory', 'ended', course.times_ns[-1], course.message.stamp_ns, now_ns)
+
+
+def _too_old(what: str, did: str, newest_ns: int, stamp_ns: int, now_ns: int) -> str:
+    """Return why nothing is known of what is wanted now, '' if the time is not that old."""
+    age_s = (now_ns - newest_ns) * 1e-9
+    if age_s <= HOLD_S:
+        return ''
+    if stamp_ns == 0:
+        return f'the header.stamp of {what} is zero; fill it with the time it is for'
+    return f'{what} {did} {age_s:.1f} s ago; is header.stamp filled?'

@@ -94,8 +94,8 @@ class MuscleSetpoint:
         self.references.clear()
 
     def begin(self, now_ns: int, measured: float) -> None:
-        """Begin a tick: what is stamped too far ahead is refused."""
-        self.references.refuse_ahead(now_ns)
+        """Begin a tick: what is stamped too far ahead, or too old, is refused."""
+        self.references.judge(now_ns)
 
     def reason(self, now_ns: int) -> int:
         """Return the code for what is asked for, one of ``codes.RUNNING`` if there is any."""

@@ -14,12 +14,15 @@
 
 """Tell the log why a message was not taken, once and not with every message."""
 
+import re
 from typing import Any
+
+_NUMBER = re.compile(r'-?\b(?:\d[\d.]*(?:e[+-]?\d+)?|nan|inf)\b')
 
 
 class RefusalLog:
     """
-    Warns of refusals that were not there before.
+    Warns of refusals that were not there before; other numbers in one are no news.
 
     Parameters
     ----------
@@ -31,10 +34,15 @@ class RefusalLog:
     def __init__(self, logger: Any) -> None:
         self._logger = logger
         self._before: tuple[str, ...] = ()
+        self._kinds: tuple[str, ...] = ()       # of these, without their numbers
 
     def note(self, *refusals: str) -> None:
         """Take the present reasons, '' for none."""
-        before, self._before = self._before, refusals
-        for refusal in refusals:
-            if refusal and refusal not in before:
+        if refusals == self._before:
+            return
+        # A value or an age differs from message to message.
+        kinds, self._before = self._kinds, refusals
+        self._kinds = tuple(_NUMBER.sub('#', refusal) for refusal in refusals)
+        for refusal, kind in zip(refusals, self._kinds):
+            if refusal and kind not in kinds:
                 self._logger.warning(f'a set point was refused: {refusal}')
