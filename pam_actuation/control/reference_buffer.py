@@ -42,6 +42,7 @@ from typing import TYPE_CHECKING
 from pam_actuation.control.course import Course
 from pam_actuation.control.modes.tracked import CONTRACTION, FORCE, JOINT, Tracked
 from pam_actuation.control.reference_motion import ReferenceMotion, Scale
+from pam_actuation.control.reference_values import ReferenceValues
 
 if TYPE_CHECKING:
     from pam_actuation.control.course import Trajectory
@@ -55,11 +56,8 @@ LOST_S = 0.5
 HOLD_S = 2.0
 MAX_AHEAD_NS = 20_000_000       # of the stamp of any input
 
-# By what is tracked: fields of value and rate in the messages, and the rate [unit/s] beyond
-# what the points say that is a jump. 4 rad/s are about 0.05 m/s on a small pulley.
-_FIELDS = {
-    CONTRACTION: ('contraction_m', 'velocity_m_per_s'), FORCE: ('force_n', None),
-    JOINT: ('angle_rad', 'rate_rad_per_s')}
+# By what is tracked, the rate [unit/s] beyond what the points say that is a jump. 4 rad/s are
+# about 0.05 m/s on a small pulley.
 JUMP_PER_S = {CONTRACTION: 0.05, FORCE: math.inf, JOINT: 4.0}
 
 SCALES = {CONTRACTION: Scale(1e-3, 1e-3), FORCE: Scale(5.0, 2.0), JOINT: Scale(0.04, 0.05)}
@@ -92,11 +90,9 @@ class ReferenceBuffer:
 
     def __init__(self, tracked: Tracked = CONTRACTION,
                  allowed: tuple[float, float] = (-math.inf, math.inf)) -> None:
-        self._lower, self._upper = allowed
-        self._unit = {'n': 'N'}.get(tracked.unit, tracked.unit)
+        self._values = ReferenceValues(tracked, allowed)
         self.refused = 0
         self.refusal = ''
-        self._field, self._rate_field = _FIELDS[tracked]
         self._jump_per_s = JUMP_PER_S[tracked]
         self._motion = ReferenceMotion(SCALES[tracked])
         self.clear()
@@ -119,18 +115,12 @@ class ReferenceBuffer:
 
     def set_reference(self, message: 'SetPoint') -> bool:
         """Take a ``Reference``; one that is not usable is ignored and False returned."""
-        if not self._allowed(self._value(message)):
-            return self._refuse(f'a reference {self._outside}')
+        why = self._values.why_not(message)
+        if why:
+            return self._refuse(why)
         self._arrived.append(message)
         self.reference = message
         return True
-
-    def _allowed(self, value: float) -> bool:
-        return math.isfinite(value) and self._lower <= value <= self._upper
-
-    @property
-    def _outside(self) -> str:
-        return f'is not finite or not within {self._lower:g} to {self._upper:g} {self._unit}'
 
     def _refuse(self, why: str) -> bool:
         self.refused += 1
@@ -143,16 +133,12 @@ class ReferenceBuffer:
 
         Usable: at least one point, equal lengths, allowed values, times strictly rising.
         """
+        why = self._values.why_not_trajectory(message)
+        if why:
+            return self._refuse(why)
         times = tuple(message.stamp_ns + offset for offset in message.time_from_start_ns)
-        values: tuple[float, ...] = getattr(message, self._field)
-        usable = (
-            len(times) > 0 and len(times) == len(values)
-            and all(a < b for a, b in zip(times, times[1:]))
-            and all(map(self._allowed, values)))
-        if not usable:
-            return self._refuse(f'a trajectory does not rise in time, or {self._outside}')
-        rates = getattr(message, self._rate_field) if self._rate_field else ()
-        self._course = Course(message, times, values, rates)
+        self._course = Course(
+            message, times, self._values.of(message), self._values.rate_of(message, ()))
         self._arrived_courses.append(self._course)
         return True
 
@@ -210,11 +196,6 @@ class ReferenceBuffer:
         self._course = self._accepted_course
         self._arrived, self._arrived_courses = [], []
 
-    def _value(self, message: 'SetPoint') -> float:
-        """Return what a message asks for, of the quantity that counts here."""
-        value: float = getattr(message, self._field)
-        return value
-
     def uses_trajectory(self, now_ns: int) -> bool:
         """Return whether the trajectory is the one that counts now."""
         if self._course is None or now_ns > self._course.times_ns[-1]:
@@ -260,8 +241,9 @@ class ReferenceBuffer:
             assert self._course is not None     # else there is nothing to ask for
             return self._course.values[-1], 0.0
         if reference is not self._followed:
-            rate = getattr(reference, self._rate_field) if self._rate_field else math.nan
-            self._motion.take(reference.stamp_ns, self._value(reference), rate)
+            values = self._values
+            self._motion.take(reference.stamp_ns, values.of(reference),
+                              values.rate_of(reference, math.nan))
             self._followed = reference
         age_s = (now_ns - reference.stamp_ns) * 1e-9
         ahead_s = (time_ns - now_ns) * 1e-9

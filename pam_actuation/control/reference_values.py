@@ -1,0 +1,106 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What messages on ``reference`` and ``reference_trajectory`` ask for, and why some are not usable.
+
+A message has a position (of a muscle its contraction, of a joint its angle) or an effort, as its
+ROS type calls them. One of the other kind has nothing for the controller.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+from pam_actuation.control.modes.tracked import CONTRACTION, FORCE, JOINT, Tracked
+
+
+class _Kind(NamedTuple):
+    """Attribute of the value, its ROS field, attribute of the rate; the same of the other kind."""
+
+    value: str
+    ros: str
+    rate: str | None
+    other: str | None
+    other_ros: str
+
+
+_KINDS = {
+    CONTRACTION: _Kind('contraction_m', 'position', 'velocity_m_per_s', 'force_n', 'effort'),
+    FORCE: _Kind('force_n', 'effort', None, 'contraction_m', 'position'),
+    JOINT: _Kind('angle_rad', 'position', 'rate_rad_per_s', None, '')}
+_UNITS = {CONTRACTION: 'm', FORCE: 'N', JOINT: 'rad'}
+
+
+class ReferenceValues:
+    """
+    The values of references of one tracked quantity.
+
+    Parameters
+    ----------
+    tracked : Tracked
+    allowed : tuple of float
+        Lowest and highest value.
+
+    """
+
+    def __init__(self, tracked: Tracked, allowed: tuple[float, float]) -> None:
+        self._kind, self._unit = _KINDS[tracked], _UNITS[tracked]
+        self._follows = 'an angle' if tracked == JOINT else f'a {tracked.mode}'
+        self._lower, self._upper = allowed
+
+    def of(self, message: Any) -> Any:
+        """Return what a message asks for: a number, of a trajectory a tuple of them."""
+        return getattr(message, self._kind.value)
+
+    def rate_of(self, message: Any, missing: Any) -> Any:
+        """Return the rate of a message (of a trajectory a tuple), ``missing`` without any."""
+        return missing if self._kind.rate is None else getattr(message, self._kind.rate)
+
+    def why_not(self, message: Any) -> str:
+        """Return why a ``Reference`` or ``AngleReference`` is not usable, '' if it is."""
+        other = self._kind.other
+        if math.isnan(self.of(message)) and other and math.isfinite(getattr(message, other)):
+            return self._wrong_kind('a reference')
+        return self._unusable('a reference', self.of(message))
+
+    def why_not_trajectory(self, message: Any) -> str:
+        """Return why a trajectory is not usable, '' if it is."""
+        times, values = message.time_from_start_ns, self.of(message)
+        if not times:
+            return 'a trajectory has no points'
+        if not values and self._kind.other and getattr(message, self._kind.other):
+            return self._wrong_kind('a trajectory')
+        if len(times) != len(values):
+            return f'a trajectory has {len(times)} times and {len(values)} {self._kind.ros}s'
+        for k, (before_ns, after_ns) in enumerate(zip(times, times[1:])):
+            if after_ns <= before_ns:
+                return f'the time_from_start of a trajectory does not rise at points[{k + 1}]'
+        whys = (self._unusable(f'points[{k}] of a trajectory', value)
+                for k, value in enumerate(values))
+        return next(filter(None, whys), '')
+
+    def _wrong_kind(self, what: str) -> str:
+        kind = self._kind
+        return (f'{what} has {kind.other_ros} but no {kind.ros}; '
+                f'this controller follows {self._follows}')
+
+    def _unusable(self, what: str, value: float) -> str:
+        """Return why a value is not usable, '' if it is."""
+        ros, lower, upper, unit = self._kind.ros, self._lower, self._upper, self._unit
+        if math.isnan(value):
+            return f'{what} has no {ros}, or one that is not a number'
+        if math.isfinite(value) and lower <= value <= upper:
+            return ''
+        return (f'{what} has {ros} {value:g} {unit}, which is not within '
+                f'{lower:g} to {upper:g} {unit}')
