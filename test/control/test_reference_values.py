@@ -16,6 +16,7 @@
 
 import math
 
+from pam_actuation.control.joint_trajectory import angle_trajectory
 from pam_actuation.control.modes.tracked import CONTRACTION, FORCE, JOINT
 from pam_actuation.control.reference_buffer import ReferenceBuffer
 from pam_actuation.messages import AngleReference, Reference, ReferenceTrajectory
@@ -77,3 +78,35 @@ def test_a_refused_trajectory_names_its_point(tracked, points, why):
 def test_a_trajectory_of_unequal_lengths_says_so():
     assert refusal(CONTRACTION, ReferenceTrajectory(1, (0, MS), (0.01,))) == (
         'a trajectory has 2 times and 1 positions')
+
+
+@pytest.mark.parametrize('every', [1, 3])
+@pytest.mark.parametrize('rate', [math.inf, -math.inf])
+def test_a_rate_that_is_not_finite_counts_as_left_empty(rate, every):
+    """On ``reference`` one left empty is NaN."""
+    buffers = ReferenceBuffer(), ReferenceBuffer()
+    for k in range(60):
+        now = k * 20 * MS
+        for buffer, unusable in zip(buffers, (math.nan, rate)):
+            buffer.set_reference(Reference(
+                now, 1e-4 * k, 0.005 if k % every else unusable))
+            buffer.judge(now)
+        a, b = (buffer.at(now + 5 * MS, now + 100 * MS) for buffer in buffers)
+        assert a == b and all(map(math.isfinite, a))
+    assert [buffer.refused for buffer in buffers] == [0, 0]
+
+
+@pytest.mark.parametrize('rates', [(math.nan,), (math.inf,), (-math.inf,)])
+def test_a_rate_of_a_point_that_is_not_finite_counts_as_left_empty(rates):
+    found = []
+    for velocities in ((), rates):
+        points = [Point(0, (0.0,), (0.0,), ()), Point(100 * MS, (0.01,), velocities, ())]
+        raw = trajectory_bytes(MS, ('knee',), points, '')
+        of_joint = codec.decode('joint_trajectory', raw)
+        joint = angle_trajectory(MS, of_joint.names, of_joint.points, 'knee', (-1.0, 1.0), MS, 0.0)
+        for tracked, message in (
+                (CONTRACTION, codec.decode('reference_trajectory', raw)), (JOINT, joint)):
+            buffer = ReferenceBuffer(tracked, ALLOWED[tracked])
+            assert buffer.set_trajectory(message)
+            found.append([buffer.at(MS, MS + k * 10 * MS) for k in range(12)])
+    assert found[:2] == found[2:] and found[0][5][0] == pytest.approx(0.005)
