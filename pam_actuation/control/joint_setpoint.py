@@ -17,8 +17,8 @@ What is asked of a joint: an angle or, without one, a torque; and a co-contracti
 
 Without a fresh angle, a wanted torque is followed: 0.5 s after the last ``joint_reference`` or the
 end of a trajectory. It counts for 0.1 s; then both muscles are vented until there is a torque or
-an angle again. A wanted co-contraction counts until the next one; one that is not finite is
-ignored, one beyond the limits stops there. No ROS inside.
+an angle again. A wanted co-contraction counts until the next one; one that is not finite, below
+the atmosphere or above the highest pressure is refused. No ROS inside.
 """
 
 from collections.abc import Callable
@@ -35,6 +35,8 @@ from pam_actuation.control.tick import Effort
 from pam_actuation.messages import AngleTrajectory, NamedEfforts, NamedTrajectory, Pressure
 from pam_sim.errors import InputError
 
+_ROUNDED_PA = 1.0           # beyond the limits: a pressure at a limit may be rounded
+
 
 class JointSetpoint:
     """
@@ -46,6 +48,8 @@ class JointSetpoint:
         Lowest and highest angle of the joint; set points outside are refused.
     name : str
         Of the joint, by which it is found in messages to several joints.
+    pressures_pa : tuple of float
+        Lowest and highest co-contraction, absolute; others are refused.
 
     Attributes
     ----------
@@ -53,16 +57,21 @@ class JointSetpoint:
         The newest one asked for, absolute; NaN before the first. It is not forgotten.
     refusal : str
         Why the newest trajectory was not taken, '' if it was.
+    co_contractions_refused : int
+        Wanted co-contractions that were not usable.
+    co_contraction_refusal : str
+        Why the newest of them was not, '' before the first.
 
     """
 
-    def __init__(self, range_rad: tuple[float, float], name: str) -> None:
-        self._range, self._name = range_rad, name
+    def __init__(self, range_rad: tuple[float, float], name: str,
+                 pressures_pa: tuple[float, float]) -> None:
+        self._range, self._name, self._pressures_pa = range_rad, name, pressures_pa
         lower, upper = range_rad
         self.references = ReferenceBuffer(JOINT, (lower - TOLERANCE_RAD, upper + TOLERANCE_RAD))
         self.co_contraction_pa = math.nan       # asked for, absolute
-        self.refusal = ''
-        self._refused_trajectories = 0
+        self.refusal = self.co_contraction_refusal = ''
+        self._refused_trajectories = self.co_contractions_refused = 0
         self.forget()
 
     def forget(self) -> None:
@@ -91,9 +100,16 @@ class JointSetpoint:
         self.efforts.take(message)
 
     def on_co_contraction(self, message: Pressure) -> None:
-        """Take a wanted mean pressure of both muscles, absolute."""
-        if math.isfinite(message.pressure_pa):
-            self.co_contraction_pa = message.pressure_pa
+        """Take a wanted mean pressure of both muscles, absolute; refuse an unusable one."""
+        lowest_pa, highest_pa = self._pressures_pa
+        wanted_pa = message.pressure_pa
+        if lowest_pa - _ROUNDED_PA <= wanted_pa <= highest_pa + _ROUNDED_PA:
+            self.co_contraction_pa = wanted_pa
+            return
+        self.co_contractions_refused += 1
+        self.co_contraction_refusal = (
+            f'a co_contraction of {wanted_pa:g} Pa is not within {lowest_pa:g} to '
+            f'{highest_pa:g} Pa absolute; what was wanted before stays')
 
     def begin(self, now_ns: int, measured: float) -> None:
         """Begin a tick: let what arrived count; ``measured`` is the newest angle [rad]."""
@@ -149,8 +165,9 @@ class JointSetpoint:
 
     @property
     def refusals(self) -> tuple[str, ...]:
-        """Return why the newest trajectory, reference and effort were not usable, '' for none."""
-        return self.refusal, self.references.refusal, self.efforts.refusal
+        """Return why the newest message of each kind was not usable, '' for none."""
+        return (self.refusal, self.references.refusal, self.efforts.refusal,
+                self.co_contraction_refusal)
 
     def values(self) -> tuple[tuple[str, object], ...]:
         """Return what the diagnostics say of it."""
@@ -158,4 +175,6 @@ class JointSetpoint:
                 ('references.refused', self.refused),
                 ('references.refusal', self.refusal or self.references.refusal),
                 ('efforts.refused', self.efforts.rejected),
-                ('efforts.refusal', self.efforts.refusal))
+                ('efforts.refusal', self.efforts.refusal),
+                ('co_contractions.refused', self.co_contractions_refused),
+                ('co_contractions.refusal', self.co_contraction_refusal))

@@ -42,6 +42,7 @@ torque that is followed silent for 0.1 s       vents
 a reference or trajectory that is not finite,  that message is ignored and counted; what was
 out of reach, from the future, long ago, or    held goes on
 older than the reference that is held
+co-contraction out of reach or not finite      ignored and counted; what was held goes on
 pressure, force missing, stale or not finite   not used (they only guard start and learning)
 followed pressure below or above the command,  integral and rules stand still: the error is
 or silent; pressure lost, where it is unknown  that of a driver that vents or limits
@@ -73,6 +74,7 @@ from pam_actuation.messages import ControllerState, Message, Pressure
 from pam_actuation.slow_rise import NEARLY_PA
 from pam_sim.errors import InputError
 from pam_sim.joint.rig import JointRig
+from pam_sim.units import P_ATM_PA
 
 if TYPE_CHECKING:
     from pam_actuation.control.config import Controller
@@ -168,15 +170,18 @@ class ControllerLoop:
     def _of_joint(self, joint: JointRig, name: str) -> tuple[Law, Measurement, Setpoint]:
         from pam_actuation.control.joint_law import JointLaw
         from pam_actuation.control.joint_setpoint import JointSetpoint
+        from pam_actuation.control.modes.joint import limits_gauge_pa
         controller = self.controller
         if tracked_by(controller) != JOINT:
             raise InputError('this controller tracks a single muscle; a joint needs one with '
                              '`mode: joint`', controller.rig_name)
         lower, upper = joint.range_rad
+        _, highest_gauge_pa = limits_gauge_pa(controller.settings)
         return (JointLaw(controller, joint),
                 Measurement(JOINT, self._newest, (lower - _MARGIN_RAD, upper + _MARGIN_RAD),
                             (lower + _STOP_RAD, upper - _STOP_RAD)),
-                JointSetpoint(joint.range_rad, name))
+                JointSetpoint(
+                    joint.range_rad, name, (P_ATM_PA, P_ATM_PA + highest_gauge_pa)))
 
     def _takers(self) -> dict[str, Callable[[Any], object]]:
         """Return what takes each topic: set points, followed pressures, measurements."""

@@ -233,16 +233,32 @@ def test_a_reference_that_is_not_finite_is_counted_and_ignored(loop):
 def test_co_contraction_follows_what_is_asked_within_the_limits(joint, loop):
     bench = Bench(joint, loop)
     means = []
-    for wanted in (300e3, 200e3, math.nan, 5e6):
+    highest = loop.controller.settings['max_pressure_gauge_pa']
+    for wanted in (300e3, 200e3, math.nan, 5e6, 451.0 - P_ATM_PA, highest):
         loop.take('co_contraction', Pressure(bench.now_ns, P_ATM_PA + wanted))
         for _ in range(300):
             loop.take('joint_reference', AngleReference(bench.now_ns, 0.0, 0.0))
             _, commands = bench.tick()
         means.append(np.mean([command.pressure_pa for command in commands]) - P_ATM_PA)
     assert means[0] == pytest.approx(300e3, abs=1.0)
-    assert means[1:3] == pytest.approx([200e3, 200e3], abs=1.0)
+    assert means[1:5] == pytest.approx([200e3] * 4, abs=1.0)
     # As far up as the difference that holds the angle leaves room for.
-    assert means[2] < means[3] <= loop.controller.settings['max_pressure_gauge_pa']
+    assert means[4] < means[5] <= highest
+
+
+@pytest.mark.parametrize('wanted_pa', [math.nan, math.inf, -math.inf, 451.0, 2e6, 101_000.0])
+def test_a_co_contraction_no_joint_can_have_is_refused_with_a_reason(joint, loop, wanted_pa):
+    highest_pa = P_ATM_PA + loop.controller.settings['max_pressure_gauge_pa']
+    for sound_pa in (P_ATM_PA, highest_pa + 1e-9, 4e5):
+        loop.take('co_contraction', Pressure(START_NS, sound_pa))
+    assert dict(loop.setpoint.values())['co_contractions.refused'] == 0
+    loop.take('co_contraction', Pressure(START_NS, wanted_pa))
+    values = dict(loop.setpoint.values())
+    assert loop.setpoint.co_contraction_pa == 4e5 and values['co_contractions.refused'] == 1
+    assert values['co_contractions.refusal'] == (
+        f'a co_contraction of {wanted_pa:g} Pa is not within 101325 to {highest_pa:g} Pa '
+        'absolute; what was wanted before stays')
+    assert loop.setpoint.refusals[-1] == values['co_contractions.refusal']
 
 
 def test_each_loop_refuses_the_controller_of_the_other(joint):

@@ -131,7 +131,7 @@ def test_one_that_was_held_grows_old_as_before():
 
 
 def test_a_joint_keeps_what_its_sound_sender_wants():
-    setpoint = JointSetpoint((-1.0, 1.0), 'knee')
+    setpoint = JointSetpoint((-1.0, 1.0), 'knee', (1e5, 7e5))
     setpoint.takes()['joint_reference'](AngleReference(START, 0.1))
     setpoint.begin(START, 0.0)
     setpoint.takes()['joint_reference'](AngleReference(START - OLD_NS, 0.5))
