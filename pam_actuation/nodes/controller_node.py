@@ -25,7 +25,7 @@ from pam_actuation.nodes.lockstep import TickInput
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import valve_of_rig
 from pam_actuation.nodes.refusals import RefusalLog
-from pam_actuation.nodes.senders import SensorEar
+from pam_actuation.nodes.senders import TopicEar
 from pam_sim.errors import InputError
 from pam_sim.parameters import Parameter
 from pam_sim.units import P_ATM_PA
@@ -39,6 +39,8 @@ MOST_WRONG_STEPS = 20
 ACCEPT_OTHER_RIG = node_parameter(
     'accept_other_rig', False, 'Take a controller file that was made for another rig.')
 MEASURED = ('pressure', 'force', 'contraction')
+# Of one sender each. Messages to several joints, such as ``joint_trajectory``, may have more.
+WANTED = ('reference', 'reference_trajectory', 'joint_reference')
 SENT_LAST_FIRST = ('force', 'contraction', 'pressure')     # by the plant: one wait for all three
 FOLLOWING, GIVING = 'following the reference', 'giving the wanted torque'
 
@@ -100,10 +102,12 @@ class ControllerNode(ManagedNode):
         self._refusals = RefusalLog(self.get_logger())
         for topic in (*loop.command_topics, 'controller_state'):
             self.add_publisher(topic)
-        self._tracked = tracked = loop.measurement.sensor.topic
-        self.inputs = {topic: (self.add_subscription(topic, writers=topic == tracked), take)
+        self._tracked = loop.measurement.sensor.topic
+        judged = self._tracked, *WANTED
+        self.inputs = {topic: (self.add_subscription(topic, writers=topic in judged), take)
                        for topic, take in loop.takes().items()}
-        self._ear = SensorEar(self, self.inputs[tracked][0])
+        self._ears = {topic: TopicEar(self, subscription)
+                      for topic, (subscription, _) in self.inputs.items() if topic in judged}
 
     def inputs_of_a_tick(self) -> list[TickInput]:
         """Return the measurements and, of a reference that takes part, what it asks for."""
@@ -145,26 +149,31 @@ class ControllerNode(ManagedNode):
         """Take the newest inputs, compute, send commands and internals."""
         loop = self.loop
         assert loop is not None
+        arrived = {}
         for topic, (subscription, take) in self.inputs.items():
             # In lockstep reference and followed pressure are those of the tick before.
             old = self.participants and topic not in MEASURED
             taken = subscription.take_before(self.now_ns()) if old else subscription.take()
             for message, _ in taken:
                 take(message)
-            if topic == self._tracked:
-                measured = taken
+            arrived[topic] = taken
         # Only now: what arrived while this node waited for the processor is not from the future.
         now_ns = self.now_ns()
         if self.participants:
             self._check_step(now_ns)
-        loop.two_sensors = self._ear.took(measured, now_ns)
+        two_send = {topic: ear.took(arrived[topic], now_ns) for topic, ear in self._ears.items()}
+        loop.two_sensors = two_send.pop(self._tracked)
         for topic, message in loop.sent(now_ns, self.learning).items():
             self.send(topic, message)
         self._refusals.note(*loop.setpoint.refusals)
+        level, says = WARN, loop.reason
         if loop.reason == REASONS[0]:
-            self.diagnostics.update(OK, GIVING if loop.setpoint.effort.follows else FOLLOWING)
-        else:
-            self.diagnostics.update(WARN, loop.reason)
+            level, says = OK, GIVING if loop.setpoint.effort.follows else FOLLOWING
+        # The muscle follows two references in turn, smoothly: a reason to warn, not to vent.
+        two_want = '; '.join(filter(None, two_send.values()))
+        if two_want:
+            level, says = WARN, f'{says}; {two_want}'
+        self.diagnostics.update(level, says)
 
     def diagnostic_values(self) -> Values:
         """Add set points that were refused."""

@@ -145,14 +145,14 @@ class DriverEar:
         return len(names), told(names)
 
 
-class SensorEar:
+class TopicEar:
     """
-    Notices that two nodes measure what a controller tracks.
+    Notices that two nodes send what is to come from one, such as a measurement or a reference.
 
     Parameters
     ----------
     node : ManagedNode
-        The controller.
+        That listens.
     subscription : PolledSubscription
         With ``writers``.
 
