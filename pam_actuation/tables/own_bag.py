@@ -34,9 +34,9 @@ def needs_no_import(path: StrPath) -> str:
     """
     Return a sentence where every verb reads a file as it is, '' for other files.
 
-    Such a bag has topics of our names and types: pressure and contraction of a muscle, or one of
-    them beside topics of our nodes; the angle of a joint and the pressures of its muscles. Their
-    messages are not looked at.
+    Such a bag has topics of our names and types. Of a muscle these are pressure and contraction,
+    or one of them beside topics of our nodes. Of a joint they are the angle and the pressures of
+    its muscles. Their messages are not looked at.
     """
     try:
         if kind_of(Path(path)) != 'bag':

@@ -22,9 +22,9 @@ Ctrl-C at random moments of every verb and node, each the same in every run.
 
 The time that a verb or node works is divided into rounds, the first ones short, since imports and
 starts are the delicate part. In each round each of them is interrupted once. A verb must end with
-exit code 130 and one line on standard error, or as usual if it was done already; a node with exit
-code 0, whatever came first. No process may stay. The program prints how often each outcome came
-and exits with 1 otherwise.
+exit code 130 and one line on standard error, or as usual if it was done already. A node must end
+with exit code 0, whatever came first. No process may stay. The program prints how often each
+outcome came and exits with 1 otherwise.
 """
 
 import argparse
