@@ -132,7 +132,8 @@ def identify(run: 'RecordedRun', model: str, settings: Settings, folder: Path) -
 def replay(run: 'RecordedRun', model: str, settings: Settings, folder: Path) -> Found:
     """Replay controller, driver and plant, each alone."""
     from pam_actuation.replay.compare import replay_run
-    from pam_actuation.replay.joint import is_joint, replay_joint
+    from pam_actuation.replay.joint import replay_joint
+    from pam_actuation.replay.model import is_joint
     found = (replay_joint if is_joint(run) else replay_run)(run)
     data: dict[str, Any] = found.to_dict()
     write_text(folder / 'replay.json', json.dumps(data, indent=2, default=str) + '\n')

@@ -140,8 +140,7 @@ def _understood(args: argparse.Namespace) -> 'tuple[list[Table], Guess]':
         args.maps, args.rate)
     # A mapping file says everything; otherwise all columns are looked at.
     wanted = [one.column for one in mapping.signals.values()] if args.mapping else None
-    as_it_is = _as_it_is(args)
-    if as_it_is and not args.preview:
+    if not args.preview and (as_it_is := _as_it_is(args)):
         raise InputError(f'{as_it_is}. To import it all the same, say with --map which columns '
                          'are signals', args.files[0])
     tables = []

@@ -59,8 +59,8 @@ def run(args: argparse.Namespace) -> int:
     """Replay; exit code 1 where the recorded controller is not reproduced to the bit."""
     from pam_actuation.bags.load_joint import load_recording
     from pam_actuation.replay.compare import replay_run
-    from pam_actuation.replay.joint import is_joint, replay_joint
-    from pam_actuation.replay.model import model_of, with_model
+    from pam_actuation.replay.joint import replay_joint
+    from pam_actuation.replay.model import is_joint, model_of, with_model
     from pam_actuation.replay.settings import changed_controller
     check_outputs(args, args.out)
     recorded = load_recording(args.bag, args.namespace, args.recover)

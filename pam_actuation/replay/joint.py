@@ -30,7 +30,6 @@ from typing import Any, TYPE_CHECKING
 
 import numpy as np
 from pam_actuation.bags.ending import early_sentences
-from pam_actuation.bags.load_joint import MEASURED
 from pam_actuation.control.config import load_controller
 from pam_actuation.control.modes.joint import JointController
 from pam_actuation.drivers.recorded import as_recorded
@@ -129,11 +128,6 @@ class JointReplay:
             np.savez(temporary, **arrays)
 
 
-def is_joint(run: Run) -> bool:
-    """Return whether a run is that of a joint."""
-    return MEASURED in run
-
-
 def replay_joint(run: Run, controller: 'Controller | str | os.PathLike[str] | None' = None,
                  only: str | None = None, chain: bool = False,
                  model: Rig | JointRig | None = None) -> JointReplay:
@@ -160,8 +154,8 @@ def replay_joint(run: Run, controller: 'Controller | str | os.PathLike[str] | No
 
     """
     path = str(run.path)
-    remarks = (*early_sentences([run]), *other_model(run, model))
-    as_it_ran = not other_model(run, model)     # another joint asks for other commands
+    other = other_model(run, model)     # another joint asks for other commands
+    remarks = (*early_sentences([run]), *other)
     run = with_model(run, model)
     if not run.metadata.get('rig'):
         raise InputError(f'the recording does not say which joint it is; {GIVE_MODEL}', path)
@@ -194,7 +188,7 @@ def replay_joint(run: Run, controller: 'Controller | str | os.PathLike[str] | No
         raise InputError('nothing to replay: ' + '; '.join(notes.values()), path)
     return JointReplay(
         parts, {} if controller is not None else internals, controller is not None,
-        as_it_ran and (states_suffice(run) or run.metadata.get('origin') != 'live'), notes,
+        not other and (states_suffice(run) or run.metadata.get('origin') != 'live'), notes,
         remarks)
 
 

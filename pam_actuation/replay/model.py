@@ -36,6 +36,11 @@ GIVE_MODEL = 'name its model with pam replay --model'     # a sentence ends with
 OneRun = TypeVar('OneRun', bound=Run)
 
 
+def is_joint(run: Run) -> bool:
+    """Return whether a run is that of a joint."""
+    return MEASURED in run
+
+
 def model_of(run: Run, source: 'StrPath') -> Rig | JointRig:
     """
     Return the model that a caller names for a recording; a preset gets the recorded valve.
@@ -63,7 +68,7 @@ def model_of(run: Run, source: 'StrPath') -> Rig | JointRig:
     valve = _recorded_valve(run, (*(f'{one}/' for one in SIDES), '')) if is_preset else None
     rig = (load_rig_or_side if of_side else load_rig_or_joint)(source, valve=valve)
     below = run.namespace.rpartition('/')[2]
-    if isinstance(rig, JointRig) and MEASURED not in run and below in SIDES:
+    if isinstance(rig, JointRig) and not is_joint(run) and below in SIDES:
         rig = rig.muscles[f'{below}/']
     check_kind([run], rig)
     recorded = _recorded_valve(run, rig.muscles)
@@ -98,7 +103,7 @@ def check_kind(runs: Iterable[Run], rig: Rig | JointRig) -> None:
     """Raise InputError for a bag of a muscle with the model of a joint, or the other way round."""
     of_joint = isinstance(rig, JointRig)
     for run in runs:
-        if (MEASURED in run) == of_joint:
+        if is_joint(run) == of_joint:
             continue
         if of_joint:
             raise InputError(f'has no {MEASURED}; it is no recording of a joint such as '

@@ -31,9 +31,9 @@ from pam_actuation.experiments.joint_offline import JointLoops
 from pam_actuation.experiments.offline import simulate_experiment
 from pam_actuation.messages import (
     AngleReference, AngleTrajectory, ControllerState, NamedEfforts, Pressure)
-from pam_actuation.replay.joint import is_joint, PARTS, replay_joint
+from pam_actuation.replay.joint import PARTS, replay_joint
 from pam_actuation.replay.joint_controller import COMMANDS
-from pam_actuation.replay.model import model_of
+from pam_actuation.replay.model import is_joint, model_of
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.joint import load_joint
