@@ -202,7 +202,7 @@ def as_unknown(learned, proof, valve):
     calibrated = Validation(held_out, True, estimator, base, base)
     result = GapResult('unknown', '', signals=calibrated.signals(), unexplained_fraction=1.0,
                        model_yaml=model_of(estimator, base).to_yaml())
-    propose(result, estimator, base, held_out, True)
+    propose(result, calibrated)
     return result
 
 

@@ -22,12 +22,13 @@ from pam_sim.effects.registry import get_effect
 from pam_sim.gap.criteria import Criteria
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit, Precision
+from pam_sim.gap.report.reason import join
 from pam_sim.gap.result import Calibrated, GapResult
 from pam_sim.gap.select.comparison import gap
 from pam_sim.gap.select.rival import NamedEffect, Rival
 from pam_sim.gap.select.search import Outcome
 from pam_sim.gap.verify.materiality import is_material
-from pam_sim.gap.verify.model import held_without, model_of, numbers_of
+from pam_sim.gap.verify.model import as_given, held_without, model_of, numbers_of
 from pam_sim.gap.verify.notice import Notice, notices, stamp_sd_s, supply_notice
 from pam_sim.gap.verify.own_runs import OwnRuns
 from pam_sim.gap.verify.spread import spread_of_numbers
@@ -35,9 +36,55 @@ from pam_sim.gap.verify.uncertainty import effect_numbers, half_width, NORMAL_95
 from pam_sim.gap.verify.validation import Validation
 
 
-def fill(result: GapResult, estimator: Estimator, outcome: Outcome, final: Fit,
-         validation: Validation) -> None:
+def decide(result: GapResult, outcome: Outcome, validation: Validation, materiality: float
+           ) -> OwnRuns:
+    """
+    Set signals, numbers, effects and verdict of a result; drop names that do not matter.
+
+    Parameters
+    ----------
+    result : GapResult
+        What is known so far.
+    outcome : Outcome
+        Of the search, with the names that the certify data confirm. What is too small for a name
+        is taken out.
+    validation : Validation
+        Of the final model.
+    materiality : float
+        What an effect must move for a name, in standard deviations of a sensor.
+
+    Returns
+    -------
+    OwnRuns
+        Of the model that is kept, with its validation.
+
+    """
+    def judged(validation: Validation) -> OwnRuns:
+        runs = OwnRuns(validation)
+        fill(result, outcome, validation)
+        judge(result, outcome, validation, materiality, runs)
+        return runs
+
+    runs = judged(validation)
+    if result.verdict == 'unknown' and outcome.named:
+        # Too small for a name; the gap is another one.
+        small = join(w.name for w in outcome.named)
+        result.remarks.append(f'What {small} would explain is too small to matter.')
+        outcome.named = []
+        runs = judged(validation.of(validation.base))
+    if given_suffices(result, runs.validation, materiality):
+        result.remarks.append('Calibrated numbers would follow the certify data less well than '
+                              'the given ones, so these stay.')
+        outcome.named = []
+        estimator = validation.estimator
+        given = estimator.base = as_given(estimator)
+        runs = judged(validation.of(given, given))
+    return runs
+
+
+def fill(result: GapResult, outcome: Outcome, validation: Validation) -> None:
     """Put signals, numbers, effects and the model into a result, in place of former ones."""
+    estimator, final = validation.estimator, validation.final
     result.effects = []
     result.signals = validation.signals()
     precision = estimator.precision(final)
@@ -63,19 +110,19 @@ def fill(result: GapResult, estimator: Estimator, outcome: Outcome, final: Fit,
     result.model_yaml = model.with_(effects=settings).to_yaml()
 
 
-def judge(result: GapResult, outcome: Outcome, estimator: Estimator, validation: Validation,
-          base: Fit, final: Fit, materiality: float, whole: bool,
-          runs: OwnRuns | None = None) -> None:
+def judge(result: GapResult, outcome: Outcome, validation: Validation, materiality: float,
+          runs: OwnRuns) -> None:
     """
     Set verdict, ambiguity set and the unexplained fraction of a result.
 
     What is too small for a name stands beside a gap without one where the verdict is ``unknown``
     though something is named.
     """
-    named, criteria = outcome.named, estimator.criteria
+    named, estimator, final = outcome.named, validation.estimator, validation.final
+    criteria = estimator.criteria
     result.ambiguity_set, result.rivals, result.unexplained_fraction = [], [], 0.0
-    result.moved = validation.moved(base, whole) if named else {}
-    own = validation.moved(held_without(final), whole) if named else {}
+    result.moved = validation.moved(validation.base) if named else {}
+    own = validation.moved(held_without(final)) if named else {}
     again = bool(named) and validation.finds_again()
 
     def is_worth_a_name(least: float) -> bool:
@@ -95,9 +142,8 @@ def judge(result: GapResult, outcome: Outcome, estimator: Estimator, validation:
          't': _tested(r, w.subsystem)} for w in named for r in w.rivals]
     wrong = [c for c in result.parameters if abs(c.prior_deviation) > criteria.max_prior_sd]
     if not outcome.share or not (material or wrong):
-        is_left = _is_left(result, estimator, validation, base, max(materiality, 1.0), whole)
-        result.noticed = _noticed(estimator, validation, base, materiality,
-                                  None if is_left else runs)
+        is_left = _is_left(result, validation, max(materiality, 1.0))
+        result.noticed = _noticed(validation, materiality, None if is_left else runs)
         result.verdict, result.effects, result.parameters = 'no_gap', [], []
         if is_left or result.noticed:
             result.verdict, result.unexplained_fraction = 'unknown', 1.0
@@ -119,36 +165,35 @@ def _at_most(estimator: Estimator, final: Fit, named: Sequence[NamedEffect]) -> 
                                   for w in named if w.name in names), default=math.inf)
 
 
-def _noticed(estimator: Estimator, validation: Validation, base: Fit, materiality: float,
-             runs: OwnRuns | None) -> list[Notice]:
+def _noticed(validation: Validation, materiality: float, runs: OwnRuns | None) -> list[Notice]:
     """
     Return what calibration leaves that is no noise, and that may matter in a free run.
 
     Without ``runs``, where the free run itself shows a gap, the recorded supply pressure alone.
     """
-    criteria, recording = estimator.criteria, validation.recording
+    estimator, recording = validation.estimator, validation.recording
+    criteria = estimator.criteria
     least = max(materiality, 1.0)
     found = [] if recording.pressure_given else [one for one in [supply_notice(
-        recording, model_of(estimator, base), validation.noise['pressure'], least)]
+        recording, model_of(estimator, validation.base), validation.noise['pressure'], least)]
         if one is not None and one.is_gap(criteria)]
     if runs is None:
         return found
     floor = validation.floor_with(stamp_sd_s(recording))
     may_matter = any(gap.rmse_refit > math.hypot(floor[s], least * validation.noise[s])
                      for s, gap in validation.signals().items())
-    return found + [one for one in (notices(runs, estimator, base) if may_matter else ())
+    return found + [one for one in (notices(runs) if may_matter else ())
                     if one.is_gap(criteria)]
 
 
-def _is_left(result: GapResult, estimator: Estimator, validation: Validation, base: Fit,
-             least: float, whole: bool) -> bool:
+def _is_left(result: GapResult, validation: Validation, least: float) -> bool:
     """
     Return whether calibration leaves a gap that matters and that is no noise.
 
     It matters by the floor as it was found. Half of that must be left by a floor that is too low,
     and by numbers at the end of their interval.
     """
-    criteria, noise = estimator.criteria, validation.noise
+    criteria, noise = validation.estimator.criteria, validation.noise
 
     def left(name: str, floor: float, spread: float = 0.0) -> float:
         beyond = _beyond(result.signals[name].rmse_refit, math.hypot(floor, NORMAL_95 * spread))
@@ -161,31 +206,31 @@ def _is_left(result: GapResult, estimator: Estimator, validation: Validation, ba
     large = [name for name, s in result.signals.items()
              if left(name, s.noise_floor) > least and surely(name) > sure]
     # What the searched data show clearly is no doubt about numbers, however wide their priors.
-    if not large or _is_clear(estimator, base):
+    if not large or _is_clear(validation):
         return bool(large)
-    spread = spread_of_numbers(validation, estimator, base, whole)
+    spread = spread_of_numbers(validation)
     return any(surely(name, spread.get(name, 0.0)) > sure for name in large)
 
 
-def given_suffices(result: GapResult, estimator: Estimator, validation: Validation, base: Fit,
-                   materiality: float) -> bool:
+def given_suffices(result: GapResult, validation: Validation, materiality: float) -> bool:
     """
     Return whether the model as given explains the proof to its noise, and calibration does not.
 
     Few moves tell some numbers hardly, and noise alone then leads them away. An effect may make
     up for that. What the searched data show clearly is a gap all the same.
     """
-    if result.verdict == 'no_gap' or result.noticed or _is_clear(estimator, base):
+    if result.verdict == 'no_gap' or result.noticed or _is_clear(validation):
         return False
     least = max(materiality, 1.0)
     if result.effects:          # what has a name is more than a gap without one
-        least *= estimator.criteria.greater_part
+        least *= validation.estimator.criteria.greater_part
     return all(_beyond(s.rmse_before, s.noise_floor) <= least * validation.noise[name]
                for name, s in result.signals.items())
 
 
-def _is_clear(estimator: Estimator, base: Fit) -> bool:
+def _is_clear(validation: Validation) -> bool:
     """Return whether calibration leaves a gap in the searched data that is clear without proof."""
+    estimator, base = validation.estimator, validation.base
     return any(gap(p, base.errors[p.subsystem]) > estimator.criteria.clear_rest
                for p in estimator.problems)
 

@@ -20,7 +20,6 @@ from gap_runs import assert_form, nominal, recorded, voltages
 import numpy as np
 from pam_sim.gap import find_gap
 from pam_sim.gap.criteria import CRITERIA
-from pam_sim.gap.data.split import FIT, SELECT
 from pam_sim.gap.fit.candidate import Candidate
 from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
 from pam_sim.gap.result import SignalGap
@@ -115,20 +114,19 @@ def test_the_subsystem_of_the_signal_goes_back_to_the_calibrated_one(
 
     def validated(final):
         now = next(rounds, [])
-        return SimpleNamespace(worse=lambda: now, signals=lambda: {
-            s: SignalGap('', 1.0, 3.0, 2.0, 4.0) for s in now})
+        return SimpleNamespace(
+            worse=lambda: now, final=final, of=validated, estimator=estimator,
+            signals=lambda: {s: SignalGap('', 1.0, 3.0, 2.0, 4.0) for s in now})
 
-    def left(gone, estimator, base, final):
-        assert (estimator.use, base) == ((FIT, SELECT), 'base')
-        h = final.hypothesis
+    def left(gone, validation):
+        h = validation.final.hypothesis
         return Fit(Hypothesis(tuple(c for c in h.effects if c.name not in gone), tuple(
             n for n in h.numbers if n not in gone)), np.zeros(0), {}, {}, {})
 
     monkeypatch.setattr(harm, 'less', left)
     final = Fit(Hypothesis((Candidate('tube_lag', ()), Candidate('creep', ())), ('mass_kg',)),
                 np.zeros(0), {}, {}, {})
-    estimator = SimpleNamespace(use=(FIT, SELECT), problems=PROBLEMS)
-    named, final, _, harms = harm.without_harm(
-        NAMED, estimator, 'base', final, validated(final), validated)
-    assert [w.name for w in named] == stay == list(final.hypothesis.names)
+    estimator = SimpleNamespace(problems=PROBLEMS)
+    named, left_over, harms = harm.without_harm(NAMED, validated(final))
+    assert [w.name for w in named] == stay == list(left_over.final.hypothesis.names)
     assert [one.names for one in harms] == told

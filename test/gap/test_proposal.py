@@ -33,6 +33,7 @@ from pam_sim.gap.propose.search import candidate_of, ends_of
 from pam_sim.gap.propose.writing import EffectText
 from pam_sim.gap.result import GapResult
 from pam_sim.gap.subsystems.problems import subsystem_problems
+from pam_sim.gap.verify.validation import Validation
 import pytest
 import yaml
 
@@ -84,7 +85,8 @@ def asked(rig, **options):
     recording = Recording(recorded(rig, voltages(12.0)), 'ppr')
     estimator = Estimator(nominal(), subsystem_problems(nominal(), [recording], True, 0, CRITERIA))
     result = GapResult('unknown', '', model_yaml=nominal().to_yaml())
-    propose(result, estimator, estimator.base, recording, False, **options)
+    base = estimator.base
+    propose(result, Validation(recording, False, estimator, base, base), **options)
     return result
 
 

@@ -69,9 +69,11 @@ def test_a_name_of_a_set_goes_where_the_certify_data_contradict_it(moved, apart,
     validation.recording, validation.part = Given(), {'contraction': np.ones(SAMPLES, dtype=bool)}
     # Sine and cosine have half of the square.
     validation.noise = {'contraction': 1.0 / np.sqrt(2.0)}
-    validation.run = lambda found, whole: {'contraction': runs[found.hypothesis.names]}
+    validation.run = lambda found: {'contraction': runs[found.hypothesis.names]}
+    validation.estimator, validation.whole = Unchanged(), True
+    validation.base, validation.final = found_of(), fits[NAMES[0]]
     named = [NamedEffect(NAMES[0], 'muscle', [Rival(n, f) for n, f in fits.items()], NAMES)]
-    kept, final = refute(named, Unchanged(), found_of(), fits[NAMES[0]], validation, True)
+    kept, final = refute(named, validation)
     assert kept[0].names == left and kept[0].name == left[0]
     assert final is fits[left[0]]
 
@@ -94,13 +96,14 @@ def test_a_name_that_both_motions_leave_behind_is_held_to_what_the_best_leaves(
         'contraction': truth + noise + rest * np.sin(7.0 * time_s)})
     validation.part = {'contraction': np.ones(SAMPLES, dtype=bool)}
     validation.noise, validation.floor = {'contraction': 1.0}, {'contraction': 1.1}
-    validation.run = lambda found, whole: {'contraction': runs[found.hypothesis.names]}
+    validation.run = lambda found: {'contraction': runs[found.hypothesis.names]}
     validation.after = {'contraction': truth}
     rivals = [Rival(NAMES[0], found_of(NAMES[0])),
               Rival(NAMES[1], found_of(NAMES[1]), t={'muscle': t})]
     named = [NamedEffect(NAMES[0], 'muscle', rivals, NAMES)]
-    estimator = SimpleNamespace(criteria=CRITERIA, polish=lambda found: found)
-    kept, _ = refute(named, estimator, found_of(), rivals[0].found, validation, whole)
+    validation.estimator = SimpleNamespace(criteria=CRITERIA, polish=lambda found: found)
+    validation.base, validation.final, validation.whole = found_of(), rivals[0].found, whole
+    kept, _ = refute(named, validation)
     assert kept[0].names == NAMES[:1 if goes else 2]
 
 
@@ -121,30 +124,31 @@ def test_the_name_that_the_certify_data_confirm_least_goes_first(spurious):
 
     validation.recording, validation.part = Given(), {'contraction': np.ones(SAMPLES, dtype=bool)}
     validation.noise = validation.floor = {'contraction': 1.0}
-    validation.run = lambda found, whole: {
+    validation.run = lambda found: {
         'contraction': sum((moves[n] for n in found.hypothesis.names), 0.0 * truth)}
-    validation.after = validation.run(found_of(*NAMES), True)
+    final = validation.final = found_of(*NAMES)
+    validation.estimator, validation.base = Refitted(), found_of()
+    validation.after = validation.run(final)
     validation.drift = [{'contraction': 0.0 * truth}]
     named = [NamedEffect(n, 'muscle', [], (n,)) for n in NAMES]
-    final = found_of(*NAMES)
-    name, left = unconfirmed(named, Refitted(), found_of(), final, validation, True)
+    name, left = unconfirmed(named, validation)
     assert name == spurious
     assert left.hypothesis.names == tuple(n for n in NAMES if n != spurious)
     # Where the valve may drift that way by itself, the fall tells nothing.
     validation.drift = [{'contraction': sign * drift} for sign in (-1.0, 1.0)]
-    assert unconfirmed(named, Refitted(), found_of(), final, validation, True) == (None, final)
+    assert unconfirmed(named, validation) == (None, final)
     validation.drift = [{'contraction': 0.0 * truth}]
     # Beside what leaves far more, a small one is not judged.
     Given.measured = {'contraction': truth + noise + 50.0 * np.sin(7.0 * time_s)}
-    assert unconfirmed(named, Refitted(), found_of(), final, validation, True) == (None, final)
+    assert unconfirmed(named, validation) == (None, final)
     Given.measured = {'contraction': truth + noise}
     # What is true stays; of what moves nothing that could be seen there, nothing is said.
-    validation.after = validation.run(left, True)
+    validation.final, validation.after = left, validation.run(left)
     true = [w for w in named if w.name != spurious]
-    assert unconfirmed(true, Refitted(), found_of(), left, validation, True) == (None, left)
+    assert unconfirmed(true, validation) == (None, left)
     moves[true[0].name] = -0.01 * truth
-    validation.after = validation.run(left, True)
-    assert unconfirmed(true, Refitted(), found_of(), left, validation, True) == (None, left)
+    validation.after = validation.run(left)
+    assert unconfirmed(true, validation) == (None, left)
 
 
 @pytest.mark.parametrize('skew_s, left_s', [
@@ -253,9 +257,8 @@ def test_of_a_slow_log_the_run_of_the_valve_alone_refutes_its_names(told, gone):
 
     refitted = SimpleNamespace(
         criteria=CRITERIA, fit=lambda left, theta, near: found_of(*left.names))
-    final = found_of('tube_lag', 'creep')
-    name, left = refuted_alone(
-        named, refitted, found_of(), final, SimpleNamespace(fall=fall))
+    name, left = refuted_alone(named, SimpleNamespace(fall=fall, validation=SimpleNamespace(
+        estimator=refitted, base=found_of(), final=found_of('tube_lag', 'creep'))))
     assert asked == [('valve', ('creep',))]
     assert (name, left.hypothesis.names) == (
         ('tube_lag', ('creep',)) if gone else (None, ('tube_lag', 'creep')))

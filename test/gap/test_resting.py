@@ -18,10 +18,10 @@ from gap_runs import nominal, recorded, voltages
 import numpy as np
 from pam_sim import load_rig
 from pam_sim.gap.criteria import CRITERIA
+from pam_sim.gap.data.checked import recording_of
 from pam_sim.gap.data.health import check_for
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.resting import rest_of
-from pam_sim.gap.workflow import _recording
 from pam_sim.identify.records import offer_of
 from pam_sim.run import Run, Series
 from pam_sim.units import GRAVITY_M_PER_S2
@@ -73,7 +73,7 @@ def test_a_load_on_its_stop_is_one_sentence(real):
 @pytest.mark.parametrize('rig', [nominal(), UNKNOWN_MASS])
 def test_its_force_is_left_out_of_the_look_and_of_the_numbers(real, rig):
     run, at_rest = real
-    for recording in (_recording(run, rig, CRITERIA),
+    for recording in (recording_of(run, rig, CRITERIA),
                       offer_of(run, rig).recording):
         assert np.count_nonzero(recording.measured['force'] < 0.5) < 0.01 * at_rest.sum()
         whole = Recording(run, 'ppr')

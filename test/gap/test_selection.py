@@ -176,8 +176,6 @@ def test_a_gap_without_a_name_must_be_clear(
         monkeypatch, off, materiality, highest, spread, verdict):
     signal = SimpleNamespace(rmse_refit=np.hypot(1.0, off), noise_floor=1.0)
     result = SimpleNamespace(parameters=[], signals={'pressure': signal})
-    validation = SimpleNamespace(noise={'pressure': 1.0}, highest_floor={'pressure': highest},
-                                 unexplained=lambda: 1.0)
     monkeypatch.setattr(verdict_module, 'is_material', lambda *given: False)
     monkeypatch.setattr(verdict_module, '_noticed', lambda *given: [])
     monkeypatch.setattr(
@@ -185,9 +183,10 @@ def test_a_gap_without_a_name_must_be_clear(
     found = SimpleNamespace(hypothesis=Hypothesis(), theta=())
     monkeypatch.setattr(verdict_module, 'held_without', lambda found: found)
     outcome = SimpleNamespace(named=[], share={'valve': 0.0})
-    estimator = SimpleNamespace(criteria=CRITERIA, problems=[])
-    verdict_module.judge(
-        result, outcome, estimator, validation, found, found, materiality, True)
+    validation = SimpleNamespace(
+        noise={'pressure': 1.0}, highest_floor={'pressure': highest}, unexplained=lambda: 1.0,
+        estimator=SimpleNamespace(criteria=CRITERIA, problems=[]), base=found, final=found)
+    verdict_module.judge(result, outcome, validation, materiality, None)
     assert result.verdict == verdict
 
 
@@ -280,18 +279,17 @@ def test_how_large_effects_may_be_rests_on_the_least_certain(names, at_most):
 def test_an_effect_is_too_small_for_a_name_only_where_that_is_certain(
         monkeypatch, certainty, verdict):
     result = SimpleNamespace(parameters=[], effects=['creep'], signals={})
-    validation = SimpleNamespace(
-        noise={}, unexplained=lambda: 0.0, finds_again=lambda: True,
-        moved=lambda *given: {'contraction': 0.8})
     monkeypatch.setattr(verdict_module, 'held_without', lambda found: found)
     monkeypatch.setattr(verdict_module, '_noticed', lambda *given: [])
     creep = SimpleNamespace(name='creep')
     final = SimpleNamespace(hypothesis=SimpleNamespace(effects=(creep,)))
     outcome = SimpleNamespace(share={'muscle': 1.0}, named=[
         NamedEffect('creep', 'muscle', [], ('creep',))])
-    estimator = SimpleNamespace(
-        certainty=lambda found, place: certainty, criteria=CRITERIA)
-    verdict_module.judge(result, outcome, estimator, validation, None, final, 1.0, True)
+    validation = SimpleNamespace(
+        noise={}, unexplained=lambda: 0.0, finds_again=lambda: True, base=None, final=final,
+        moved=lambda *given: {'contraction': 0.8}, estimator=SimpleNamespace(
+            certainty=lambda found, place: certainty, criteria=CRITERIA))
+    verdict_module.judge(result, outcome, validation, 1.0, None)
     assert result.verdict == verdict
 
 
@@ -301,15 +299,15 @@ def test_an_effect_is_too_small_for_a_name_only_where_that_is_certain(
 def test_what_leaves_much_of_the_gap_is_a_part_only(monkeypatch, found, left, verdict):
     result = SimpleNamespace(**{'parameters': [], 'effects': [], 'signals': {}} | {
         found: [SimpleNamespace(prior_deviation=9.0)]})
-    validation = SimpleNamespace(
-        noise={}, unexplained=lambda: left, finds_again=lambda: True,
-        moved=lambda *given: {'contraction': 9.0})
     monkeypatch.setattr(verdict_module, 'held_without', lambda found: found)
     outcome = SimpleNamespace(share={'muscle': 1.0}, named=[
         NamedEffect('creep', 'muscle', [], ('creep',))])
     final = SimpleNamespace(hypothesis=SimpleNamespace(effects=()))
-    estimator = SimpleNamespace(certainty=lambda found, place: 60.0, criteria=CRITERIA)
-    verdict_module.judge(result, outcome, estimator, validation, None, final, 1.0, True)
+    validation = SimpleNamespace(
+        noise={}, unexplained=lambda: left, finds_again=lambda: True, base=None, final=final,
+        moved=lambda *given: {'contraction': 9.0}, estimator=SimpleNamespace(
+            certainty=lambda found, place: 60.0, criteria=CRITERIA))
+    verdict_module.judge(result, outcome, validation, 1.0, None)
     assert result.verdict == verdict
 
 

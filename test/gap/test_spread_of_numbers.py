@@ -39,11 +39,11 @@ class Given(Validation):
     """A calibrated model with one number, known within 1, that moves its run like ``form``."""
 
     def __init__(self, form):
-        self.form, self.simulations = form, 0
+        self.form, self.simulations, self.base, self.estimator = form, 0, None, self
         self.part = {'contraction': np.ones(TIME_S.size, dtype=bool)}
         self.refit = {'contraction': np.zeros(TIME_S.size)}
 
-    def run(self, found, whole):
+    def run(self, found):
         """Return the run with the number moved."""
         return {'contraction': self.refit['contraction'] + found * self.form}
 
@@ -56,7 +56,7 @@ class Given(Validation):
 def test_a_number_that_one_motion_hardly_shows_leaves_doubt_in_another():
     validation = Given(3e-5 * np.cos(TIME_S))
     # Known within 1, it moves the run by its form; the rms of a cosine.
-    spread = spread_of_numbers(validation, Given, None, True)
+    spread = spread_of_numbers(validation)
     assert spread['contraction'] == pytest.approx(3e-5 / np.sqrt(2.0), rel=0.01)
 
 

@@ -18,7 +18,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.split import FIT, SELECT
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
@@ -101,8 +100,8 @@ class Proposal:
                 'range': {name: list(ends) for name, ends in self.ranges.items()}}
 
 
-def propose(result: GapResult, estimator: Estimator, final: Fit, held_out: Recording, whole: bool,
-            seed: int = 0, out_of_time: Callable[[], bool] = lambda: False) -> None:
+def propose(result: GapResult, validation: Validation,
+            out_of_time: Callable[[], bool] = lambda: False) -> None:
     """
     Set the proposal of a result, if one is wanted and the certify data confirm it.
 
@@ -112,20 +111,13 @@ def propose(result: GapResult, estimator: Estimator, final: Fit, held_out: Recor
     ----------
     result : GapResult
         With its verdict.
-    estimator : Estimator
-        That the final model was fitted with.
-    final : Fit
-        The final model.
-    held_out : Recording
-        Of the proof.
-    whole : bool
-        All of it is the certify part; otherwise its certify blocks.
-    seed : int
-        Of the draws of the floor.
+    validation : Validation
+        Of the final model.
     out_of_time : callable
         Whether to come to an end.
 
     """
+    estimator, final = validation.estimator, validation.final
     criteria = estimator.criteria
     if result.verdict in ('no_gap', 'refused') or (
             result.verdict != 'unknown'
@@ -140,12 +132,12 @@ def propose(result: GapResult, estimator: Estimator, final: Fit, held_out: Recor
         if found is None:
             continue
         proved = both.polish(found.fit)
-        validation = Validation(held_out, whole, both, final, proved, seed)
-        fell, _ = validation.fall(validation.refit, validation.after)
-        explained = 1.0 - validation.unexplained()
+        proof = validation.of(proved, final, both)
+        fell, _ = proof.fall(proof.refit, proof.after)
+        explained = 1.0 - proof.unexplained()
         if (explained > criteria.greater_part and fell > criteria.greater_part
-                and not validation.worse()):
-            result.proposal = _written(both, found, proved, validation)
+                and not proof.worse()):
+            result.proposal = _written(found, proof)
             result.remarks.append(result.proposal.sentence)
             return
     result.remarks.append(NO_TIME if out_of_time() else NONE)
@@ -177,10 +169,10 @@ def _fits(stand_in: StandIn, learning: Estimator, problem: SubsystemProblem) -> 
             and (not stand_in.signal or stand_in.signal in problem.signals))
 
 
-def _written(estimator: Estimator, found: Sum, proved: Fit, validation: Validation
-             ) -> Proposal:
+def _written(found: Sum, proof: Validation) -> Proposal:
     """Return the proposal of proved terms, with its file and its model."""
-    values, explained = proved.values()[found.place], 1.0 - validation.unexplained()
+    proved, explained = proof.final, 1.0 - proof.unexplained()
+    values = proved.values()[found.place]
     ranges = {one.symbol: (found.ends[f'low_of_{i}'], found.ends[f'high_of_{i}'])
               for i, one in enumerate(found.stand_in.inputs) if f'low_of_{i}' in found.ends}
     effect = EffectText(found.stand_in, found.terms, values, ranges, explained)
@@ -190,11 +182,11 @@ def _written(estimator: Estimator, found: Sum, proved: Fit, validation: Validati
         Hypothesis(tuple(h.effects[p] for p in kept), h.numbers),
         np.concatenate([np.zeros(0), *(proved.theta_of(p) for p in kept)]), proved.known_z,
         proved.errors, proved.temper)
-    data = yaml.safe_load(model_of(estimator, bare).to_yaml())
+    data = yaml.safe_load(model_of(proof.estimator, bare).to_yaml())
     data['effects'] = [*data.get('effects', ()), {
         'name': effect.name, 'parameters': effect.values()}]
     return Proposal(effect.equation, effect.name, found.stand_in.subsystem, float(explained),
                     effect.ranges, effect.text(), dump_yaml(data),
                     ', '.join(range_texts(effect.ranges, effect.inputs)),
                     proved.settings()[found.place],
-                    {s: (g.rmse_refit, g.rmse_after) for s, g in validation.signals().items()})
+                    {s: (g.rmse_refit, g.rmse_after) for s, g in proof.signals().items()})

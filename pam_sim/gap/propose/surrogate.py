@@ -28,7 +28,6 @@ from typing import Any
 
 import numpy as np
 from pam_sim.effects.registry import get_effect
-from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.signals import READABLE
 from pam_sim.gap.data.split import FIT, SELECT
 from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
@@ -88,8 +87,7 @@ def in_words(surrogate: Mapping[str, Any]) -> str:
             'these is shown to be the cause.')
 
 
-def add_surrogate(result: GapResult, context: SearchContext, base: Fit, held_out: Recording,
-                  whole: bool, seed: int = 0) -> None:
+def add_surrogate(result: GapResult, context: SearchContext, validation: Validation) -> None:
     """
     Set the surrogate of a result, if one is wanted and the certify data confirm it.
 
@@ -101,20 +99,14 @@ def add_surrogate(result: GapResult, context: SearchContext, base: Fit, held_out
         With its verdict and its proposal.
     context : SearchContext
         Of the search.
-    base : Fit
-        The numbers calibrated on all data of the search.
-    held_out : Recording
-        Of the proof.
-    whole : bool
-        All of it is the certify part; otherwise its certify blocks.
-    seed : int
-        Of the draws of the floor.
+    validation : Validation
+        With the numbers calibrated on all data of the search.
 
     """
     if result.verdict != 'unknown' or result.proposal is not None:
         return
     both = context.estimator.using(FIT, SELECT)
-    current = base
+    base = current = validation.base
     for problem in both.problems:
         # It adds up its errors: what lowers the drift of one motion raises that of another.
         if problem.subsystem == 'valve' and both.rig.valve == 'hsv':
@@ -126,14 +118,14 @@ def add_surrogate(result: GapResult, context: SearchContext, base: Fit, held_out
             Hypothesis((*current.hypothesis.effects, *found.hypothesis.effects),
                        (*current.hypothesis.numbers, *found.hypothesis.numbers)),
             np.concatenate([current.theta, found.theta]), current))
-        if _is_proved(Validation(held_out, whole, both, current, added, seed), problem):
+        if _is_proved(validation.of(added, current, both), problem):
             current = added
     if current is base:
         return
-    validation = Validation(held_out, whole, both, base, current, seed)
+    proof = validation.of(current, base, both)
     result.surrogate = Surrogate(
-        current.hypothesis.names, float(1.0 - validation.unexplained()),
-        {s: (g.rmse_refit, g.rmse_after) for s, g in validation.signals().items()},
+        current.hypothesis.names, float(1.0 - proof.unexplained()),
+        {s: (g.rmse_refit, g.rmse_after) for s, g in proof.signals().items()},
         model_of(both, current).to_yaml())
     result.remarks.append(in_words(result.surrogate.to_dict()))
 

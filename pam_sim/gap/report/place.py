@@ -31,8 +31,6 @@ import numpy as np
 from pam_sim.effects.registry import effects, get_effect
 from pam_sim.gap.criteria import Criteria
 from pam_sim.gap.data.recording import Recording
-from pam_sim.gap.fit.estimator import Estimator
-from pam_sim.gap.fit.hypothesis import Fit
 from pam_sim.gap.report.by_subsystem import subsystem_of
 from pam_sim.gap.report.condition import condition_of
 from pam_sim.gap.report.encoder import sensor_part
@@ -44,7 +42,6 @@ from pam_sim.gap.select.search import Outcome
 from pam_sim.gap.subsystems.effects import acts_on
 from pam_sim.gap.verify.model import held_without, model_of
 from pam_sim.gap.verify.own_runs import largest, OwnRuns
-from pam_sim.gap.verify.validation import Validation
 
 UNTOLD = 0.5                 # certainty of one of two subsystems that no signal tells apart
 T_OF_DOUBT = 1.0             # deviations by which a rival must be behind before it counts as such
@@ -85,8 +82,7 @@ class Evidence:
     criteria: Criteria
 
 
-def places(result: GapResult, outcome: Outcome, estimator: Estimator, validation: Validation,
-           runs: OwnRuns, final: Fit, whole: bool) -> list[Share]:
+def places(result: GapResult, outcome: Outcome, runs: OwnRuns) -> list[Share]:
     """
     Return the rows of ``where``: the place first, then how the gap of the whole chain divides.
 
@@ -96,16 +92,8 @@ def places(result: GapResult, outcome: Outcome, estimator: Estimator, validation
         With its verdict and the verdicts by subsystem.
     outcome : Outcome
         Of the search.
-    estimator : Estimator
-        That the final model was fitted to.
-    validation : Validation
-        Of the final model.
     runs : OwnRuns
-        On the certify data.
-    final : Fit
-        The final model.
-    whole : bool
-        As of the Validation.
+        Of the final model, on the certify data.
 
     Returns
     -------
@@ -113,9 +101,12 @@ def places(result: GapResult, outcome: Outcome, estimator: Estimator, validation
         Empty where there is no gap.
 
     """
+    validation = runs.validation
+    estimator, final = validation.estimator, validation.final
+
     def moved(w: NamedEffect) -> Mapping[str, float]:
         others = [o.name for o in outcome.named if o is not w]
-        return validation.moved(held_without(final, others), whole)
+        return validation.moved(held_without(final, others))
 
     model, recording = model_of(estimator, final), validation.recording
     encoder = None

@@ -20,11 +20,10 @@ back to the calibrated one. Nothing is fitted to the certify data, nor chosen by
 does there.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from pam_sim.gap.fit.estimator import Estimator
-from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
+from pam_sim.gap.fit.hypothesis import Hypothesis
 from pam_sim.gap.select.rival import NamedEffect
 from pam_sim.gap.subsystems.effects import shows
 from pam_sim.gap.subsystems.problem import SubsystemProblem
@@ -42,24 +41,17 @@ class Harm:
     after: float
 
 
-def without_harm(named: Sequence[NamedEffect], estimator: Estimator, base: Fit, final: Fit,
-                 validation: Validation, validated: Callable[[Fit], Validation]
-                 ) -> tuple[list[NamedEffect], Fit, Validation, list[Harm]]:
+def without_harm(named: Sequence[NamedEffect], validation: Validation
+                 ) -> tuple[list[NamedEffect], Validation, list[Harm]]:
     """
-    Return what may be added, the final model with it, its validation, and what was left out.
+    Return what may be added, the validation of the model with it, and what was left out.
 
     Parameters
     ----------
     named : list of NamedEffect
         What was added.
-    estimator : Estimator
-        That they were fitted to.
-    base, final : Fit
-        Numbers calibrated alone, and the final model.
     validation : Validation
         Of the final model.
-    validated : callable
-        ``validated(fit)``: the Validation of another final model.
 
     """
     left, harms = list(named), []
@@ -69,13 +61,13 @@ def without_harm(named: Sequence[NamedEffect], estimator: Estimator, base: Fit, 
             break
         signals = validation.signals()
         signal = max(worse, key=lambda s: signals[s].rmse_after / signals[s].rmse_refit)
-        gone = _makers(signal, final.hypothesis, [w.name for w in left], estimator.problems)
+        gone = _makers(signal, validation.final.hypothesis, [w.name for w in left],
+                       validation.estimator.problems)
         harms.append(Harm(tuple(gone), signal, signals[signal].rmse_refit,
                           signals[signal].rmse_after))
-        final = less(gone, estimator, base, final)
         left = [w for w in left if w.name not in gone]
-        validation = validated(final)
-    return left, final, validation, harms
+        validation = validation.of(less(gone, validation))
+    return left, validation, harms
 
 
 def _makers(signal: str, hypothesis: Hypothesis, names: Sequence[str],

@@ -14,14 +14,17 @@
 
 """Whether effects move a signal by enough to be worth a name."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from pam_sim.annotations import BoolArray, FloatArray
 from pam_sim.gap.criteria import CRITERIA, Criteria
 from pam_sim.gap.data.noise import noise_of
 from pam_sim.gap.data.recording import Recording
-from pam_sim.gap.data.split import SETTLE_S
+from pam_sim.gap.data.split import SETTLE_S, settling_s, split_of
+from pam_sim.gap.fit.estimator import Estimator
+from pam_sim.gap.fit.hypothesis import Fit
+from pam_sim.gap.verify.model import free_run_of, held_without
 
 
 def is_material(own: Mapping[str, float], refitted: Mapping[str, float], materiality: float,
@@ -52,6 +55,38 @@ def is_material(own: Mapping[str, float], refitted: Mapping[str, float], materia
         max(own.values(), default=0.0) > materiality
         and left > min(materiality,
                        criteria.found_again_sd if found_again else criteria.visible_sd))
+
+
+def materiality_on(recording: Recording, whole: bool, estimator: Estimator, materiality: float
+                   ) -> Callable[[Fit, Fit], bool]:
+    """
+    Return whether one fit differs from another by enough for a name, as a function of the two.
+
+    Parameters
+    ----------
+    recording : Recording
+        Of the proof; its input alone is used.
+    whole : bool
+        All of it is the certify part; otherwise its certify blocks.
+    estimator : Estimator
+        That the fits are made by.
+    materiality : float
+        As of ``is_material``.
+
+    """
+    unused_s = split_of(recording, criteria=estimator.criteria).unused_s
+    settled = {s: recording.time_s[s] > (settling_s(recording, s) if whole else unused_s(s))
+               for s in recording.signals}
+
+    def matters(found: Fit, without: Fit) -> bool:
+        bare = held_without(found, without.hypothesis.names)
+        run, *others = (free_run_of(estimator, f, recording) for f in (found, bare, without))
+        own, refitted = (moved(recording, run, o, settled) for o in others)
+        is_number = len(bare.theta) == len(found.theta)
+        return is_material(refitted if is_number else own, refitted, materiality,
+                           criteria=estimator.criteria)
+
+    return matters
 
 
 def moved(recording: Recording, first: Mapping[str, FloatArray], second: Mapping[str, FloatArray],

@@ -91,22 +91,20 @@ class Notice:
         return large
 
 
-def notices(runs: OwnRuns, estimator: Estimator, found: Fit, seed: int = 0) -> list[Notice]:
+def notices(runs: OwnRuns, seed: int = 0) -> list[Notice]:
     """
-    Return what the recordings show of a fit, signal by signal.
+    Return what the recordings show that the calibrated model does not, signal by signal.
 
     Parameters
     ----------
     runs : OwnRuns
-        Each subsystem on its own measured inputs, on the certify data.
-    estimator : Estimator
-        That the fit was made by. Its data count as well where a flow is integrated.
-    found : Fit
-        The model that is tested.
+        Each subsystem on its own measured inputs, on the certify data. The searched data count as
+        well where a flow is integrated.
     seed : int
         Of the draws of noise.
 
     """
+    estimator, found = runs.validation.estimator, runs.validation.base
     doubt = _doubt(estimator, found)
     tested = []
     for (problem, rig, known), searched in zip(runs.at(found), estimator.problems):

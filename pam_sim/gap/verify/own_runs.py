@@ -27,7 +27,6 @@ import numpy as np
 from pam_sim.annotations import BoolArray, FloatArray
 from pam_sim.gap.data.signals import UNIT
 from pam_sim.gap.data.split import CERTIFY, settling_s
-from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit
 from pam_sim.gap.result import SignalGap
 from pam_sim.gap.subsystems.known import SKEW_MAX_S
@@ -45,31 +44,27 @@ class OwnRuns:
     Parameters
     ----------
     validation : Validation
-        Has the recording.
-    whole : bool
-        As of the Validation.
-    estimator : Estimator
-    base, final : Fit
-        Numbers calibrated alone, and the final model.
-    seed : int
-        Of the draws that carry input noise into the floor.
+        With the recording, the calibrated and the final model.
 
     Attributes
     ----------
+    validation : Validation
+        As given.
     gaps : dict of str -> dict of str -> SignalGap
         By subsystem (``valve``, ``muscle``: muscle and load) and signal.
 
     """
 
-    def __init__(self, validation: Validation, whole: bool, estimator: Estimator, base: Fit,
-                 final: Fit, seed: int = 0) -> None:
-        self._whole, self._estimator, self._final = whole, estimator, final
+    def __init__(self, validation: Validation) -> None:
+        self.validation = validation
+        self._whole, self._estimator = validation.whole, validation.estimator
         self._settle_s = {s: settling_s(validation.recording, s)
                           for s in validation.recording.signals}
         self._problems = subsystem_problems(
-            estimator.rig, [validation.recording], False, seed, estimator.criteria
-        ) if whole else estimator.problems
-        before, refit, after = self._given(), self._errors(base), self._errors(final)
+            self._estimator.rig, [validation.recording], False, validation.seed,
+            self._estimator.criteria) if self._whole else self._estimator.problems
+        before, refit, after = (
+            self._given(), self._errors(validation.base), self._errors(validation.final))
         self._refit, self._after = refit, after
         self.gaps = {p.subsystem: {s: SignalGap(
             UNIT[s], p.floor[s], *(_rms(errors[p.subsystem, s]) for errors in (
@@ -82,7 +77,8 @@ class OwnRuns:
 
     def spread(self) -> dict[tuple[str, str], float]:
         """Return the rms by which the final model may be off by its numbers alone."""
-        return spread_of_runs(self._estimator.spread(self._final), self._errors, self._after)
+        return spread_of_runs(
+            self._estimator.spread(self.validation.final), self._errors, self._after)
 
     def searched(self, subsystem: str, signal: str) -> float:
         """Return the rms [SI] that the final model leaves of a signal in the searched data."""
@@ -90,7 +86,7 @@ class OwnRuns:
         if signal not in p.signals:
             return 0.0
         chosen = np.isin(p.part, self._estimator.use) & (p.signal == p.signals.index(signal))
-        return _rms(self._final.errors[subsystem][chosen]) * p.floor[signal]
+        return _rms(self.validation.final.errors[subsystem][chosen]) * p.floor[signal]
 
     def residual(self, subsystem: str, signal: str) -> tuple[FloatArray, FloatArray]:
         """Return (instants [s], errors of the calibrated model, SI) on the certify data."""

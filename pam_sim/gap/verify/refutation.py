@@ -38,8 +38,8 @@ from pam_sim.gap.verify.own_runs import OwnRuns
 from pam_sim.gap.verify.validation import Validation
 
 
-def refute(named: Iterable[NamedEffect], estimator: Estimator, base: Fit, final: Fit,
-           validation: Validation, whole: bool) -> tuple[list[NamedEffect], Fit]:
+def refute(named: Iterable[NamedEffect], validation: Validation
+           ) -> tuple[list[NamedEffect], Fit]:
     """
     Drop from sets of names those that the certify data contradict.
 
@@ -47,14 +47,8 @@ def refute(named: Iterable[NamedEffect], estimator: Estimator, base: Fit, final:
     ----------
     named : list of NamedEffect
         What was added.
-    estimator : Estimator
-        That they were fitted to.
-    base, final : Fit
-        Numbers calibrated alone, and the final model, with the first name of every set.
     validation : Validation
-        Of the final model.
-    whole : bool
-        As of the Validation.
+        Of the final model, with the first name of every set.
 
     Returns
     -------
@@ -64,20 +58,21 @@ def refute(named: Iterable[NamedEffect], estimator: Estimator, base: Fit, final:
         The final model with these.
 
     """
-    criteria, kept = estimator.criteria, []
+    criteria, final, kept = validation.estimator.criteria, validation.final, []
     for w in named:
-        fits = _comparable(w, estimator, final)
+        fits = _comparable(w, validation.estimator, final)
         if not fits:
             kept.append(w)
             continue
-        runs = {name: validation.run(found, whole) for name, found in fits.items()}
-        before = validation.run(less([w.name], estimator, base, final), whole)
+        runs = {name: validation.run(found) for name, found in fits.items()}
+        before = validation.run(less([w.name], validation, final))
         told = {name: validation.fall(before, run) for name, run in runs.items()}
         best = max(told, key=lambda name: told[name][0] * told[name][1] ** 2)
         form = math.sqrt(1.0 - criteria.named_share) * told[best][1]
+        left = min(form, validation.left()) if validation.whole and best == w.name else form
         gone = {name for name in runs if name != best and _contradicted(
-            validation, runs[name], runs[best], min(form, validation.left())
-            if whole and best == w.name and _is_behind(w, name, criteria) else form, criteria)}
+            validation, runs[name], runs[best],
+            left if _is_behind(w, name, criteria) else form, criteria)}
         names = tuple(n for n in w.names if n not in gone)
         # The recordings hardly tell them apart: where the certify data do not find the first
         # again, but another, that one is likelier.
@@ -91,14 +86,14 @@ def refute(named: Iterable[NamedEffect], estimator: Estimator, base: Fit, final:
     return kept, final
 
 
-def unconfirmed(named: Sequence[NamedEffect], estimator: Estimator, base: Fit, final: Fit,
-                validation: Validation, whole: bool) -> tuple[str | None, Fit]:
+def unconfirmed(named: Sequence[NamedEffect], validation: Validation
+                ) -> tuple[str | None, Fit]:
     """
     Return the name that the certify data speak against most, and the fit without it.
 
     Parameters
     ----------
-    named, estimator, base, final, validation, whole
+    named, validation
         As of ``refute``.
 
     Returns
@@ -112,9 +107,9 @@ def unconfirmed(named: Sequence[NamedEffect], estimator: Estimator, base: Fit, f
         The other names, everything refitted; the final model where there is no such name.
 
     """
-    criteria = estimator.criteria
-    fits = {w.name: less([w.name], estimator, base, final) for w in named}
-    runs = {name: validation.run(fit, whole) for name, fit in fits.items()}
+    criteria = validation.estimator.criteria
+    fits = {w.name: less([w.name], validation) for w in named}
+    runs = {name: validation.run(fit) for name, fit in fits.items()}
     told = {name: validation.fall(run, validation.after) for name, run in runs.items()}
     # Beside a large effect whose form leaves more than that, a small one cannot be judged.
     least = max(criteria.visible_sd, validation.left() if len(named) > 1 else 0.0)
@@ -124,13 +119,12 @@ def unconfirmed(named: Sequence[NamedEffect], estimator: Estimator, base: Fit, f
                and 1.0 - fell > criteria.certain_sd * validation.doubt(
                    runs[name], validation.after)}
     if not against:
-        return None, final
+        return None, validation.final
     name = min(against, key=lambda name: against[name])
     return name, fits[name]
 
 
-def refuted_alone(named: Sequence[NamedEffect], estimator: Estimator, base: Fit, final: Fit,
-                  runs: OwnRuns) -> tuple[str | None, Fit]:
+def refuted_alone(named: Sequence[NamedEffect], runs: OwnRuns) -> tuple[str | None, Fit]:
     """
     Return the name of the valve that its own run on the certify data speaks against most.
 
@@ -139,8 +133,8 @@ def refuted_alone(named: Sequence[NamedEffect], estimator: Estimator, base: Fit,
 
     Parameters
     ----------
-    named, estimator, base, final
-        As of ``refute``.
+    named : list of NamedEffect
+        What was added.
     runs : OwnRuns
         Of the final model.
 
@@ -150,17 +144,17 @@ def refuted_alone(named: Sequence[NamedEffect], estimator: Estimator, base: Fit,
         As of ``unconfirmed``.
 
     """
-    criteria = estimator.criteria
-    fits = {w.name: less([w.name], estimator, base, final)
-            for w in named if w.subsystem == 'valve'}
+    validation = runs.validation
+    criteria = validation.estimator.criteria
+    fits = {w.name: less([w.name], validation) for w in named if w.subsystem == 'valve'}
     against = {}
     for name, fit in fits.items():
-        fell, apart, doubt = runs.fall('valve', fit, final)
+        fell, apart, doubt = runs.fall('valve', fit, validation.final)
         if (fell < 0.0 and apart > criteria.visible_sd
                 and 1.0 - fell > criteria.certain_sd * doubt):
             against[name] = fell
     if not against:
-        return None, final
+        return None, validation.final
     name = min(against, key=lambda name: against[name])
     return name, fits[name]
 
@@ -193,9 +187,14 @@ def _comparable(w: NamedEffect, estimator: Estimator, final: Fit) -> dict[str, F
             if r.name in w.names and set(r.found.hypothesis.names) - {r.name} == beside}
 
 
-def less(names: Collection[str], estimator: Estimator, base: Fit, final: Fit) -> Fit:
-    """Return the final fit without some names, its numbers refitted; ``base`` without any."""
+def less(names: Collection[str], validation: Validation, final: Fit | None = None) -> Fit:
+    """
+    Return a final fit without some names, its numbers refitted; the calibrated one without any.
+
+    ``final`` is that of the validation if none is given.
+    """
+    final = validation.final if final is None else final
     h = final.hypothesis
     bare = held_without(final, set(h.names) - set(names))
     left = Hypothesis(bare.hypothesis.effects, tuple(f for f in h.numbers if f not in names))
-    return estimator.fit(left, bare.theta, final) if left.names else base
+    return validation.estimator.fit(left, bare.theta, final) if left.names else validation.base

@@ -20,7 +20,6 @@ from typing import TypeVar
 
 import numpy as np
 from pam_sim.annotations import FloatArray
-from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit
 from pam_sim.gap.verify.validation import Validation
 
@@ -29,21 +28,14 @@ Signal = TypeVar('Signal', str, tuple[str, str])
 SMALL_STEP = 0.3             # of a number, in its standard deviation
 
 
-def spread_of_numbers(validation: Validation, estimator: Estimator, base: Fit, whole: bool
-                      ) -> dict[str, float]:
+def spread_of_numbers(validation: Validation) -> dict[str, float]:
     """
     Return what the calibrated model may be off on the certify data by its numbers alone.
 
     Parameters
     ----------
     validation : Validation
-        Of the final model.
-    estimator : Estimator
-        That it was fitted to.
-    base : Fit
-        Numbers calibrated alone.
-    whole : bool
-        As of the Validation.
+        With the calibrated model.
 
     Returns
     -------
@@ -53,10 +45,9 @@ def spread_of_numbers(validation: Validation, estimator: Estimator, base: Fit, w
     """
     def run(found: Fit) -> dict[str, FloatArray]:
         validation.simulations += 1
-        return {s: values[validation.part[s]] for s, values in validation.run(
-            found, whole).items()}
+        return {s: values[validation.part[s]] for s, values in validation.run(found).items()}
 
-    return spread_of_runs(estimator.spread(base), run, {
+    return spread_of_runs(validation.estimator.spread(validation.base), run, {
         s: values[validation.part[s]] for s, values in validation.refit.items()})
 
 

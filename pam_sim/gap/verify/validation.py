@@ -85,35 +85,47 @@ class Validation:
         that a run of its own starts from, into the floor; or the noise of a pressure that is
         given.
 
+    Attributes
+    ----------
+    recording, whole, estimator, base, final, seed
+        As given.
+
     """
 
     def __init__(self, recording: Recording, whole: bool, estimator: Estimator, base: Fit,
                  final: Fit, seed: int = 0) -> None:
-        self.recording, self.estimator = recording, estimator
+        self.recording, self.whole, self.estimator = recording, whole, estimator
+        self.base, self.final, self.seed = base, final, seed
         split = split_of(recording, criteria=estimator.criteria)
         self.part = {s: recording.tells(s, recording.time_s[s]) & (
             recording.time_s[s] > settling_s(recording, s) if whole else
             split.part_of(recording.time_s[s], s) == CERTIFY) for s in recording.signals}
         self.before = free_run(estimator.rig, recording)
-        self.refit, self.after = self.run(base, whole), self.run(final, whole)
+        self.refit, self.after = self.run(base), self.run(final)
         self.simulations = 3
         seen = {s: noise_of(recording.time_s[s], recording.measured[s]) for s in recording.signals}
         # It is the same sensor, and a recording without rest hides its slow noise.
         self._slow = {s: 0.0 if seen[s].slow_sd > 0.0 else self._slow_elsewhere(s) for s in seen}
         self.noise = {s: float(np.hypot(seen[s].sd, self._slow[s])) for s in seen}
-        self.drift = self._drift(final, whole, seed)
+        self.drift = self._drift()
         # A valve that adds up its errors drifts: one run may be off by far more than the mean.
         self.floor, self.highest_floor = self._floors()
 
-    def run(self, found: Fit, whole: bool, stamp_shift_s: FloatArray | None = None,
+    def of(self, final: Fit, base: Fit | None = None, estimator: Estimator | None = None
+           ) -> 'Validation':
+        """Return that of another final model, and of another calibrated one, if one is given."""
+        return Validation(self.recording, self.whole, estimator or self.estimator,
+                          base or self.base, final, self.seed)
+
+    def run(self, found: Fit, stamp_shift_s: FloatArray | None = None,
             start_error_pa: float = 0.0, pressure_noise_pa: float | FloatArray = 0.0
             ) -> dict[str, FloatArray]:
         """Return the free run of a fit at the stamps, by signal."""
         _, measurement = numbers_of(self.estimator, found)
-        start = start_error_pa if whole else measurement.get('start_error', 0.0)
+        start = start_error_pa if self.whole else measurement.get('start_error', 0.0)
         run = free_run_of(self.estimator, found, self.recording, start, stamp_shift_s,
                           pressure_noise_pa)
-        return self._aligned(run, late_by(measurement)) if whole else run
+        return self._aligned(run, late_by(measurement)) if self.whole else run
 
     def _aligned(self, run: Mapping[str, FloatArray], late_s: Mapping[str, float]
                  ) -> dict[str, FloatArray]:
@@ -161,9 +173,9 @@ class Validation:
         return {s: math.sqrt(max(self.floor[s] ** 2 - less * float(np.mean(
             [np.mean(d[s] ** 2) for d in self.drift])), 0.0)) for s in self.floor}
 
-    def moved(self, found: Fit, whole: bool) -> dict[str, float]:
+    def moved(self, found: Fit) -> dict[str, float]:
         """Return by signal how far the final model moves it from a fit's, in sensor noise."""
-        return moved(self.recording, self.after, self.run(found, whole), self.part)
+        return moved(self.recording, self.after, self.run(found), self.part)
 
     def fall(self, worse: Mapping[str, FloatArray], better: Mapping[str, FloatArray]
              ) -> tuple[float, float]:
@@ -247,20 +259,20 @@ class Validation:
         error = (simulated[signal] - self.recording.measured[signal])[self.part[signal]]
         return float(np.sqrt(np.mean(error ** 2)))
 
-    def _drift(self, final: Fit, whole: bool, seed: int) -> list[dict[str, FloatArray]]:
+    def _drift(self) -> list[dict[str, FloatArray]]:
         """Return by signal, for some draws, how far errors of the input move the final run."""
-        random, r = np.random.default_rng(seed), self.recording
+        random, r = np.random.default_rng(self.seed), self.recording
         found: list[dict[str, FloatArray]] = []
         start_sd = start_error_sd(r)
         noise = self._pressure_noise() if r.pressure_given else None
         for _ in range(INPUT_DRAWS):
             if noise is not None:
                 drift_pa = DRIFT_SD * noise.sd * random.standard_normal()
-                moved = self.run(final, whole, pressure_noise_pa=drift_pa + noise.draw(
+                moved = self.run(self.final, pressure_noise_pa=drift_pa + noise.draw(
                     r.time_s['pressure'], random))
             else:
                 shift = r.stamp_sd_s(STAMP_SD_S) * random.standard_normal(r.messages)
-                moved = self.run(final, whole, shift, start_sd * random.standard_normal())
+                moved = self.run(self.final, shift, start_sd * random.standard_normal())
             self.simulations += 1
             found.append({s: moved[s] - self.after[s] for s in r.signals})
         return found

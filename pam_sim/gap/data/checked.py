@@ -1,0 +1,82 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Recordings as a question may use them: commands known, holes split off, health looked at."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from pam_sim.gap.criteria import CRITERIA, Criteria
+from pam_sim.gap.data.commanded import all_commanded
+from pam_sim.gap.data.health import check_for, without_dead
+from pam_sim.gap.data.holes import split_at_holes
+from pam_sim.gap.data.overlap import check_apart
+from pam_sim.gap.data.recording import Recording
+from pam_sim.gap.data.resting import rest_of
+from pam_sim.rig import Rig
+from pam_sim.run import Run
+
+
+@dataclass(frozen=True)
+class CheckedRuns:
+    """
+    What of the recordings is used.
+
+    Parameters
+    ----------
+    runs : list of Run
+        To search, the parts between holes.
+    certify : Run or None
+        For the validation, None where it is a part of the first run.
+    refusals : list of str
+        Why they cannot be compared with the model; empty where they can.
+    remarks : list of str
+        Sentences on what was left out or is weak.
+
+    """
+
+    runs: list[Run]
+    certify: Run | None
+    refusals: list[str]
+    remarks: list[str]
+
+
+def checked_runs(runs: Run | Sequence[Run], certify: Run | None, rig: Rig,
+                 criteria: Criteria = CRITERIA) -> CheckedRuns:
+    """
+    Return what of the recordings is used, and what is said of them.
+
+    Raises
+    ------
+    InputError
+        The recording for the validation is one of those that are searched.
+
+    """
+    runs = [runs] if isinstance(runs, Run) else list(runs)
+    if certify is not None:
+        check_apart(runs, certify, criteria)
+    runs, certify, told = all_commanded(runs, certify, rig)
+    runs, certify, holes, refusals = split_at_holes(
+        runs, certify, criteria.min_duration_s, rig.is_driven)
+    health = [check_for(run, rig, criteria)
+              for run in [*runs, *([certify] if certify else [])]]
+    refusals += list(dict.fromkeys(p for h in health for p in h.problems))
+    remarks = told + holes + list(dict.fromkeys(r for h in health for r in h.remarks))
+    return CheckedRuns(runs, certify, refusals, remarks)
+
+
+def recording_of(run: Run, rig: Rig, criteria: Criteria = CRITERIA) -> Recording:
+    """Return a recording without dead sensors, and without the force of a load at rest."""
+    run = without_dead(run)
+    return Recording(run, rig.valve, rig.is_driven, rest=rest_of(run, rig, criteria))
