@@ -24,8 +24,6 @@ from pam_sim.errors import InputError
 from pam_sim.gap.criteria import CRITERIA
 from pam_sim.gap.data.commanded import commanded
 from pam_sim.gap.data.signals import UNIT
-from pam_sim.gap.subsystems.effects import subsystem_of_number
-from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.gap.verify.uncertainty import NORMAL_95
 from pam_sim.identify.advice import next_experiment, where_open
 from pam_sim.identify.fit import fit, NOWHERE, Weighted
@@ -35,9 +33,10 @@ from pam_sim.identify.judgement import (
 from pam_sim.identify.numbers import (
     known_numbers_of, Number, unknown_numbers, with_values)
 from pam_sim.identify.possible import (
-    counted_in, in_other_forms, is_incomplete, possible_effects, SEEN_FLOORS2)
+    in_other_forms, is_incomplete, possible_effects, SEEN_FLOORS2)
 from pam_sim.identify.profile import Interval, profile
 from pam_sim.identify.records import offers_of, problems_of
+from pam_sim.identify.remarks import of_one_scale, remarks_on, Squares
 from pam_sim.identify.result import Found, half_width, Identification
 from pam_sim.identify.secant import settle, solve_from
 from pam_sim.identify.settled import beside_settled_zero, with_settled_zero
@@ -50,7 +49,6 @@ from pam_sim.tolerance import AbsoluteSd, UNKNOWN
 LAW_AND_EFFECT = ('something is missing from the model, and without a recorded force it is not '
                   'told from the force law')
 Progress = Callable[[float], object]
-Squares = list[tuple[SubsystemProblem, str, float]]
 RETURNS = 4                  # to the fit, where a profile met a better solution
 
 
@@ -135,13 +133,8 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
         possible = possible_effects(rig, problems, numbers)
         weighted = Weighted(rig, problems, [*numbers, *possible], incomplete=True)
         x = np.concatenate([x, np.zeros(len(possible))])
-        for _ in range(2):          # full weights first, as in the fit
-            x, _, _ = solve_from(weighted, x)
-        progress(0.4)
-        weighted.retemper(x)
-        weighted, x, forms = in_other_forms(
-            weighted, x, len(acting), _part(progress, 0.4, 0.6))
-        x = settle(weighted, x)
+        weighted, x, forms = _in_each_form(
+            weighted, x, len(acting), _part(progress, 0.3, 0.6))
     progress(0.6)
     x, information, numbers_found, combinations = _judged(
         weighted, x, acting, forms, _part(progress, 0.6, 0.9))
@@ -155,7 +148,6 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
         combinations = joined + [c for c in combinations if not set(more) & set(c.weights)]
         squares = own + [one for one in squares if one[0].subsystem == 'valve']
     left = [(p, name, square) for p, name, square in squares if square > SEEN_FLOORS2]
-    starting = [n.name for n in acting if any(n.acts_in(p) for p, _, _ in left)]
     # A small rest of another formulation bends little; a clear one bends the fit of every edge.
     bent = [n.name for n in acting if any(
         n.acts_in(p) for p, _, square in left if square > CRITERIA.clear_rest)]
@@ -164,18 +156,8 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
         [{'path': one.path, 'kind': one.kind, 'added_kg': one.added_kg} for one in offers],
         _signals(before, _rms(squares)), incomplete, bent=bent)
     result.remarks += [f'{one.path}: {one.rest.text()}' for one in offers if one.rest]
-    result.remarks += remarks + ([] if force_compared else _of_one_scale(acting))
-    result.remarks += _starting_values(left, [name for name in starting if name not in at_rest])
-    result.remarks += [one.edge() for one in numbers_found if one.at_edge]
-    result.remarks += _of_another_law(rig, left)
-    result.remarks += [f'{name}: from the holds, where the regulator has settled; no effect of '
-                       'the library explains its edges' for name in at_rest]
-    result.remarks += [
-        f'{name}: {effect.name} would look the same and counts in; a recorded force tells them '
-        'apart' for effect, name in counted_in(problems, acting)]
-    result.remarks += [
-        f'{n.name}: nothing in these recordings depends on it; {_what_shows(n)}'
-        for n in wanted if n not in acting]
+    result.remarks += remarks + ([] if force_compared else of_one_scale(acting))
+    result.remarks += remarks_on(rig, problems, wanted, numbers_found, left, at_rest)
     # What ends at the edge of its range needs another model rather than another recording.
     if advise and (any(not one.is_narrow for one in numbers_found) or len(acting) < len(wanted)):
         with_force = any('force' in one.recording.signals for one in offers)
@@ -231,17 +213,23 @@ def _judged(weighted: Weighted, x: FloatArray, acting: Sequence[Number], forms: 
     return x, information, found, combinations
 
 
-def _without_valve(weighted: Weighted, x: FloatArray, count: int, progress: Progress
-                   ) -> tuple[dict[str, Found], list[Combination], Squares]:
-    """Return (numbers by name, combinations, mean squares) of muscle and load alone."""
-    acting = weighted.numbers[:count]
+def _in_each_form(weighted: Weighted, x: FloatArray, count: int, progress: Progress
+                  ) -> tuple[Weighted, FloatArray, FloatArray]:
+    """Return (problem, solution, doubt of each first number by the formulation of effects)."""
     forms: FloatArray = np.zeros(count)
     for _ in range(2):          # full weights first, as in the fit
         x, _, _ = solve_from(weighted, x)
     if weighted.incomplete:
         weighted.retemper(x)
-        weighted, x, forms = in_other_forms(weighted, x, count, _part(progress, 0.0, 0.5))
-    x = settle(weighted, x)
+        weighted, x, forms = in_other_forms(weighted, x, count, progress)
+    return weighted, settle(weighted, x), forms
+
+
+def _without_valve(weighted: Weighted, x: FloatArray, count: int, progress: Progress
+                   ) -> tuple[dict[str, Found], list[Combination], Squares]:
+    """Return (numbers by name, combinations, mean squares) of muscle and load alone."""
+    acting = weighted.numbers[:count]
+    weighted, x, forms = _in_each_form(weighted, x, count, _part(progress, 0.0, 0.5))
     x, _, found, combinations = _judged(weighted, x, acting, forms, _part(progress, 0.5, 1.0))
     return ({one.number.name: one for one in found}, combinations, weighted.mean_squares(x))
 
@@ -263,41 +251,6 @@ def _profiles(weighted: Weighted, x: FloatArray, count: int, progress: Progress
         else:
             break
     return x, covariance, slopes, intervals
-
-
-def _of_one_scale(acting: Sequence[Number]) -> list[str]:
-    """Return a sentence where force law and load may grow together without a trace."""
-    unknown = [n for n in acting if n.unknown]
-    if not (any(n.of_law for n in unknown) and any(n.name == 'mass_kg' for n in unknown)):
-        return []
-    return ['force law and mass are unknown: a stronger muscle with a heavier load moves alike. '
-            'State the mass, or record a force']
-
-
-def _starting_values(left: Squares, names: Sequence[str]) -> list[str]:
-    """Return a sentence on the numbers whose signals are not explained even with effects."""
-    if not names:
-        return []
-    rests = ' and '.join(f'{name} {math.sqrt(square):.1f} noise floors (rms)'
-                         for _, name, square in left)
-    return [f'{", ".join(names)}: a starting value. No effect of the library explains what is '
-            f'left of {rests}, and it may act alike; the interval allows for that']
-
-
-def _of_another_law(rig: Rig, left: Squares) -> list[str]:
-    """Return a sentence where the muscle leaves a clear gap and its force law is stated."""
-    clear = any(p.subsystem == 'muscle' and square > CRITERIA.clear_rest for p, _, square in left)
-    if not clear or rig.unknown_of_law:
-        return []
-    return ['muscle and load leave a clear gap with the stated force law. If it was measured on '
-            'another muscle, state it as unknown: pam rig new --unknown law']
-
-
-def _what_shows(number: Number) -> str:
-    if number.name == 'force_zero_n':
-        return 'record a force'
-    valve = subsystem_of_number(number.name) == 'valve'
-    return 'record a `valve_signal` or `pressure_command`' if valve else 'record a contraction'
 
 
 def _identified(rig: Rig, found: Sequence[Found]) -> Rig:

@@ -22,7 +22,7 @@ import numpy as np
 from pam_actuation.report.identify import page
 from pam_sim import load_rig
 from pam_sim.errors import InputError
-from pam_sim.identify import identify, workflow
+from pam_sim.identify import identify, remarks
 from pam_sim.identify.before_gap import numbers_first
 from pam_sim.identify.numbers import unknown_numbers
 from pam_sim.identify.possible import possible_effects
@@ -101,11 +101,11 @@ def test_law_and_mass_without_a_force_are_said_to_grow_together():
 
 def test_a_clear_gap_of_the_muscle_asks_about_a_stated_law():
     muscle, valve = SimpleNamespace(subsystem='muscle'), SimpleNamespace(subsystem='valve')
-    asked = workflow._of_another_law(RIG, [(muscle, 'contraction', 400.0)])
+    asked = remarks.of_another_law(RIG, [(muscle, 'contraction', 400.0)])
     assert len(asked) == 1 and '--unknown law' in asked[0]
     for rig, problem, square in ((RIG, muscle, 2.0), (RIG, valve, 400.0), (
             RIG.with_(tolerance={'law.a3': math.inf}), muscle, 400.0)):
-        assert workflow._of_another_law(rig, [(problem, 'contraction', square)]) == []
+        assert remarks.of_another_law(rig, [(problem, 'contraction', square)]) == []
 
 
 def test_a_static_map_is_no_possible_effect_beside_an_unknown_law():
