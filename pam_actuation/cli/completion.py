@@ -26,7 +26,14 @@ from typing import Any, TYPE_CHECKING
 if TYPE_CHECKING:
     from pam_actuation.cli.options import Parser
 
-RIG, JOINT, MUSCLE = 'presets', 'joint/presets', 'muscle/sizes'      # folders of pam_sim
+# Folders of pam_sim; of what is registered by its file also where further ones are, and a name
+# that each file assigns.
+RIG, JOINT, MUSCLE = 'presets', 'joint/presets', 'muscle/sizes'
+REGULATOR = 'valve/regulators'
+LAW = 'muscle/laws', 'PAM_MUSCLE_LAWS_PATH', 'LAW'
+LOAD = 'load', 'PAM_LOADS_PATH', 'NAME'
+EFFECT = 'effects', 'PAM_EFFECTS_PATH', 'EFFECT'
+BUILT_IN = ('antagonistic_joint', 'hsv', 'ppr', 'sensors')      # models without a file each
 ASKED = '_ARGCOMPLETE'      # in the environment while a shell asks
 
 
@@ -80,7 +87,10 @@ def _names_for(verb: str, argument: str) -> Names | None:
     if (verb, argument) in (('nodes', 'name'), ('status', 'name'), ('param', 'node')):
         return nodes
     if (verb, argument) == ('models', 'name'):
-        return lambda: presets(RIG) + presets(JOINT) + presets(MUSCLE)
+        return lambda: [*BUILT_IN, *presets(RIG), *presets(JOINT), *presets(MUSCLE),
+                        *declared(*LAW), *declared(*LOAD), *declared(*EFFECT)]
+    if verb == 'rig' and argument in OF_RIG:
+        return OF_RIG[argument]
     return None
 
 
@@ -96,12 +106,40 @@ def presets(folder: str) -> list[str]:
     return NamedFiles(folder).names()
 
 
+def declared(folder: str, variable: str, mark: str) -> list[str]:
+    """
+    Return the names of laws, loads or effects, each a file with a certain line.
+
+    Parameters
+    ----------
+    folder : str
+        Of ``pam_sim``.
+    variable : str
+        Environment variable with further folders.
+    mark : str
+        The name that each such file assigns.
+
+    """
+    from pathlib import Path
+
+    import pam_sim
+    own = str(Path(pam_sim.__file__).parent / folder)
+    further = filter(None, os.environ.get(variable, '').split(os.pathsep))
+    return sorted({path.stem for place in (own, *further) for path in Path(place).glob('*.py')
+                   if f'\n{mark} = ' in path.read_text(encoding='utf-8')})
+
+
 def nodes() -> list[str]:
     """Return the names of the nodes, each a module with a main function."""
     from pathlib import Path
     folder = Path(__file__).resolve().parent.parent / 'nodes'
     return sorted(path.stem for path in folder.glob('*.py')
                   if '\ndef main(' in path.read_text(encoding='utf-8'))
+
+
+OF_RIG: dict[str, Names] = {
+    'muscle': lambda: presets(MUSCLE), 'load': lambda: declared(*LOAD),
+    'regulator': lambda: presets(REGULATOR)}
 
 
 def _with_files(names: Names) -> Callable[..., list[str]]:

@@ -20,6 +20,7 @@ from typing import Any, TYPE_CHECKING
 
 from pam_actuation.cli.common import (
     add_overwrite_option, check_outputs, emit, EXIT_DONE, read_line)
+from pam_actuation.cli.completion import presets, REGULATOR
 from pam_actuation.cli.options import number, out_path, Parser, source
 
 if TYPE_CHECKING:
@@ -61,8 +62,8 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument('--valve', metavar='ppr|hsv', default='ppr',
                         help='regulator or pair of on/off valves (default: %(default)s)')
     parser.add_argument('--regulator', type=source, default=None, metavar='NAME',
-                        help='a regulator by the name of its data sheet: festo_veaa_d2, d9, d11, '
-                        'smc_itv1030, smc_itv1050')
+                        help=f'a regulator by the name of its data sheet: '
+                        f'{", ".join(presets(REGULATOR))}')
     parser.add_argument('--regulator-volts', type=source, default=None, metavar='LOW:HIGH',
                         help='range of its input, V; 4-20 mA through 500 ohm is 2:10')
     parser.add_argument('--regulator-kpa', type=source, default=None, metavar='LOW:HIGH',

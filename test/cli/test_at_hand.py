@@ -19,12 +19,15 @@ import os
 import subprocess
 import sys
 
+from pam_actuation.cli import completion
 from pam_actuation.cli.completion import nodes
 from pam_actuation.cli.main import main
 from pam_actuation.cli.overview import VERBS
 from pam_actuation.experiments import load_experiment
 from pam_actuation.resources import list_config
+from pam_sim.catalogue import catalogue
 from pam_sim.errors import did_you_mean
+from pam_sim.load import LOADS
 import pytest
 
 # Hides ROS, as on a machine without it, and then starts a program as the shell would.
@@ -46,7 +49,7 @@ def test_pam_alone_shows_every_verb_and_the_first_steps(capsys):
     assert sorted(set(first_words) - {'pam'}) == sorted(VERBS)
     assert first_words.count('pam') == 5 and 'pam simulate' in shown
     assert max(map(len, shown.splitlines())) <= 99
-    assert len(shown.splitlines()) < 40          # one screen
+    assert len(shown.splitlines()) < 45          # one screen, with room for a verb of one's own
 
 
 @pytest.mark.parametrize('arguments, near', [
@@ -131,6 +134,18 @@ def test_the_shell_is_answered_with_verbs_options_and_names():
         'pid_plain', 'pid_plain_hsv', 'pid_plain_random', 'pid_plain_random_hsv'}
     assert completed('pam nodes valve_') == {'valve_driver', 'valve_watchdog'}
     assert completed('pam param get sofc') == {'sofc_controller'}
+    assert completed('pam rig new --regulator festo_veaa_d1') == {'festo_veaa_d11'}
+    assert completed('pam models cree') == {'creep'}
+
+
+def test_every_model_is_offered_those_of_further_folders_too(monkeypatch, tmp_path):
+    names = completion._names_for('models', 'name')
+    assert sorted(names()) == sorted({entry['name'] for entry in catalogue()})
+    tmp_path.joinpath('twofold.py').write_text('import math\nEFFECT = 1\n', encoding='utf-8')
+    tmp_path.joinpath('helper.py').write_text('import math\n', encoding='utf-8')
+    monkeypatch.setenv('PAM_EFFECTS_PATH', str(tmp_path))
+    assert 'twofold' in names() and 'helper' not in names()
+    assert sorted(completion.OF_RIG['load']()) == sorted(LOADS)
 
 
 def test_completion_loads_no_simulator():
@@ -139,6 +154,7 @@ def test_completion_loads_no_simulator():
         'from pam_actuation.cli import completion\n' \
         'completion._add_names(build_parser()); completion.configured("experiments")\n' \
         'completion.presets(completion.RIG); completion.nodes()\n' \
+        'completion._names_for("models", "name")()\n' \
         'print([n for n in ("numba", "scipy", "numpy", "matplotlib", "rclpy") ' \
         'if n in sys.modules])'
     done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True)
