@@ -26,6 +26,7 @@ from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.gap import find_gap
 from pam_sim.gap.report.reason import explain
+from pam_sim.gap.report.words import in_words
 from pam_sim.gap.result import Calibrated, GapResult, SignalGap, SubsystemVerdict
 from pam_sim.gap.select.rival import NamedEffect
 from pam_sim.gap.verify.notice import Notice
@@ -53,6 +54,14 @@ def said(verdict, signals, named=(), share=None, effects=(), parameters=(), **mo
                        parameters=list(parameters), **more)
     result.ambiguity_set = list(dict.fromkeys(n for w in named for n in w.names))
     return explain(result, SimpleNamespace(named=list(named), share=share or {}, mistaken={}))
+
+
+@pytest.mark.parametrize('name, words', [
+    ('loop_half_width_at_400kpa_n', 'loop half width at 400 kPa'),
+    ('loss_n_per_m2', 'loss'), ('damping_n_s_per_m', 'damping'), ('speed_m_per_s', 'speed'),
+    ('gain_percent', 'gain percent'), ('force_at_500kpa_10mm', 'force at 500 kPa and 10 mm')])
+def test_a_quantity_in_words_has_no_unit(name, words):
+    assert in_words(name) == words
 
 
 def test_what_grows_rises_and_what_stays_stays():

@@ -14,9 +14,11 @@
 
 """Names of reported quantities in words: the keys of gap.json are for programs."""
 
-# Endings that say the unit, longest first; the value stands with its unit beside them.
-UNIT_ENDINGS = ('_m3_per_s_pa', '_kg_per_s', '_pa_per_s', '_n_per_m', '_m3', '_pa', '_m', '_n',
-                '_s')
+import re
+
+# The ending that says the unit; the value stands with its unit beside the words.
+_UNIT = '(?:m3|m2|m|n|pa|kg|s|j|w|v)'
+_ENDING = re.compile(f'_{_UNIT}(?:_{_UNIT})*(?:_per_{_UNIT}(?:_{_UNIT})*)?$')
 CONDITIONS = {'400kpa': '400 kPa', '500kpa': '500 kPa', '10mm': '10 mm',
               '20mm_per_s': '20 mm/s', '50mm_per_s': '50 mm/s'}
 
@@ -38,7 +40,7 @@ def in_words(name: str) -> str:
     """
     plain = name
     if not name.endswith(tuple(CONDITIONS)):
-        plain = next((name.removesuffix(e) for e in UNIT_ENDINGS if name.endswith(e)), name)
+        plain = _ENDING.sub('', name)
     head, at, condition = plain.partition('_at_')
     words = head.replace('_', ' ')
     if not at:
