@@ -54,16 +54,6 @@ def config_dir() -> Path:
     return share_dir() / 'config'
 
 
-def launch_dir() -> Path:
-    """Return the folder of launch files."""
-    return share_dir() / 'launch'
-
-
-def msg_docs_dir() -> Path:
-    """Return the folder that documents the topics, one page each."""
-    return share_dir() / 'msg_docs'
-
-
 def node_page(name: str) -> Path:
     """
     Return the page of a node, made from the code.

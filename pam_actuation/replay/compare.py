@@ -83,11 +83,6 @@ class Replay:
         return (self.controller is not None and not self.counterfactual
                 and not self.controller.identical)
 
-    @property
-    def command_difference(self) -> Difference | None:
-        """Return the Difference of the pressure commands of the controller replay."""
-        return None if self.controller is None else _of_commands(self.controller, self.start_ns)
-
     def to_dict(self) -> dict[str, Any]:
         """Return plain data for ``--json``."""
         out: dict[str, Any] = {
