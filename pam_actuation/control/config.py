@@ -100,8 +100,9 @@ def load_controller(name_or_path_or_text: str | os.PathLike[str],
 
     Returns
     -------
-    SelfOrganizingFuzzyController, PidController or LqiController
-        In mode force or joint: a ForceController or JointController about it.
+    CompiledController
+        Of the law that the text names. In mode force or joint: a ForceController or
+        JointController about it.
 
     Raises
     ------

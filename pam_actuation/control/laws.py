@@ -17,8 +17,9 @@ The control laws that a controller file may name: one entry for each.
 
 Another law is a module with its settings, its compiled step and its class, an entry in ``LAWS``,
 and a preset in ``config/controllers``. Its settings then stand on the page of controller files.
-``pam tune`` asks for two entries more: its axes in ``tuning/space.py``, its loop in
-``tuning/closed_loop.py``.
+``pam tune`` asks for its axes in ``tuning/space.py`` and its loop in ``tuning/rollouts.py`` or
+``baseline_rollouts.py``, which ``ROLLOUTS`` of ``tuning/closed_loop.py`` names. ``warm_up.py``
+compiles its preset ahead.
 """
 
 from collections.abc import Callable

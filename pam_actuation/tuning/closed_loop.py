@@ -202,7 +202,8 @@ class ClosedLoop(MuscleLoop):
 
         Parameters
         ----------
-        controller : SelfOrganizingFuzzyController, PidController or LqiController
+        controller : CompiledController
+            Of any law in ``ROLLOUTS``.
             Starts as after ``pause``.
         learn : bool or callable
             Whether the rules may change, possibly as a function of time [s].

@@ -37,6 +37,13 @@ def test_the_committed_page_is_what_the_registries_say():
     assert committed == markdown.page(ENTRIES), 'pam models --markdown docs/reference/models.md'
 
 
+@pytest.mark.skipif(any(os.environ.get(name) for name in PLUG_INS), reason='plug-ins are set')
+def test_the_page_of_muscle_laws_has_a_row_for_each():
+    rows = (ROOT / 'docs' / 'reference' / 'muscle_laws.md').read_text(encoding='utf-8')
+    laws = [entry['name'] for entry in ENTRIES if entry['kind'] == 'law']
+    assert laws and not [name for name in laws if f'\n| `{name}` |' not in rows]
+
+
 def test_overview_names_everything_within_the_terminal(monkeypatch):
     monkeypatch.setenv('COLUMNS', '80')
     lines = overview(ENTRIES).splitlines()
