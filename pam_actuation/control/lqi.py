@@ -31,8 +31,10 @@ from pam_actuation.control.fixed_law import FixedLawController
 from pam_actuation.control.inputs import INPUT
 from pam_actuation.control.law_parts import (
     faded_offset, first_command_pa, held_offset, integral_growth, limited)
-from pam_actuation.control.lqi_gains import MAX_DELAY_TICKS, MAX_ORDER, MODEL, pack, used_numbers
+from pam_actuation.control.lqi_gains import (
+    MAX_DELAY_TICKS, MAX_ORDER, MODEL, observer_gains, pack, used_numbers)
 from pam_actuation.control.lqi_model import LinearModel
+from pam_actuation.control.observer import gains_at
 from pam_actuation.control.settings import checked_settings, parameter_record, setting
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import Compiled, compiled, entry_point, source_key
@@ -68,6 +70,7 @@ STATE = record(
     ('estimate_m', MAX_ORDER),        # state of the model
     ('acting_pa', MAX_DELAY_TICKS),   # commands on their way, oldest first
     ('feedforward_pa', MAX_DELAY_TICKS),    # what they contain of it
+    'unread_ticks',                   # since the last correction
 )
 # The names on topic ``controller_state``.
 OUTPUT = record(
@@ -137,7 +140,7 @@ def _start(par: np.record, model: np.record, st: np.record, inp: np.record,
 
 
 @compiled
-def _tick(par: np.record, model: np.record, st: np.record, inp: np.record,
+def _tick(par: np.record, model: np.record, observer: FloatArray, st: np.record, inp: np.record,
           out: np.record) -> float:
     """Run one tick; see ``lqi_step``."""
     period = 1.0 / par.rate_hz
@@ -161,9 +164,12 @@ def _tick(par: np.record, model: np.record, st: np.record, inp: np.record,
     innovation = y - st.estimate_m[0]
     if held_back != 0.0 or elapsed > _STALE_S:    # False for NaN: one period
         _rest(model, st, y)                # what moved it is not known
+        st.unread_ticks = 0.0
     elif not elapsed <= 0.0:
+        at = gains_at(observer, n, st.unread_ticks)
         for i in range(n):
-            st.estimate_m[i] += model.observer_gain[i] * innovation
+            st.estimate_m[i] += observer[at + i] * innovation
+        st.unread_ticks = 0.0
 
     error = inp.reference_m - offset - x
     st.error_m = error
@@ -180,6 +186,7 @@ def _tick(par: np.record, model: np.record, st: np.record, inp: np.record,
         model.integral_gain_pa_per_m_s * error, (command - wanted) / par.anti_windup_time_s,
         held_back)
     _predict(model, st, command - model.pressure_pa, feedforward)
+    st.unread_ticks += 1.0
     out.command_pa = command
     out.error_m = error
     out.estimated_contraction_m = estimate
@@ -196,27 +203,27 @@ def _tick(par: np.record, model: np.record, st: np.record, inp: np.record,
 
 
 @compiled
-def _step(par: FloatArray, model: FloatArray, st: FloatArray, inp: FloatArray,
-          out: FloatArray) -> float:
+def _step(par: FloatArray, model: FloatArray, observer: FloatArray, st: FloatArray,
+          inp: FloatArray, out: FloatArray) -> float:
     """Run one tick on arrays; see ``lqi_step``."""
-    return _tick(part(par, 0, PARAMETERS), part(model, 0, MODEL), part(st, 0, STATE),
+    return _tick(part(par, 0, PARAMETERS), part(model, 0, MODEL), observer, part(st, 0, STATE),
                  part(inp, 0, INPUT), part(out, 0, OUTPUT))
 
 
 def _entry(key: int) -> Compiled[..., float]:
     """Return the step function as one unit of compiled code, stored under ``key``."""
     @entry_point
-    def lqi_step(par: FloatArray, model: FloatArray, st: FloatArray, inp: FloatArray,
-                 out: FloatArray) -> float:
+    def lqi_step(par: FloatArray, model: FloatArray, observer: FloatArray, st: FloatArray,
+                 inp: FloatArray, out: FloatArray) -> float:
         """
         Run one tick; return the pressure command [absolute Pa].
 
-        Arrays of ``PARAMETERS``, ``lqi_gains.MODEL``, ``STATE``, ``inputs.INPUT`` and
-        ``OUTPUT``; ``st`` and ``out`` are written.
+        Arrays of ``PARAMETERS``, ``lqi_gains.MODEL``, rows of ``lqi_gains.observer_gains``,
+        ``STATE``, ``inputs.INPUT`` and ``OUTPUT``; ``st`` and ``out`` are written.
         """
         if key < 0:       # never; makes the key part of what is stored
             return P_ATM_PA
-        return _step(par, model, st, inp, out)
+        return _step(par, model, observer, st, inp, out)
 
     return lqi_step
 
@@ -258,8 +265,10 @@ class LqiController(FixedLawController):
                 f'the linear model is of {model.rate_hz:g} Hz, the controller runs at '
                 f'{checked["rate_hz"]:g} Hz', where('rate_hz') if where else 'rate_hz')
         self.model = model
-        self.gains = pack(model, checked)
-        super().__init__(lqi_step, checked, self.gains, PARAMETERS, STATE, rig_name)
+        rows = observer_gains(model, checked['disturbance_pa'], checked['noise_m'])
+        self.gains, self.observer = pack(model, checked, rows[0]), rows.ravel()
+        super().__init__(lqi_step, checked, self.gains, PARAMETERS, STATE, rig_name,
+                         self.observer)
 
     def with_settings(self, settings: Mapping[str, object], rules: 'RuleBase | None' = None
                       ) -> 'LqiController':
@@ -270,4 +279,5 @@ class LqiController(FixedLawController):
         """Return linear model and gains; an LQI controller has no static inverse."""
         return {
             'model': self.model.to_dict(),
-            'gains': self.gains[used_numbers(self.gains)].tolist()}
+            'gains': self.gains[used_numbers(self.gains)].tolist(),
+            'observer_gains': self.observer.tolist()}

@@ -27,8 +27,8 @@ The LQI controller in YAML.
       contraction_m: 0.014
       pressure_pa: 555000.0
 
-A recording also keeps ``gains``, what the Riccati equations gave, so that a replay on
-another machine has the same bits.
+A recording also keeps ``gains`` and ``observer_gains``, what the Riccati equations gave, so that
+a replay on another machine has the same bits.
 """
 
 from collections.abc import Callable, Mapping
@@ -36,7 +36,8 @@ from typing import Any
 
 import numpy as np
 from pam_actuation.control.lqi import LqiController, SETTINGS
-from pam_actuation.control.lqi_gains import MAX_DELAY_TICKS, MAX_ORDER, MODEL, used_numbers
+from pam_actuation.control.lqi_gains import (
+    gains_of_every_tick, MAX_DELAY_TICKS, MAX_ORDER, MODEL, used_numbers)
 from pam_actuation.control.lqi_model import identify_on_rig, LinearModel
 from pam_sim.annotations import BoolArray, FloatArray
 from pam_sim.errors import InputError
@@ -62,8 +63,11 @@ _LISTS = (
         unit='m/Pa', lower=-1.0, upper=1.0))
 _GAINS = Key('gains', list, 'Gains of a recording, exact to the bit.',
              otherwise='from the Riccati equations', lower=-1e12, upper=1e12)
+_OBSERVER = Key('observer_gains', list, 'Gains of the observer of a recording, for each number of '
+                'ticks between readings.', otherwise='from the Riccati equations; next to `gains` '
+                'without it, those of `gains` at any interval, as before', lower=-1e12, upper=1e12)
 KEYS = (Key('model', dict, 'Linear model of the muscle that the gains rest on.',
-            otherwise='identified on the rig'), _GAINS)
+            otherwise='identified on the rig'), _GAINS, _OBSERVER)
 MODEL_KEYS = (_DELAY, *_NUMBERS, *_LISTS)
 
 
@@ -82,7 +86,7 @@ def lqi_from_tree(tree: Located, rig: Rig | None, settings: Mapping[str, object]
     model = model_of(tree, rig, lambda known: identify_on_rig(
         known, check_parameters(SETTINGS, settings, 'setting', where)['rate_hz']))
     controller = LqiController(model, settings, rig_name, where)
-    take_gains(tree, controller.gains, used_numbers(controller.gains), MODEL)
+    take_gains(tree, controller, used_numbers(controller.gains), MODEL, gains_of_every_tick)
     return controller
 
 
@@ -96,8 +100,16 @@ def model_of(tree: Located, rig: Rig | None, identified: Callable[[Rig], LinearM
     return identified(rig)
 
 
-def take_gains(tree: Located, gains: FloatArray, used: BoolArray, record: 'np.dtype[Any]') -> None:
-    """Replace the used numbers of an array of gains by those of a file, where it has any."""
+def take_gains(
+        tree: Located, controller: Any, used: BoolArray, record: 'np.dtype[Any]',
+        of_every_tick: Callable[[FloatArray], FloatArray]) -> None:
+    """
+    Replace the used numbers of the gains of a controller by those of a file, where it has any.
+
+    A file of a version before has one gain of the observer, for readings of every tick. It then
+    holds for any interval between readings, as in that version.
+    """
+    gains, observer = controller.gains, controller.observer
     if 'gains' not in tree:
         return
     before = fields(gains.copy(), record)
@@ -105,6 +117,9 @@ def take_gains(tree: Located, gains: FloatArray, used: BoolArray, record: 'np.dt
     now = fields(gains, record)
     if (before.order, before.delay_ticks) != (now.order, now.delay_ticks):
         raise tree.error('`gains` are of a model of another order or delay', 'gains')
+    observer[:] = (
+        _read_floats(tree, _OBSERVER, observer.size) if _OBSERVER.name in tree
+        else np.resize(of_every_tick(gains), observer.size))
 
 
 def _read_model(table: Located) -> LinearModel:

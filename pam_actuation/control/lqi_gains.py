@@ -32,6 +32,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 from pam_actuation.control.lqi_model import LinearModel
+from pam_actuation.control.observer import kalman_gains, riccati
 from pam_sim.annotations import BoolArray, FloatArray
 from pam_sim.errors import InputError
 from pam_sim.records import fields, record, values_of, zeros
@@ -84,7 +85,7 @@ def feedback_gains(model: LinearModel, integral_weight: float,
     weight = np.zeros((n + 1, n + 1))
     weight[:n, :n] = np.outer(c, c)
     weight[-1, -1] = integral_weight
-    p = _riccati(big_a, big_b, weight, np.array([[command_weight]]))
+    p = riccati(big_a, big_b, weight, np.array([[command_weight]]))
     gains = np.linalg.solve(command_weight + big_b.T @ p @ big_b, big_b.T @ p @ big_a)
     delay = np.empty(d)
     for j in range(d - 1, -1, -1):
@@ -95,27 +96,20 @@ def feedback_gains(model: LinearModel, integral_weight: float,
 
 
 def observer_gains(model: LinearModel, disturbance_pa: float, noise_m: float) -> FloatArray:
-    """Return the gains [-] by which a measured difference corrects the estimated state."""
+    """
+    Return the gains [-] by which a measured difference corrects the estimated state.
+
+    One row for each interval of readings.
+    """
     a, b, c = state_matrices(model)
     noise = (noise_m * _MM) ** 2
     spread = np.outer(b, b) * (disturbance_pa * _KPA) ** 2 + 1e-6 * noise * np.eye(len(b))
-    p = _riccati(a.T, c[:, None], spread, np.array([[noise]]))
-    return p @ c / (c @ p @ c + noise)
+    return kalman_gains(a, c, spread, noise, model.rate_hz)
 
 
-def _riccati(a: FloatArray, b: FloatArray, q: FloatArray, r: FloatArray) -> FloatArray:
-    """Return the solution of the discrete algebraic Riccati equation."""
-    from scipy.linalg import solve_discrete_are       # slow to import, see lqi_model
-    try:
-        return solve_discrete_are(a, b, q, r)
-    except np.linalg.LinAlgError:
-        raise InputError('the Riccati equation has no solution for this model and these '
-                         'weights') from None
-
-
-def pack(model: LinearModel, settings: Mapping[str, float]) -> FloatArray:
+def pack(model: LinearModel, settings: Mapping[str, float], observer: FloatArray) -> FloatArray:
     """
-    Return model and gains as an array of ``MODEL``.
+    Return model and gains as an array of ``MODEL``; ``observer`` are those of every tick.
 
     Raises
     ------
@@ -131,7 +125,6 @@ def pack(model: LinearModel, settings: Mapping[str, float]) -> FloatArray:
             f'{MAX_ORDER} and {MAX_DELAY_TICKS} are allowed')
     state, delay, integral = feedback_gains(
         model, settings['integral_weight'], settings['command_weight'])
-    observer = observer_gains(model, settings['disturbance_pa'], settings['noise_m'])
     per_pa = model.gain_m_per_pa
     rest = np.linalg.solve(np.eye(len(b)) - a, b) / (per_pa * _MM / _KPA)
     si = _MM / _KPA             # kPa/mm to Pa/m
@@ -144,6 +137,12 @@ def pack(model: LinearModel, settings: Mapping[str, float]) -> FloatArray:
         'observer_gain': padded(observer, MAX_ORDER), 'rest': padded(rest, MAX_ORDER),
         'state_gain_pa_per_m': padded(state * si, MAX_ORDER),
         'delay_gain': padded(delay, MAX_DELAY_TICKS)})
+
+
+def gains_of_every_tick(gains: FloatArray) -> FloatArray:
+    """Return the gains of the observer for readings of every tick, of an array of ``MODEL``."""
+    model = fields(gains, MODEL)
+    return np.array(model.observer_gain[:int(model.order)])
 
 
 def padded(values: ArrayLike, size: int) -> FloatArray:

@@ -16,7 +16,8 @@ Linear model predictive control: a baseline that plans ahead on an identified mo
 
 In every tick the commands of a horizon are chosen so that the model's contraction follows the
 reference, see ``mpc_gains``; the first of them is sent. A Kalman filter estimates the state and a
-disturbance of the command, so that nothing is left at rest. As long as no command of the plan is
+disturbance of the command, so that nothing is left at rest. Its gain is that of the ticks between
+readings (``observer``). As long as no command of the plan is
 out of bounds, the plan is linear in what is known. Otherwise coordinate descent solves the
 quadratic programme with bounds. That is a few microseconds of compiled code, with the same bits
 everywhere; a general solver needs a library and a thousand times that.
@@ -34,7 +35,8 @@ from pam_actuation.control.inputs import INPUT
 from pam_actuation.control.law_parts import faded_offset, first_command_pa, held_offset, limited
 from pam_actuation.control.lqi_gains import MAX_DELAY_TICKS, MAX_ORDER
 from pam_actuation.control.lqi_model import LinearModel
-from pam_actuation.control.mpc_gains import HORIZON, MODEL, MOVES, pack
+from pam_actuation.control.mpc_gains import HORIZON, MODEL, MOVES, observer_gains, pack
+from pam_actuation.control.observer import gains_at
 from pam_actuation.control.settings import checked_settings, parameter_record, setting
 from pam_actuation.control.static_inverse import inverse_pressure_pa, inverse_to_mapping
 from pam_sim.annotations import FloatArray
@@ -78,6 +80,7 @@ STATE = record(
     ('reference_m', 2 * HORIZON),     # of the horizon and what follows
     ('plan_pa', MOVES),
     ('wanted_pa', MOVES),             # the same without bounds
+    'unread_ticks',                   # since the last correction
 )
 OUTPUT = record(
     'command_pa', 'error_m', 'estimated_contraction_m', 'innovation_m', 'disturbance_pa',
@@ -176,8 +179,8 @@ def _plan(model: np.record, st: np.record) -> bool:
 
 
 @compiled
-def _tick(par: np.record, model: np.record, inverse: FloatArray, st: np.record, inp: np.record,
-          out: np.record) -> float:
+def _tick(par: np.record, model: np.record, inverse: FloatArray, observer: FloatArray,
+          st: np.record, inp: np.record, out: np.record) -> float:
     """Run one tick; see ``mpc_step``."""
     period = 1.0 / par.rate_hz
     n, d = int(model.order), int(model.delay_ticks)
@@ -207,10 +210,13 @@ def _tick(par: np.record, model: np.record, inverse: FloatArray, st: np.record, 
         # What moved it is no disturbance of the command, nor what led up to it.
         _rest(model, st, y)
         st.disturbance_pa = st.calm_pa
+        st.unread_ticks = 0.0
     elif not elapsed <= 0.0:
+        at = gains_at(observer, n + 1, st.unread_ticks)
         for i in range(n):
-            st.estimate_m[i] += model.observer_gain[i] * innovation
-        st.disturbance_pa += model.disturbance_observer_pa_per_m * innovation
+            st.estimate_m[i] += observer[at + i] * innovation
+        st.disturbance_pa += observer[at + n] * innovation
+        st.unread_ticks = 0.0
         st.calm_pa += period / (_CALM_S + period) * (st.disturbance_pa - st.calm_pa)
     for i in range(n):
         st.predicted_m[i] = st.estimate_m[i]
@@ -235,6 +241,7 @@ def _tick(par: np.record, model: np.record, inverse: FloatArray, st: np.record, 
     st.command_pa = command
     st.last_pa = last
     st.ticks += 1.0
+    st.unread_ticks += 1.0
     out.command_pa = command
     out.error_m = error
     out.estimated_contraction_m = estimate
@@ -250,27 +257,28 @@ def _tick(par: np.record, model: np.record, inverse: FloatArray, st: np.record, 
 
 
 @compiled
-def _step(par: FloatArray, model: FloatArray, inverse: FloatArray, st: FloatArray,
-          inp: FloatArray, out: FloatArray) -> float:
+def _step(par: FloatArray, model: FloatArray, inverse: FloatArray, observer: FloatArray,
+          st: FloatArray, inp: FloatArray, out: FloatArray) -> float:
     """Run one tick on arrays; see ``mpc_step``."""
-    return _tick(part(par, 0, PARAMETERS), part(model, 0, MODEL), inverse, part(st, 0, STATE),
-                 part(inp, 0, INPUT), part(out, 0, OUTPUT))
+    return _tick(part(par, 0, PARAMETERS), part(model, 0, MODEL), inverse, observer,
+                 part(st, 0, STATE), part(inp, 0, INPUT), part(out, 0, OUTPUT))
 
 
 def _entry(key: int) -> Compiled[..., float]:
     """Return the step function as one unit of compiled code, stored under ``key``."""
     @entry_point
-    def mpc_step(par: FloatArray, model: FloatArray, inverse: FloatArray, st: FloatArray,
-                 inp: FloatArray, out: FloatArray) -> float:
+    def mpc_step(par: FloatArray, model: FloatArray, inverse: FloatArray, observer: FloatArray,
+                 st: FloatArray, inp: FloatArray, out: FloatArray) -> float:
         """
         Run one tick; return the pressure command [absolute Pa].
 
-        Arrays of ``PARAMETERS``, ``mpc_gains.MODEL``, the static inverse, ``STATE``,
-        ``inputs.INPUT`` and ``OUTPUT``; ``st`` and ``out`` are written.
+        Arrays of ``PARAMETERS``, ``mpc_gains.MODEL``, the static inverse, rows of
+        ``mpc_gains.observer_gains``, ``STATE``, ``inputs.INPUT`` and ``OUTPUT``; ``st`` and
+        ``out`` are written.
         """
         if key < 0:       # never; makes the key part of what is stored
             return P_ATM_PA
-        return _step(par, model, inverse, st, inp, out)
+        return _step(par, model, inverse, observer, st, inp, out)
 
     return mpc_step
 
@@ -316,9 +324,11 @@ class MpcController(FixedLawController):
                 f'{checked["rate_hz"]:g} Hz', where('rate_hz') if where else 'rate_hz')
         self.model = model
         self.static_inverse = np.ascontiguousarray(static_inverse, dtype=float)
-        self.gains = pack(model, self.static_inverse, checked)
+        rows = observer_gains(model, checked['disturbance_pa'], checked['noise_m'])
+        self.gains, self.observer = pack(
+            model, self.static_inverse, checked, rows[0]), rows.ravel()
         super().__init__(mpc_step, checked, self.gains, PARAMETERS, STATE, rig_name,
-                         self.static_inverse)
+                         self.static_inverse, self.observer)
 
     def with_settings(self, settings: Mapping[str, object], rules: 'RuleBase | None' = None
                       ) -> 'MpcController':
@@ -328,4 +338,5 @@ class MpcController(FixedLawController):
     def file_entries(self) -> dict[str, object]:
         """Return linear model, gains and static inverse."""
         return {'static_inverse': inverse_to_mapping(self.static_inverse),
-                'model': self.model.to_dict(), 'gains': self.gains.tolist()}
+                'model': self.model.to_dict(), 'gains': self.gains.tolist(),
+                'observer_gains': self.observer.tolist()}

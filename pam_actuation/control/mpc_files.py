@@ -27,8 +27,8 @@ The model predictive controller in YAML.
       contraction_m: 0.014
       pressure_pa: 0.0
 
-Its pressures are equivalent ones (``mpc_gains``). A recording also keeps ``gains`` and
-``static_inverse``, so that a replay on another machine has the same bits.
+Its pressures are equivalent ones (``mpc_gains``). A recording also keeps ``gains``,
+``observer_gains`` and ``static_inverse``, so that a replay on another machine has the same bits.
 """
 
 from collections.abc import Callable, Mapping
@@ -36,7 +36,8 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from pam_actuation.control.lqi_files import KEYS, model_of, take_gains
 from pam_actuation.control.mpc import MpcController, SETTINGS
-from pam_actuation.control.mpc_gains import identify_behind_inverse, MODEL
+from pam_actuation.control.mpc_gains import (
+    gains_of_every_tick, identify_behind_inverse, MODEL)
 from pam_sim.annotations import FloatArray
 from pam_sim.located_yaml import Located
 from pam_sim.parameters import check_parameters
@@ -61,5 +62,6 @@ def mpc_from_tree(tree: Located, rig: Rig | None, inverse: FloatArray,
     model = model_of(tree, rig, lambda known: identify_behind_inverse(
         known, inverse, check_parameters(SETTINGS, settings, 'setting', where)['rate_hz']))
     controller = MpcController(model, inverse, settings, rig_name, where)
-    take_gains(tree, controller.gains, np.ones(controller.gains.size, dtype=bool), MODEL)
+    take_gains(tree, controller, np.ones(controller.gains.size, dtype=bool), MODEL,
+               gains_of_every_tick)
     return controller

@@ -41,6 +41,7 @@ from functools import lru_cache
 import numpy as np
 from pam_actuation.control.lqi_gains import MAX_DELAY_TICKS, MAX_ORDER, padded, state_matrices
 from pam_actuation.control.lqi_model import identification_record, LinearModel
+from pam_actuation.control.observer import kalman_gains
 from pam_actuation.control.static_inverse import GRID, GRID_SIZE
 from pam_sim import load_rig
 from pam_sim.annotations import FloatArray
@@ -204,9 +205,12 @@ def _lag_and_mass(values: FloatArray, rate_hz: float) -> tuple[FloatArray, Float
     return np.r_[0.0, numerator], denominator
 
 
-def _observer(model: LinearModel, disturbance_pa: float, noise_m: float) -> FloatArray:
-    """Return the gains on the innovation: of the state [-], last of the disturbance [kPa/mm]."""
-    from scipy.linalg import solve_discrete_are
+def observer_gains(model: LinearModel, disturbance_pa: float, noise_m: float) -> FloatArray:
+    """
+    Return the gains on the innovation, one row for each interval of readings.
+
+    They correct the state [-] and, last, the disturbance [Pa/m].
+    """
     a, b, c = state_matrices(model)
     n = len(b)
     big = np.block([[a, b[:, None]], [np.zeros((1, n)), np.ones((1, 1))]])
@@ -214,12 +218,15 @@ def _observer(model: LinearModel, disturbance_pa: float, noise_m: float) -> Floa
     spread = 1e-6 * (noise_m * _MM) ** 2 * np.eye(n + 1)
     spread[-1, -1] = (disturbance_pa * _KPA) ** 2
     noise = (noise_m * _MM) ** 2
-    try:
-        p = solve_discrete_are(big.T, seen[:, None], spread, np.array([[noise]]))
-    except np.linalg.LinAlgError:
-        raise InputError('the Riccati equation has no solution for this model and these '
-                         'weights') from None
-    return p @ seen / (seen @ p @ seen + noise)
+    rows = kalman_gains(big, seen, spread, noise, model.rate_hz)
+    rows[:, n] *= _MM / _KPA
+    return rows
+
+
+def gains_of_every_tick(gains: FloatArray) -> FloatArray:
+    """Return the gains of the observer for readings of every tick, of an array of ``MODEL``."""
+    model = fields(gains, MODEL)
+    return np.r_[model.observer_gain[:int(model.order)], model.disturbance_observer_pa_per_m]
 
 
 def _horizon(model: LinearModel) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -247,15 +254,15 @@ def _lag_ticks(model: LinearModel) -> int:
     return int(min(max(round(float(lag)) - 1, 0), HORIZON))
 
 
-def pack(model: LinearModel, table: FloatArray, settings: Mapping[str, float]) -> FloatArray:
+def pack(model: LinearModel, table: FloatArray, settings: Mapping[str, float],
+         observer: FloatArray) -> FloatArray:
     """
-    Return model and gains as an array of ``MODEL``.
+    Return model and gains as an array of ``MODEL``; ``observer`` are those of every tick.
 
     Raises
     ------
     InputError
-        Order or delay are beyond ``MAX_ORDER`` and ``MAX_DELAY_TICKS``, or the Riccati
-        equation has no solution.
+        Order or delay are beyond ``MAX_ORDER`` and ``MAX_DELAY_TICKS``.
 
     """
     a, b, _ = state_matrices(model)
@@ -272,7 +279,6 @@ def pack(model: LinearModel, table: FloatArray, settings: Mapping[str, float]) -
     hessian = moves.T @ moves + held @ held.T / settings['command_weight'] + (
         weight * change.T @ change)
     inverse = np.linalg.inv(hessian)
-    observer = _observer(model, settings['disturbance_pa'], settings['noise_m'])
     (lowest, highest), slope = equivalent_pa(
         table, np.array([settings[f'{end}_pressure_gauge_pa'] + P_ATM_PA
                          for end in ('min', 'max')]), model.contraction_m)
@@ -287,7 +293,7 @@ def pack(model: LinearModel, table: FloatArray, settings: Mapping[str, float]) -
         'denominator': padded(model.denominator, MAX_ORDER),
         'numerator_m_per_pa': padded(model.numerator, MAX_ORDER),
         'observer_gain': padded(observer[:n], MAX_ORDER),
-        'disturbance_observer_pa_per_m': observer[n] * si,
+        'disturbance_observer_pa_per_m': observer[n],
         'rest': padded(rest, MAX_ORDER), 'rest_pa_per_m': 1.0 / model.gain_m_per_pa,
         'reference_gain_pa_per_m': (inverse @ moves.T * si).ravel(),
         'held_gain_pa_per_m': (inverse @ held / model.gain_m_per_pa).ravel(),
