@@ -46,6 +46,8 @@ co-contraction out of reach or not finite      ignored and counted; what was hel
 pressure, force missing, stale or not finite   not used (they only guard start and learning)
 followed pressure below or above the command,  integral and rules stand still: the error is
 or silent; pressure lost, where it is unknown  that of a driver that vents or limits
+the law estimates a contraction that no        vents for 2 s, then starts bumplessly
+muscle has, or commands what is not finite
 of two muscles one stays empty; its driver     vents both until that one follows again
 vents against the commands or falls silent;    (``slack_muscle``): none is left alone
 its pressure is lost                           under air
@@ -64,6 +66,7 @@ from typing import Any, TYPE_CHECKING
 
 from pam_actuation.control import tick as codes
 from pam_actuation.control.following import FOLLOWS, UNKNOWN
+from pam_actuation.control.law_check import LawCheck
 from pam_actuation.control.measurement import fresh, Measurement
 from pam_actuation.control.modes.tracked import FORCE, JOINT, tracked_by
 from pam_actuation.control.muscle_channel import MuscleChannel
@@ -137,6 +140,7 @@ class ControllerLoop:
         law, self.measurement, self.setpoint = (
             self._of_joint(rig, name) if isinstance(rig, JointRig) else self._of_muscle())
         self._core = TickCore(law, nearly_pa=nearly_pa)
+        self._law_check = LawCheck(self._core.names)
         self.muscles = tuple(
             MuscleChannel(place, rise) for place, rise in zip(law.places, self._core.rises))
         self.command_topics = tuple(f'{place}pressure_command' for place in law.places)
@@ -228,6 +232,7 @@ class ControllerLoop:
         self._newest.clear()
         self.setpoint.forget()
         self.measurement.forget()
+        self._law_check.forget()
         for muscle in self.muscles:
             muscle.forget()
 
@@ -288,6 +293,8 @@ class ControllerLoop:
             muscle.look(self._newest, now_ns)
         if self.two_sensors:
             reason = codes.TWO_SENSORS
+        elif reason == codes.OK and self._law_failed(now_ns):
+            reason = codes.LAW_FAILED
         elif reason == codes.OK:
             reason = self._reason(now_ns)
         effort = setpoint.effort
@@ -359,6 +366,10 @@ class ControllerLoop:
         if late_ns > self._late_ns:
             self._on_time_ns = now_ns + late_ns + AFTER_LATE_NS
         return now_ns >= self._on_time_ns
+
+    def _law_failed(self, now_ns: int) -> bool:
+        """Return whether the law failed of late."""
+        return self.state is not None and self._law_check.failed(now_ns, self.state.values)
 
     def _position(self, now_ns: int) -> tuple[int, float]:
         """Return stamp and value of what the law starts from; -1, NaN where not usable."""

@@ -35,7 +35,7 @@ from pam_sim.units import P_ATM_PA
  CONTRACTION_IMPLAUSIBLE, NO_REFERENCE, REFERENCE_LOST, REFERENCE_HELD, NO_FORCE, FORCE_OLD,
  FORCE_AHEAD, FORCE_NOT_FINITE, FORCE_IMPLAUSIBLE, NO_ANGLE, ANGLE_OLD, ANGLE_AHEAD,
  ANGLE_NOT_FINITE, ANGLE_IMPLAUSIBLE, EFFORT_LOST, CONTRACTION_FROZEN,
- FORCE_FROZEN, ANGLE_FROZEN, MUSCLE_SLACK, TWO_SENSORS) = range(25)
+ FORCE_FROZEN, ANGLE_FROZEN, MUSCLE_SLACK, TWO_SENSORS, LAW_FAILED) = range(26)
 NOT_MEASURED = 'measured yet'        # how the reasons of missing sensors end
 REASONS = (
     'ok',
@@ -63,7 +63,8 @@ REASONS = (
     'joint angle stands still although the pressures changed: sensor frozen or joint blocked',
     'a muscle is not under air although it should be, or its pressure or driver is lost: '
     'both vented',
-    'what is tracked is measured twice, vented')
+    'what is tracked is measured twice, vented',
+    'the controller estimated or commanded what is impossible, vented')
 RUNNING = (OK, REFERENCE_HELD)      # reasons with which the controller runs
 
 _NS = 1_000_000_000
@@ -236,7 +237,7 @@ class TickCore:
         Returns
         -------
         commands_pa : tuple of float
-            Wanted absolute pressure of each muscle; vented while the inputs are invalid.
+            Wanted absolute pressure of each muscle, finite; vented while the inputs are invalid.
         values : tuple of float
             What ``controller_state`` carries, in the order of ``names``.
 
@@ -246,8 +247,9 @@ class TickCore:
         if inputs.restarted or not running:
             law.pause()
         if running:
-            commands_pa = tuple([rise.limited(command_pa, self._period_s)
-                                 for rise, command_pa in zip(self.rises, law.step(inputs))])
+            commands_pa = tuple([
+                rise.limited(command_pa if math.isfinite(command_pa) else P_ATM_PA, self._period_s)
+                for rise, command_pa in zip(self.rises, law.step(inputs))])
         else:
             commands_pa = self.vented_pa
             if inputs.proves:

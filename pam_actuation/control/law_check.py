@@ -1,0 +1,53 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Whether what a control law estimated and commanded in its last tick is possible at all."""
+
+from collections.abc import Sequence
+import math
+
+ESTIMATES_M = -0.1, 0.2         # far beyond what a muscle does: no error of a model
+RESUME_NS = 2_000_000_000
+_ESTIMATE, _COMMAND = 'estimated_contraction_m', 'command_pa'
+
+
+class LawCheck:
+    """
+    Notices a law whose estimate has left the muscle, or whose command is no finite number.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of the numbers of ``controller_state``.
+
+    """
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self._looks_at = [
+            (names.index(name), limits) for name, limits in (
+                (_ESTIMATE, ESTIMATES_M), (_COMMAND, (-math.inf, math.inf))) if name in names]
+        self.forget()
+
+    def forget(self) -> None:
+        """Begin anew."""
+        self._until_ns: int | None = None
+
+    def failed(self, now_ns: int, values: Sequence[float]) -> bool:
+        """Return whether the law failed in the tick of these values, or within 2 s before."""
+        if not all(math.isfinite(values[at]) and lowest <= values[at] <= highest
+                   for at, (lowest, highest) in self._looks_at):
+            self._until_ns = now_ns + RESUME_NS
+        if self._until_ns is not None and now_ns >= self._until_ns:
+            self._until_ns = None
+        return self._until_ns is not None
