@@ -51,6 +51,7 @@ class CompiledController:
     kind: str                               # name of the law in controller files
     state_names: tuple[str, ...]            # of ``state_values``
     static_inverse: FloatArray
+    learns = True                           # whether it becomes better while it runs
     rules: 'RuleBase | None' = None
     made_for: dict[str, Any] | None = None  # facts of the rig, see ``made_for``
     driver: dict[str, float] | None = None  # numbers of the driver's law it asks for, by name

@@ -50,6 +50,8 @@ class FixedLawController(CompiledController):
 
     """
 
+    learns = False
+
     def __init__(self, step: Callable[..., float], settings: dict[str, float],
                  knowledge: FloatArray, parameters: 'np.dtype[np.record]',
                  state: 'np.dtype[np.record]', rig_name: str = '', *more: FloatArray) -> None:

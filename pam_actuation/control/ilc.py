@@ -251,6 +251,7 @@ class IlcController(FixedLawController):
     """
 
     kind = 'ilc'
+    learns = True
     state_names = OUTPUT.names or ()
 
     def __init__(self, static_inverse: FloatArray, settings: Mapping[str, object] | None = None,

@@ -51,7 +51,8 @@ muscle has, or commands what is not finite
 of two muscles one stays empty; its driver     vents both until that one follows again
 vents against the commands or falls silent;    (``slack_muscle``): none is left alone
 its pressure is lost                           under air
-loop, driver or sensors late over 20 ms        learning stands still for 0.25 s
+loop or driver late over 20 ms, or a reading   learning stands still for 0.25 s
+older than ``on_time`` allows its sensor
 the loop itself stood still                    waits up to 20 ms for a measurement
 the loop itself stood still over 0.25 s        starts bumplessly
 =============================================  ==========================================
@@ -70,6 +71,7 @@ from pam_actuation.control.law_check import LawCheck
 from pam_actuation.control.measurement import fresh, Measurement
 from pam_actuation.control.modes.tracked import FORCE, JOINT, tracked_by
 from pam_actuation.control.muscle_channel import MuscleChannel
+from pam_actuation.control.on_time import OnTime
 from pam_actuation.control.reference_buffer import ReferenceBuffer
 from pam_actuation.control.setpoint import MuscleSetpoint, Setpoint
 from pam_actuation.control.tick import Law, MuscleLaw, TickCore, TickInputs
@@ -84,8 +86,6 @@ if TYPE_CHECKING:
     from pam_sim.rig import Rig
 
 STALL_NS = 250_000_000
-LATE_NS = 20_000_000        # a loop this late leaves an error
-AFTER_LATE_NS = 250_000_000     # for so long, credit delay included
 PATIENCE_NS = 20_000_000    # how long a measurement may take to arrive after a stall
 _CONTRACTIONS_M = -0.01, 0.1    # outside the sensor is wrong, not the muscle
 _RESTING_M, _RESTING_N = 0.002, 5.0     # up to there a muscle may lie on a stop
@@ -112,7 +112,8 @@ class ControllerLoop:
     Attributes
     ----------
     reason : str
-        What the last tick says of its inputs, one of ``tick.REASONS`` and perhaps more.
+        What the last tick says of its inputs, one of ``tick.REASONS`` and perhaps more, such as
+        why learning stands still.
     measurement : Measurement
         Of what is tracked.
     state : ControllerState or None
@@ -150,10 +151,10 @@ class ControllerLoop:
         self.reason = codes.REASONS[self.measurement.sensor.none]
         self.valid = False
         self.state: ControllerState | None = None
-        self.two_sensors = ''
+        self.two_sensors = self._remark = ''
         self._last_tick_ns: int | None = None
-        self._late_ns = max(LATE_NS, round(3e9 / controller.rate_hz))
-        self._on_time_ns = 0        # from when on no stall is felt
+        self._on_time = OnTime(controller.rate_hz, self.measurement.sensor.topic)
+        self._late_ns = self._on_time.late_ns
         self._patience_ns: int | None = None    # until when it waits for a measurement
         self._used_ns: int | None = None
         self._commands_pa: tuple[float, ...] | None = None    # of the last tick, if it ran
@@ -233,6 +234,7 @@ class ControllerLoop:
         self.setpoint.forget()
         self.measurement.forget()
         self._law_check.forget()
+        self._on_time.forget()
         for muscle in self.muscles:
             muscle.forget()
 
@@ -265,6 +267,8 @@ class ControllerLoop:
         self.valid = inputs.reason in codes.RUNNING
         self._commands_pa = commands_pa if self.valid else None
         self.reason = codes.REASONS[inputs.reason]
+        if self._remark:
+            self.reason = f'{self.reason}; {self._remark}'
         if inputs.reason == codes.TWO_SENSORS:
             self.reason = f'{self.reason}: {self.two_sensors}'
         self.state = ControllerState(now_ns, self._core.names, values)
@@ -299,8 +303,14 @@ class ControllerLoop:
             reason = self._reason(now_ns)
         effort = setpoint.effort
         may_learn = bool(learning and reason == codes.OK and not effort.follows
-                         and not self.controller.freeze_learning
-                         and self._on_time(now_ns, gap_ns))
+                         and not self.controller.freeze_learning)
+        self._remark = ''
+        if may_learn:
+            may_learn = self._on_time.judge(
+                now_ns, gap_ns, measurement.stamp_ns,
+                max(muscle.following.silent_ns(now_ns) for muscle in muscles))
+            if self.controller.learns:
+                self._remark = self._on_time.says
         inputs = TickInputs(reason, may_learn, stalled)
         inputs.effort, inputs.co_contraction_pa = effort, setpoint.co_contraction_pa
         held_back = self._held_back(now_ns)
@@ -353,19 +363,6 @@ class ControllerLoop:
         if self._patience_ns is None:
             self._patience_ns = now_ns + PATIENCE_NS
         return now_ns < self._patience_ns
-
-    def _on_time(self, now_ns: int, gap_ns: int) -> bool:
-        """
-        Return whether all loops were on time of late; errors after a stall are no error of rules.
-
-        The controller itself is seen by its ticks, a driver by what it tells, the sensors by the
-        age of what is tracked.
-        """
-        late_ns = max(gap_ns, now_ns - self.measurement.stamp_ns,
-                      *(muscle.following.silent_ns(now_ns) for muscle in self.muscles))
-        if late_ns > self._late_ns:
-            self._on_time_ns = now_ns + late_ns + AFTER_LATE_NS
-        return now_ns >= self._on_time_ns
 
     def _law_failed(self, now_ns: int) -> bool:
         """Return whether the law failed of late."""

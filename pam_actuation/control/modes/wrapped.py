@@ -61,6 +61,11 @@ class WrappedLaw:
         return self.law.kind
 
     @property
+    def learns(self) -> bool:
+        """Whether the law becomes better while it runs."""
+        return self.law.learns
+
+    @property
     def rig_name(self) -> str:
         """Identity of the rig the rules belong to."""
         return self.law.rig_name
