@@ -75,6 +75,7 @@ from pam_actuation.control.on_time import OnTime
 from pam_actuation.control.reference_buffer import ReferenceBuffer
 from pam_actuation.control.setpoint import MuscleSetpoint, Setpoint
 from pam_actuation.control.tick import Law, MuscleLaw, TickCore, TickInputs
+from pam_actuation.control.tick_rate import TickRate
 from pam_actuation.messages import ControllerState, Message, Pressure
 from pam_actuation.slow_rise import NEARLY_PA
 from pam_sim.errors import InputError
@@ -112,8 +113,8 @@ class ControllerLoop:
     Attributes
     ----------
     reason : str
-        What the last tick says of its inputs, one of ``tick.REASONS`` and perhaps more, such as
-        why learning stands still.
+        What the last tick says of its inputs, one of ``tick.REASONS`` and perhaps more: why
+        learning stands still, and that the ticks are not at the rate of the controller.
     measurement : Measurement
         Of what is tracked.
     state : ControllerState or None
@@ -151,10 +152,12 @@ class ControllerLoop:
         self.reason = codes.REASONS[self.measurement.sensor.none]
         self.valid = False
         self.state: ControllerState | None = None
-        self.two_sensors = self._remark = ''
+        self.two_sensors = ''
+        self._remarks: tuple[str, ...] = ()
         self._last_tick_ns: int | None = None
         self._on_time = OnTime(controller.rate_hz, self.measurement.sensor.topic)
         self._late_ns = self._on_time.late_ns
+        self._tick_rate = TickRate(controller.rate_hz)
         self._patience_ns: int | None = None    # until when it waits for a measurement
         self._used_ns: int | None = None
         self._commands_pa: tuple[float, ...] | None = None    # of the last tick, if it ran
@@ -235,6 +238,7 @@ class ControllerLoop:
         self.measurement.forget()
         self._law_check.forget()
         self._on_time.forget()
+        self._tick_rate.forget()
         for muscle in self.muscles:
             muscle.forget()
 
@@ -267,9 +271,9 @@ class ControllerLoop:
         self.valid = inputs.reason in codes.RUNNING
         self._commands_pa = commands_pa if self.valid else None
         self.reason = codes.REASONS[inputs.reason]
-        if self._remark:
-            self.reason = f'{self.reason}; {self._remark}'
-        if inputs.reason == codes.TWO_SENSORS:
+        if self.valid:
+            self.reason = '; '.join(filter(None, (self.reason, *self._remarks)))
+        elif inputs.reason == codes.TWO_SENSORS:
             self.reason = f'{self.reason}: {self.two_sensors}'
         self.state = ControllerState(now_ns, self._core.names, values)
         return tuple(commands), self.state
@@ -289,6 +293,8 @@ class ControllerLoop:
         """Return the ``TickInputs`` of now."""
         gap_ns = 0 if self._last_tick_ns is None else now_ns - self._last_tick_ns
         stalled = gap_ns > STALL_NS
+        if gap_ns > 0:
+            self._tick_rate.take(gap_ns)
         self._last_tick_ns = now_ns
         measurement, setpoint, muscles = self.measurement, self.setpoint, self.muscles
         reason = measurement.reason(now_ns)
@@ -304,13 +310,14 @@ class ControllerLoop:
         effort = setpoint.effort
         may_learn = bool(learning and reason == codes.OK and not effort.follows
                          and not self.controller.freeze_learning)
-        self._remark = ''
+        still = ''
         if may_learn:
             may_learn = self._on_time.judge(
                 now_ns, gap_ns, measurement.stamp_ns,
                 max(muscle.following.silent_ns(now_ns) for muscle in muscles))
             if self.controller.learns:
-                self._remark = self._on_time.says
+                still = self._on_time.says
+        self._remarks = self._tick_rate.says, still
         inputs = TickInputs(reason, may_learn, stalled)
         inputs.effort, inputs.co_contraction_pa = effort, setpoint.co_contraction_pa
         held_back = self._held_back(now_ns)
