@@ -91,10 +91,10 @@ class BagInfo:
     Everything ``pam info`` shows.
 
     ``remarks`` are sentences on what is odd or implausible, empty for a good bag; ``notes`` are
-    harmless ones. ``markers``: ``time_s`` from the begin of the bag, ``text`` and ``namespace`` of
-    what a person set. ``complete`` is False when messages are known to be missing or the run
-    stopped early. It is True when every topic of the rig has been checked, and None if that is
-    not known.
+    harmless ones. ``absent`` is the number of messages that metadata.yaml announces and no file
+    holds. ``markers``: ``time_s`` from the begin of the bag, ``text`` and ``namespace`` of what a
+    person set. ``complete`` is False when messages are known to be missing or the run stopped
+    early. It is True when every topic of the rig has been checked, and None if that is not known.
     """
 
     path: str
@@ -109,6 +109,7 @@ class BagInfo:
     remarks: list[str]
     notes: list[str]
     recovered: bool = False
+    absent: int = 0
     markers: list[dict[str, Any]] = field(default_factory=list)
 
     @property
@@ -129,7 +130,8 @@ class BagInfo:
     @property
     def missing(self) -> bool:
         """Return whether messages are known to be missing."""
-        return bool(self.recovered or self.lost or self.dropped or self.missed_at_start)
+        return bool(self.recovered or self.lost or self.dropped or self.missed_at_start
+                    or self.absent)
 
     @property
     def ending(self) -> Ending:
@@ -230,7 +232,7 @@ def bag_info(path: StrPath, recover: bool = False) -> BagInfo:
         path=str(path), storage=bag.storage, size_bytes=_size(Path(path)), start_ns=start_ns,
         duration_s=(end_ns - start_ns) * 1e-9, message_count=sum(bag.counts.values()),
         namespaces=sorted(muscles), topics=topics, metadata=bag.experiment, remarks=remarks,
-        notes=notes, recovered=bag.recovered or bool(recovery),
+        notes=notes, recovered=bag.recovered or bool(recovery), absent=bag.absent,
         markers=[{'time_s': (one.stamp_ns - start_ns) * 1e-9, 'text': one.text,
                   'namespace': place} for place, one in markers_of(bag)])
 

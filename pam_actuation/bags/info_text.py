@@ -115,7 +115,8 @@ def _verdict(info: 'BagInfo') -> str:
     elif info.complete is None:
         text = 'Nothing is known to be missing; not every topic could be checked.'
     else:
+        absent = f', {info.absent} announced and in no file' if info.absent else ''
         text = (
             f'Incomplete: {info.lost} messages lost, {info.dropped} dropped, '
-            f'{info.missed_at_start} sent before the recorder was connected.')
+            f'{info.missed_at_start} sent before the recorder was connected{absent}.')
     return text + (' Remarks:' if info.remarks else '')

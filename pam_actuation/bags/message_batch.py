@@ -19,6 +19,8 @@ Chunks of a recorder are small, so that little is lost with its power; here
 they are gathered until sorting them is worth a few array operations.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from pam_actuation.bags.payloads import alike, joined, Payloads
 from pam_actuation.bags.record_walk import MESSAGE_BYTES, MESSAGE_HEAD, RECORD_BYTES, windows
@@ -68,6 +70,12 @@ class MessageColumns:
                 _rows(data, positions[places], length), None if whole else first + places)
         self._log.append(heads['log_time_ns'].astype(np.int64))
         self._publish.append(heads['publish_time_ns'].astype(np.int64))
+
+    def append_raw(self, messages: Sequence[bytes], log_time_ns: Sequence[int]) -> None:
+        """Append messages of a storage that tells when they were received, not when sent."""
+        self.payloads.extend(Payloads(messages))
+        self._log.append(np.array(log_time_ns, dtype=np.int64))
+        self._publish.append(self._log[-1])
 
 
 class MessageBatch:

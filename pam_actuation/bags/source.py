@@ -16,20 +16,23 @@
 Open any bag of the rig: a rosbag2 directory, a lone .mcap, a sqlite3 bag.
 
 All of it is read into memory as bytes per topic; decoding is the business of
-``load.py`` and ``info.py``. MCAP goes through ``mcap_scan.py``, everything else
-that rosbag2 writes through the ``rosbags`` package.
+``load.py`` and ``info.py``. MCAP goes through ``mcap_scan.py``, sqlite3 through
+``database.py``; what is compressed is unpacked first.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+import contextlib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from pam_actuation.bags import layout
-from pam_actuation.bags.mcap_scan import Damaged, MAGIC, McapContent, scan
+from pam_actuation.bags.database import scan_database
+from pam_actuation.bags.mcap_scan import MAGIC, McapContent, scan
 from pam_actuation.bags.message_batch import MessageColumns
 from pam_actuation.bags.payloads import joined, Payloads
+from pam_actuation.bags.unpack import unpacked_file, unpacked_messages
 from pam_actuation.bags.writer import EXPERIMENT_RECORD
 from pam_sim.annotations import IntArray
 from pam_sim.errors import InputError
@@ -38,7 +41,9 @@ from pam_sim.short_repr import short_repr
 
 # Whether to keep the messages of a topic, by its name, message type and encoding.
 Wanted = Callable[[str, str, str], bool]
-_LONGEST_REASON = 300
+SQLITE = 'sqlite3'
+_STORAGES = {'.mcap': layout.STORAGE_IDENTIFIER, '.db3': SQLITE}
+_MOST = 3                   # topics that a remark lists
 _RECOVER = ('or keep that beginning: `pam info --recover` repairs the bag, and in Python '
             'recover=True reads it as it is')
 
@@ -67,7 +72,7 @@ class Bag:
 
     ``records`` are the named metadata records of the file (the last of each
     name), ``remarks`` sentences on anything odd, ``recovered`` tells that the
-    end is missing.
+    end is missing. ``absent`` is how many messages metadata.yaml announces that no file holds.
     """
 
     path: Path
@@ -76,6 +81,7 @@ class Bag:
     records: dict[str, dict[str, str]] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
     recovered: bool = False
+    absent: int = 0
 
     @property
     def counts(self) -> dict[str, int]:
@@ -95,7 +101,8 @@ def read_bag(path: StrPath, recover: bool = False, wanted: Wanted | None = None)
     Parameters
     ----------
     path : path
-        Directory with metadata.yaml, directory with only .mcap files, .mcap or .db3 file.
+        Directory with metadata.yaml, directory with only .mcap files, .mcap or .db3 file. Files
+        and messages may be compressed with zstd.
     recover : bool
         Also read what precedes the damage in a file that ended early.
     wanted : callable, optional
@@ -113,14 +120,12 @@ def read_bag(path: StrPath, recover: bool = False, wanted: Wanted | None = None)
         if not path.exists():
             raise InputError('no such file or directory; give the path of a bag', path)
         refuse_pipe(path)
+        if path.name == layout.METADATA_FILE:
+            path = path.parent
         if path.is_dir():
             return _read_directory(path, recover, wanted)
-        if path.suffix == '.mcap':
-            return _read_mcap(path, [path], recover, wanted)
-        if path.suffix == '.db3':
-            return _read_with_rosbags(path, path, wanted)
-        if path.name == layout.METADATA_FILE:
-            return _read_directory(path.parent, recover, wanted)
+        if path.suffix in _STORAGES:
+            return _read_files(path, [path], _STORAGES[path.suffix], recover, wanted)
     except PermissionError as error:
         raise InputError('no right to read this', error.filename or path) from None
     except OSError as error:
@@ -135,19 +140,25 @@ def _read_directory(path: Path, recover: bool, wanted: Wanted | None) -> Bag:
     if facts is None:
         files = sorted(filter(Path.is_file, path.glob('*.mcap')), key=_by_number)
         if files:
-            return _read_mcap(path, files, recover, wanted)
+            return _read_files(path, files, layout.STORAGE_IDENTIFIER, recover, wanted)
         databases = sorted(path.glob('*.db3'), key=_by_number)
         if len(databases) == 1:
-            return _read_with_rosbags(path, databases[0], wanted)
+            return _read_files(path, databases, SQLITE, recover, wanted)
         raise InputError(
             'no bag in this directory (neither metadata.yaml nor .mcap files); give the '
             "directory that 'pam run', 'pam simulate' or 'ros2 bag record' made", path)
-    plain_mcap = (
-        facts.get('storage_identifier') == 'mcap' and not facts.get('compression_mode'))
-    if not plain_mcap:
-        bag = _read_with_rosbags(path, path, wanted)
-        bag.storage = str(facts.get('storage_identifier') or bag.storage)
-        return bag
+    kind = str(facts.get('storage_identifier'))
+    if kind not in _STORAGES.values():
+        raise InputError(f'its storage is {kind}; allowed: {", ".join(_STORAGES.values())}', path)
+    bag = _read_files(path, _listed_files(path, facts), kind, recover, wanted)
+    if not bag.recovered:
+        _compare_counts(bag, facts)
+    _add_custom_data(bag, facts.get('custom_data'))
+    return bag
+
+
+def _listed_files(path: Path, facts: Mapping[str, Any]) -> list[Path]:
+    """Return the data files that metadata.yaml lists."""
     files = []
     for name in facts['relative_file_paths']:
         # Version 3 and older repeat the directory's name in front of the file's.
@@ -157,15 +168,31 @@ def _read_directory(path: Path, recover: bool, wanted: Wanted | None) -> Bag:
             raise InputError(
                 f'the file {name} named in {layout.METADATA_FILE} is missing', path)
         files.append(found[0])
-    bag = _read_mcap(path, files, recover, wanted)
+    return files
+
+
+def _compare_counts(bag: Bag, facts: Mapping[str, Any]) -> None:
+    """Note where the files hold other numbers of messages than metadata.yaml announces."""
     announced, present = facts.get('message_count'), sum(bag.counts.values())
     if not isinstance(announced, int) or announced.bit_length() > 64:
         bag.remarks.append(f'{layout.METADATA_FILE} announces no number of messages.')
-    elif announced != present and not bag.recovered:
-        bag.remarks.append(
-            f'{layout.METADATA_FILE} announces {announced} messages, the files hold {present}.')
-    _add_custom_data(bag, facts.get('custom_data'))
-    return bag
+        return
+    bag.absent = max(announced - present, 0)
+    if announced != present:
+        differ = [f'{bag.counts.get(name, 0)} of {count} on {name}'
+                  for name, count in _announced_counts(facts) if bag.counts.get(name, 0) != count]
+        more = [f'{len(differ) - _MOST} more topics'] if len(differ) > _MOST else []
+        listed = f' ({", ".join(differ[:_MOST] + more)})' if differ else ''
+        bag.remarks.append(f'{layout.METADATA_FILE} announces {announced} messages, the files '
+                           f'hold {present}{listed}.')
+
+
+def _announced_counts(facts: Mapping[str, Any]) -> list[tuple[str, int]]:
+    """Return (topic, number of messages) as metadata.yaml lists them; [] where it does not."""
+    with contextlib.suppress(KeyError, TypeError):
+        return [(str(row['topic_metadata']['name']), int(row['message_count']))
+                for row in facts['topics_with_message_count']]
+    return []
 
 
 def _directory_facts(path: Path) -> dict[str, Any] | None:
@@ -198,29 +225,35 @@ def _by_number(path: Path) -> tuple[int, str]:
     return (int(digits) if digits.isdigit() else -1, path.name)
 
 
-def _read_mcap(path: Path, files: Sequence[Path], recover: bool, wanted: Wanted | None) -> Bag:
-    bag = Bag(path=path, storage='mcap')
+def _read_files(path: Path, files: Sequence[Path], storage: str, recover: bool,
+                wanted: Wanted | None) -> Bag:
+    bag = Bag(path=path, storage=storage)
     keep = None if wanted is None else (
         lambda topic, type_name, encoding: wanted(topic, _full_type_name(type_name), encoding))
     pieces: dict[str, list[MessageColumns]] = {}
     for file in files:
-        with open(file, 'rb') as stream:
-            _refuse_foreign(stream.read(len(MAGIC)), file)
-            content = scan(stream, keep)
+        with unpacked_file(file) as plain:
+            content = (scan_database(plain, keep, path) if storage == SQLITE
+                       else _scan_mcap(file, plain, keep, recover))
         if content.damage is not None:
-            readable = (
-                f'{content.message_count} messages before that can still be read')
-            if not content.message_count or not recover:
-                raise InputError(
-                    _damage_sentence(content.damage, content.message_count,
-                                     file.stat().st_size, readable), file)
             bag.recovered = True
             bag.remarks.append(
-                f'{file.name} ended early or is damaged ({content.damage}); {readable}.')
+                f'{file.name} ended early or is damaged ({content.damage}); '
+                f'{_readable(content)}.')
         _add_content(bag, content, pieces)
     for topic in bag.topics.values():
         _join(topic, pieces[topic.name])
     return bag
+
+
+def _scan_mcap(file: Path, plain: Path, keep: Wanted | None, recover: bool) -> McapContent:
+    """Return what a file holds, from its unpacked copy; InputError where it is damaged."""
+    with open(plain, 'rb') as stream:
+        _refuse_foreign(stream.read(len(MAGIC)), file)
+        content = scan(stream, keep)
+    if content.damage is not None and not (content.message_count and recover):
+        raise InputError(_damage_sentence(content, plain.stat().st_size), file)
+    return content
 
 
 def _refuse_foreign(begin: bytes, file: Path) -> None:
@@ -232,14 +265,16 @@ def _refuse_foreign(begin: bytes, file: Path) -> None:
             file)
 
 
-def _damage_sentence(damage: Damaged, count: int, size: int, readable: str) -> str:
-    if not count:
-        readable = 'no message can be read: give another bag'
-    else:
-        readable += f': record again, {_RECOVER}'
-    if damage.problem.startswith(('the file ends', 'the end mark')):
+def _readable(content: McapContent) -> str:
+    return f'{content.message_count} messages before that can still be read'
+
+
+def _damage_sentence(content: McapContent, size: int) -> str:
+    readable = (f'{_readable(content)}: record again, {_RECOVER}' if content.message_count
+                else 'no message can be read: give another bag')
+    if str(content.damage).startswith(('the file ends', 'the end mark')):
         return f'the recording ended early (no end mark after {size} bytes); {readable}'
-    return f'the file is damaged ({damage}); {readable}'
+    return f'the file is damaged ({content.damage}); {readable}'
 
 
 def _add_content(bag: Bag, content: McapContent,
@@ -261,6 +296,7 @@ def _add_content(bag: Bag, content: McapContent,
 def _join(topic: TopicData, pieces: Sequence[MessageColumns]) -> None:
     for messages in pieces:
         topic.payloads.extend(messages.payloads)
+    topic.payloads = unpacked_messages(topic.payloads)
     topic.log_time_ns = joined([messages.log_time_ns for messages in pieces])
     topic.publish_time_ns = joined([messages.publish_time_ns for messages in pieces])
 
@@ -269,52 +305,6 @@ def _full_type_name(name: str) -> str:
     """Return package/msg/Name also for the short package/Name that some writers use."""
     package, _, rest = name.partition('/')
     return f'{package}/msg/{rest}' if rest and '/' not in rest else name
-
-
-def _read_with_rosbags(path: Path, opened: Path, wanted: Wanted | None) -> Bag:
-    from rosbags.rosbag2 import Reader
-    from rosbags.rosbag2.errors import ReaderError
-    bag = Bag(path=path, storage='sqlite3')
-    try:
-        with Reader(opened) as reader:
-            for connection in reader.connections:
-                bag.topics.setdefault(
-                    connection.topic, TopicData(connection.topic, connection.msgtype))
-            raws: dict[str, list[bytes]] = {name: [] for name in bag.topics}
-            times: dict[str, list[int]] = {name: [] for name in bag.topics}
-            read: list[Any] = []
-            counted: list[Any] = []
-            for connection in reader.connections:
-                topic = bag.topics[connection.topic]
-                if connection.msgtype == topic.type_name:
-                    kept = wanted is None or wanted(topic.name, topic.type_name, topic.encoding)
-                    (read if kept else counted).append(connection)
-            # Without a connection the library would read them all.
-            for connection, log_time_ns, raw in reader.messages(read) if read else ():
-                raws[connection.topic].append(bytes(raw))
-                times[connection.topic].append(log_time_ns)
-            for name, topic in bag.topics.items():
-                topic.payloads = Payloads(raws[name])
-                topic.payloads.skip(sum(
-                    one.msgcount for one in counted if one.topic == name))
-                # This storage keeps only the receive time.
-                topic.log_time_ns = np.array(times[name], dtype=np.int64)
-                topic.publish_time_ns = topic.log_time_ns
-            _add_custom_data(bag, getattr(reader.storage.metadata, 'custom', None))
-    except (ReaderError, FileNotFoundError) as error:
-        raise InputError(f'not a readable rosbag2 bag: {_short(error)}', path) from None
-    # The database library has its own family of exceptions, all meaning a broken file.
-    except Exception as error:
-        raise InputError(
-            f'not a readable rosbag2 bag ({type(error).__name__}: {_short(error)})',
-            path) from None
-    return bag
-
-
-def _short(error: object) -> str:
-    """Return the text of a library's error as part of one sentence."""
-    text = ' '.join(str(error).split())
-    return text if len(text) < _LONGEST_REASON else f'{text[:_LONGEST_REASON]} …'
 
 
 def _add_custom_data(bag: Bag, custom: object) -> None:

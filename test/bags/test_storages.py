@@ -1,0 +1,109 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Bags of other storages that are not as their metadata says, or have none."""
+
+import sqlite3
+
+from pam_actuation.bags import layout
+from pam_actuation.bags.info import bag_info, render_text
+from pam_actuation.bags.load import load_run
+from pam_actuation.cli.main import main
+from pam_actuation.topics.table import RECORDED
+from pam_sim.errors import InputError
+import pytest
+from rosbags.rosbag2 import CompressionMode, StoragePlugin
+from sample_bag import METADATA, START_NS, STEP_NS, write_bag
+from sample_foreign import write_with_rosbags
+import zstandard
+
+COUNT = 30
+
+
+def change_metadata(bag, change):
+    """Let ``change`` edit what metadata.yaml says."""
+    file = bag / layout.METADATA_FILE
+    content = layout.from_yaml(file.read_text())
+    change(content[layout.METADATA_ROOT])
+    file.write_text(layout.to_yaml(content))
+
+
+def delete_rows(database, condition):
+    with sqlite3.connect(database) as connection:
+        connection.execute(f'DELETE FROM messages WHERE {condition}')
+
+
+def test_lost_rows_of_a_database_are_told(tmp_path, capsys):
+    bag = write_with_rosbags(tmp_path / 'run', COUNT, StoragePlugin.SQLITE3)
+    whole = COUNT * len(RECORDED)
+    delete_rows(bag / 'run.db3', f'timestamp >= {START_NS + 20 * STEP_NS}')
+    kept = 20 * len(RECORDED)
+    info = bag_info(bag)
+    assert (info.message_count, info.absent, info.complete) == (kept, whole - kept, False)
+    told, = info.remarks
+    assert f'announces {whole} messages, the files hold {kept}' in told
+    assert f'20 of {COUNT} on /muscle/' in told and f'{len(RECORDED) - 3} more topics' in told
+    assert f'{whole - kept} announced and in no file' in render_text(info)
+    assert 'Nothing is known to be missing' not in render_text(info)
+    assert main(['info', str(bag)]) == 1
+    capsys.readouterr()
+    # A program that reads one topic alone hears the same of the whole bag.
+    assert any('announces' in remark for remark in load_run(bag).remarks)
+
+
+def test_a_database_that_lacks_one_topic_names_it(tmp_path):
+    bag = write_with_rosbags(tmp_path / 'run', COUNT, StoragePlugin.SQLITE3)
+    delete_rows(bag / 'run.db3', f'topic_id = 1 AND timestamp < {START_NS + 5 * STEP_NS}')
+    told, = bag_info(bag).remarks
+    assert f'({COUNT - 5} of {COUNT} on /muscle/' in told and told.count(' on ') == 1
+
+
+@pytest.mark.parametrize('compressed', [False, True])
+def test_messages_are_read_whatever_metadata_says_of_their_quality_of_service(
+        tmp_path, compressed):
+    bag = write_bag(tmp_path / 'run', COUNT)
+    file = bag / 'run_0.mcap'
+    if compressed:
+        (bag / 'run_0.mcap.zstd').write_bytes(zstandard.compress(file.read_bytes()))
+        file.unlink()
+
+    def forget(facts):
+        for row in facts['topics_with_message_count']:
+            row['topic_metadata']['offered_qos_profiles'] = []
+        facts['custom_data'] = None
+        if compressed:
+            facts.update(compression_mode='FILE', compression_format='zstd',
+                         relative_file_paths=['run_0.mcap.zstd'])
+    change_metadata(bag, forget)
+    run = load_run(bag)
+    assert len(run['pressure']) == COUNT and run.remarks == ()
+    assert run.metadata == METADATA         # of the record in the file
+    assert bag_info(bag).storage == 'mcap'
+
+
+def test_a_damaged_compressed_file_is_refused(tmp_path):
+    bag = write_with_rosbags(tmp_path / 'run', COUNT, StoragePlugin.SQLITE3, CompressionMode.FILE)
+    file = bag / 'run.db3.zstd'
+    data = bytearray(file.read_bytes())
+    data[len(data) // 2:len(data) // 2 + 50] = bytes(50)
+    file.write_bytes(data)
+    with pytest.raises(InputError, match='run.db3.zstd: the compressed file is damaged'):
+        load_run(bag)
+
+
+def test_a_storage_that_nobody_here_reads_is_named(tmp_path):
+    bag = write_bag(tmp_path / 'run', 3)
+    change_metadata(bag, lambda facts: facts.update(storage_identifier='tape'))
+    with pytest.raises(InputError, match='its storage is tape; allowed: mcap, sqlite3'):
+        load_run(bag)
