@@ -101,8 +101,8 @@ def read_bag(path: StrPath, recover: bool = False, wanted: Wanted | None = None)
     Parameters
     ----------
     path : path
-        Directory with metadata.yaml, directory with only .mcap files, .mcap or .db3 file. Files
-        and messages may be compressed with zstd.
+        Directory with metadata.yaml, directory with only .mcap or only .db3 files, or one such
+        file. Files and messages may be compressed with zstd.
     recover : bool
         Also read what precedes the damage in a file that ended early.
     wanted : callable, optional
@@ -138,14 +138,12 @@ def read_bag(path: StrPath, recover: bool = False, wanted: Wanted | None = None)
 def _read_directory(path: Path, recover: bool, wanted: Wanted | None) -> Bag:
     facts = _directory_facts(path)
     if facts is None:
-        files = sorted(filter(Path.is_file, path.glob('*.mcap')), key=_by_number)
-        if files:
-            return _read_files(path, files, layout.STORAGE_IDENTIFIER, recover, wanted)
-        databases = sorted(path.glob('*.db3'), key=_by_number)
-        if len(databases) == 1:
-            return _read_files(path, databases, SQLITE, recover, wanted)
+        for suffix, storage in _STORAGES.items():
+            files = sorted(filter(Path.is_file, path.glob(f'*{suffix}')), key=_by_number)
+            if files:
+                return _read_files(path, files, storage, recover, wanted)
         raise InputError(
-            'no bag in this directory (neither metadata.yaml nor .mcap files); give the '
+            'no bag in this directory (neither metadata.yaml nor .mcap or .db3 files); give the '
             "directory that 'pam run', 'pam simulate' or 'ros2 bag record' made", path)
     kind = str(facts.get('storage_identifier'))
     if kind not in _STORAGES.values():

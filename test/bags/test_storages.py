@@ -14,6 +14,7 @@
 
 """Bags of other storages that are not as their metadata says, or have none."""
 
+import shutil
 import sqlite3
 
 from pam_actuation.bags import layout
@@ -107,3 +108,25 @@ def test_a_storage_that_nobody_here_reads_is_named(tmp_path):
     change_metadata(bag, lambda facts: facts.update(storage_identifier='tape'))
     with pytest.raises(InputError, match='its storage is tape; allowed: mcap, sqlite3'):
         load_run(bag)
+
+
+def test_parts_of_a_database_without_metadata_are_read_in_order(tmp_path):
+    bag = write_with_rosbags(tmp_path / 'run', COUNT, StoragePlugin.SQLITE3)
+    parts = tmp_path / 'parts'
+    parts.mkdir()
+    for number, (begin, end) in {2: (0, 10), 9: (10, 20), 10: (20, 30)}.items():
+        part = parts / f'part_{number}.db3'
+        shutil.copy(bag / 'run.db3', part)
+        begin_ns, end_ns = START_NS + begin * STEP_NS, START_NS + end * STEP_NS
+        delete_rows(part, f'timestamp < {begin_ns} OR timestamp >= {end_ns}')
+    run = load_run(parts)
+    assert list(run['pressure'].stamp_ns) == [START_NS + i * STEP_NS for i in range(COUNT)]
+    assert run.remarks == ()
+
+
+@pytest.mark.parametrize('plugin', list(StoragePlugin), ids=lambda plugin: plugin.name)
+def test_a_lone_file_of_compressed_messages_is_read(tmp_path, plugin):
+    bag = write_with_rosbags(tmp_path / 'run', COUNT, plugin, CompressionMode.MESSAGE)
+    run = load_run(next(file for file in bag.iterdir() if file.name != layout.METADATA_FILE))
+    assert len(run['pressure']) == len(run['contraction']) == COUNT and run.remarks == ()
+    assert len(run.reference_trajectories) == COUNT
