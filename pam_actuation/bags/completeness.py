@@ -32,8 +32,8 @@ _ARRIVES_NS = 100_000_000
 def reported_counts(bag: Bag) -> PublishedCounts:
     """Return the PublishedCounts of a bag's diagnostics."""
     published = PublishedCounts({
-        name: int(topic.publish_time_ns.min()) if len(topic.publish_time_ns) else 0
-        for name, topic in bag.topics.items()})
+        topic.recorded_name: int(topic.publish_time_ns.min()) if len(topic.publish_time_ns) else 0
+        for topic in bag.topics.values()})
     topic = bag.topics.get(DIAGNOSTICS)
     if topic is not None and is_rig_topic(topic):
         for raw, sent_ns in zip(topic.payloads, topic.publish_time_ns.tolist()):
@@ -45,11 +45,11 @@ def add_counts(info: 'TopicInfo', topic: TopicData, recording: Mapping[str, str]
                reports: PublishedCounts) -> None:
     """Enter what recorder and nodes have counted of a topic, and what is lost by that."""
     def recorded(key: str) -> int | None:
-        return count_of(recording.get(f'{topic.name}.{key}', ''))
+        return count_of(recording.get(f'{topic.recorded_name}.{key}', ''))
 
     info.dropped = recorded('dropped')
     info.missed_at_start = recorded('missed_at_start')
-    info.published, sent_ns = reports.of(topic.name)
+    info.published, sent_ns = reports.of(topic.recorded_name)
     info.lost = missing_messages(
         recorded('lost'), info.published, _held_by(info, topic, sent_ns),
         (info.dropped or 0) + (info.missed_at_start or 0))
@@ -70,11 +70,11 @@ def _held_by(info: 'TopicInfo', topic: TopicData, sent_ns: int) -> int:
 def count_from_first_report(info: 'TopicInfo', topic: TopicData,
                             reports: PublishedCounts) -> None:
     """Tell what was published before the bag of another logger from what was lost in it."""
-    published, sent_ns = reports.of(topic.name)
+    published, sent_ns = reports.of(topic.recorded_name)
     if topic.name == DIAGNOSTICS:
         info.sent_before = before = reports.missed_reports()
     else:
-        first = reports.first_of(topic.name)
+        first = reports.first_of(topic.recorded_name)
         before = None
         if first is not None:
             since_ns = first[1] - (0 if _knows_send_times(topic) else _ARRIVES_NS)

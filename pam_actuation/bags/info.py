@@ -40,6 +40,7 @@ from pam_actuation.bags.markers import markers_of
 from pam_actuation.bags.recorder import RECORDING_RECORD
 from pam_actuation.bags.recover import RECOVERY_RECORD
 from pam_actuation.bags.source import Bag, read_bag, TopicData
+from pam_actuation.bags.writer import EXPERIMENT_RECORD
 from pam_actuation.topics.cdr import CdrError
 from pam_actuation.topics.definitions import typestore
 from pam_actuation.topics.table import BY_NAME, OF_A_RUN, short_name, TOPICS
@@ -192,7 +193,8 @@ def bag_info(path: StrPath, recover: bool = False) -> BagInfo:
     recording = bag.records.get(RECORDING_RECORD, {})
     published = reported_counts(bag)
     # Of any other bag nobody knows that it began with the nodes.
-    simulated = bool(bag.experiment) and bag.experiment.get('origin') != 'live'
+    told = bag.records.get(EXPERIMENT_RECORD, {})
+    simulated = bool(told) and told.get('origin') != 'live'
     remarks = list(bag.remarks)
     if recording.get('write_error'):
         remarks.append(f'The recorder could not go on: {recording["write_error"]}.')
@@ -219,6 +221,8 @@ def bag_info(path: StrPath, recover: bool = False) -> BagInfo:
     remarks += missing
     if ending_of(bag.experiment).early:
         remarks.append(ending_of(bag.experiment).sentence)
+    notes += [f'{topic.name} is {topic.recorded_name} in the bag.'
+              for topic in bag.topics.values() if topic.name != topic.recorded_name]
     notes += [text + '.' for text in bag.experiment.get('remarks', '').splitlines()]
     if bag.experiment.get('controller_other_rig'):
         notes.append(f'The controller was {bag.experiment["controller_other_rig"]}; '

@@ -14,7 +14,9 @@
 
 """What a bag says about its experiment: the ``pam_experiment`` record."""
 
+from collections.abc import Mapping
 import importlib.metadata
+import json
 from typing import Any
 
 from pam_actuation.bags.ending import Ending
@@ -29,6 +31,26 @@ UNITS = (
     'valve_signal, valve_command: ppr_voltage V, fill_duty and vent_duty 1; '
     'time: header.stamp, ns'
 )
+
+# Text that says which topics of the rig the file has under other names; see ``names_text``.
+TOPIC_NAMES = 'topic_names'
+
+
+def names_text(names: Mapping[str, str]) -> str:
+    """Return the text ``topic_names`` of {full name: name in the file}, '' for none."""
+    return json.dumps(names) if names else ''
+
+
+def names_of(metadata: Mapping[str, str]) -> dict[str, str]:
+    """Return what a text of ``names_text`` says; {} where there is none, or one of others."""
+    try:
+        names = json.loads(metadata.get(TOPIC_NAMES, '{}'))
+    except ValueError:
+        return {}
+    if not isinstance(names, dict) or not all(
+            isinstance(name, str) and name.startswith('/') for name in names.values()):
+        return {}
+    return names
 
 
 def software_version() -> str:

@@ -31,6 +31,7 @@ from pam_actuation.bags import layout
 from pam_actuation.bags.database import scan_database
 from pam_actuation.bags.mcap_scan import MAGIC, McapContent, scan
 from pam_actuation.bags.message_batch import MessageColumns
+from pam_actuation.bags.metadata import names_of, names_text, TOPIC_NAMES
 from pam_actuation.bags.payloads import joined, Payloads
 from pam_actuation.bags.unpack import unpacked_file, unpacked_messages
 from pam_actuation.bags.writer import EXPERIMENT_RECORD
@@ -41,6 +42,8 @@ from pam_sim.short_repr import short_repr
 
 # Whether to keep the messages of a topic, by its name, message type and encoding.
 Wanted = Callable[[str, str, str], bool]
+# Behind the name of a topic in whose place another one is read; no topic of ROS ends so.
+REPLACED = ' (replaced)'
 SQLITE = 'sqlite3'
 _STORAGES = {'.mcap': layout.STORAGE_IDENTIFIER, '.db3': SQLITE}
 _MOST = 3                   # topics that a remark lists
@@ -55,9 +58,14 @@ def _no_times() -> IntArray:
 @short_repr
 @dataclass
 class TopicData:
-    """The N messages of one topic as bytes, in file order, with their times [ns], shape (N,)."""
+    """
+    The N messages of one topic as bytes, in file order, with their times [ns], shape (N,).
+
+    ``recorded_name`` is its name in the file, which may be another one.
+    """
 
     name: str
+    recorded_name: str
     type_name: str
     encoding: str = 'cdr'
     payloads: Payloads = field(default_factory=Payloads)
@@ -73,6 +81,7 @@ class Bag:
     ``records`` are the named metadata records of the file (the last of each
     name), ``remarks`` sentences on anything odd, ``recovered`` tells that the
     end is missing. ``absent`` is how many messages metadata.yaml announces that no file holds.
+    ``given_names`` are those of ``read_bag``.
     """
 
     path: Path
@@ -82,6 +91,7 @@ class Bag:
     remarks: list[str] = field(default_factory=list)
     recovered: bool = False
     absent: int = 0
+    given_names: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def counts(self) -> dict[str, int]:
@@ -90,11 +100,18 @@ class Bag:
 
     @property
     def experiment(self) -> dict[str, str]:
-        """Return the ``pam_experiment`` record; empty where the bag has none."""
-        return dict(self.records.get(EXPERIMENT_RECORD, {}))
+        """Return the ``pam_experiment`` record, with all ``names``; empty where there is none."""
+        texts = dict(self.records.get(EXPERIMENT_RECORD, {}))
+        return {**texts, TOPIC_NAMES: names_text(self.names)} if self.names else texts
+
+    @property
+    def names(self) -> dict[str, str]:
+        """Return {full name: name in the file} where these differ, as told by bag and user."""
+        return {**names_of(self.records.get(EXPERIMENT_RECORD, {})), **self.given_names}
 
 
-def read_bag(path: StrPath, recover: bool = False, wanted: Wanted | None = None) -> Bag:
+def read_bag(path: StrPath, recover: bool = False, wanted: Wanted | None = None,
+             names: Mapping[str, str] | None = None) -> Bag:
     """
     Read a bag into memory.
 
@@ -108,6 +125,9 @@ def read_bag(path: StrPath, recover: bool = False, wanted: Wanted | None = None)
     wanted : callable, optional
         Called with topic, message type and encoding: whether to keep these messages. Others
         are counted, and nothing of them is kept in memory.
+    names : dict of str to str, optional
+        {full name: name in the file} of topics that go by other names here. They count before
+        those that the bag itself tells (``topic_names`` in its ``pam_experiment``).
 
     Raises
     ------
@@ -116,6 +136,7 @@ def read_bag(path: StrPath, recover: bool = False, wanted: Wanted | None = None)
 
     """
     path = Path(path)
+    how = _How(recover, wanted, names or {})
     try:
         if not path.exists():
             raise InputError('no such file or directory; give the path of a bag', path)
@@ -123,9 +144,9 @@ def read_bag(path: StrPath, recover: bool = False, wanted: Wanted | None = None)
         if path.name == layout.METADATA_FILE:
             path = path.parent
         if path.is_dir():
-            return _read_directory(path, recover, wanted)
+            return _read_directory(path, how)
         if path.suffix in _STORAGES:
-            return _read_files(path, [path], _STORAGES[path.suffix], recover, wanted)
+            return _read_files(path, [path], _STORAGES[path.suffix], how)
     except PermissionError as error:
         raise InputError('no right to read this', error.filename or path) from None
     except OSError as error:
@@ -135,23 +156,45 @@ def read_bag(path: StrPath, recover: bool = False, wanted: Wanted | None = None)
         'not a bag; give a rosbag2 directory, an .mcap or a .db3 file', path)
 
 
-def _read_directory(path: Path, recover: bool, wanted: Wanted | None) -> Bag:
+@dataclass(frozen=True)
+class _How:
+    """What ``read_bag`` was told."""
+
+    recover: bool
+    wanted: Wanted | None
+    names: Mapping[str, str]
+
+    def keep(self, names: Mapping[str, str]) -> Wanted | None:
+        """Return whether to keep the messages of a topic, by its name in the file."""
+        wanted = self.wanted
+        return None if wanted is None else lambda topic, type_name, encoding: wanted(
+            _name_here(topic, names), _full_type_name(type_name), encoding)
+
+
+def _name_here(recorded: str, names: Mapping[str, str]) -> str:
+    """Return the name of a topic of the file, by {full name: name in the file}."""
+    for name, other in names.items():
+        if other == recorded:
+            return name
+    return recorded + REPLACED if recorded in names else recorded
+
+
+def _read_directory(path: Path, how: _How) -> Bag:
     facts = _directory_facts(path)
     if facts is None:
         for suffix, storage in _STORAGES.items():
             files = sorted(filter(Path.is_file, path.glob(f'*{suffix}')), key=_by_number)
             if files:
-                return _read_files(path, files, storage, recover, wanted)
+                return _read_files(path, files, storage, how)
         raise InputError(
             'no bag in this directory (neither metadata.yaml nor .mcap or .db3 files); give the '
             "directory that 'pam run', 'pam simulate' or 'ros2 bag record' made", path)
     kind = str(facts.get('storage_identifier'))
     if kind not in _STORAGES.values():
         raise InputError(f'its storage is {kind}; allowed: {", ".join(_STORAGES.values())}', path)
-    bag = _read_files(path, _listed_files(path, facts), kind, recover, wanted)
+    bag = _read_files(path, _listed_files(path, facts), kind, how, _custom_data(facts))
     if not bag.recovered:
         _compare_counts(bag, facts)
-    _add_custom_data(bag, facts.get('custom_data'))
     return bag
 
 
@@ -171,14 +214,15 @@ def _listed_files(path: Path, facts: Mapping[str, Any]) -> list[Path]:
 
 def _compare_counts(bag: Bag, facts: Mapping[str, Any]) -> None:
     """Note where the files hold other numbers of messages than metadata.yaml announces."""
-    announced, present = facts.get('message_count'), sum(bag.counts.values())
+    counts = {topic.recorded_name: len(topic.payloads) for topic in bag.topics.values()}
+    announced, present = facts.get('message_count'), sum(counts.values())
     if not isinstance(announced, int) or announced.bit_length() > 64:
         bag.remarks.append(f'{layout.METADATA_FILE} announces no number of messages.')
         return
     bag.absent = max(announced - present, 0)
     if announced != present:
-        differ = [f'{bag.counts.get(name, 0)} of {count} on {name}'
-                  for name, count in _announced_counts(facts) if bag.counts.get(name, 0) != count]
+        differ = [f'{counts.get(name, 0)} of {count} on {name}'
+                  for name, count in _announced_counts(facts) if counts.get(name, 0) != count]
         more = [f'{len(differ) - _MOST} more topics'] if len(differ) > _MOST else []
         listed = f' ({", ".join(differ[:_MOST] + more)})' if differ else ''
         bag.remarks.append(f'{layout.METADATA_FILE} announces {announced} messages, the files '
@@ -223,16 +267,20 @@ def _by_number(path: Path) -> tuple[int, str]:
     return (int(digits) if digits.isdigit() else -1, path.name)
 
 
-def _read_files(path: Path, files: Sequence[Path], storage: str, recover: bool,
-                wanted: Wanted | None) -> Bag:
-    bag = Bag(path=path, storage=storage)
-    keep = None if wanted is None else (
-        lambda topic, type_name, encoding: wanted(topic, _full_type_name(type_name), encoding))
+def _read_files(path: Path, files: Sequence[Path], storage: str, how: _How,
+                records: Mapping[str, dict[str, str]] | None = None) -> Bag:
+    """Return what files hold; ``records`` are known already, those of the files count before."""
+    bag = Bag(path=path, storage=storage, records=dict(records or {}), given_names=how.names)
     pieces: dict[str, list[MessageColumns]] = {}
     for file in files:
         with unpacked_file(file) as plain:
-            content = (scan_database(plain, keep, path) if storage == SQLITE
-                       else _scan_mcap(file, plain, keep, recover))
+            names = None
+            # A file that tells names of its own is read again, by these.
+            while names != bag.names:
+                names = bag.names
+                content = (scan_database(plain, how.keep(names), path) if storage == SQLITE
+                           else _scan_mcap(file, plain, how.keep(names), how.recover))
+                bag.records.update(content.metadata)
         if content.damage is not None:
             bag.recovered = True
             bag.remarks.append(
@@ -278,17 +326,16 @@ def _damage_sentence(content: McapContent, size: int) -> str:
 def _add_content(bag: Bag, content: McapContent,
                  pieces: dict[str, list[MessageColumns]]) -> None:
     """Note a file's topics in the bag and their messages in ``pieces``, by topic."""
-    bag.records.update(content.metadata)
     for channel in content.channels.values():
-        type_name = _full_type_name(channel.type_name)
+        type_name, name = _full_type_name(channel.type_name), _name_here(channel.topic, bag.names)
         topic = bag.topics.setdefault(
-            channel.topic, TopicData(channel.topic, type_name, channel.message_encoding))
+            name, TopicData(name, channel.topic, type_name, channel.message_encoding))
         if (type_name, channel.message_encoding) != (topic.type_name, topic.encoding):
             bag.remarks.append(
                 f'{channel.topic} has several message types ({topic.type_name}, '
                 f'{type_name}); only the first is read.')
             continue
-        pieces.setdefault(channel.topic, []).append(channel.messages)
+        pieces.setdefault(name, []).append(channel.messages)
 
 
 def _join(topic: TopicData, pieces: Sequence[MessageColumns]) -> None:
@@ -305,11 +352,10 @@ def _full_type_name(name: str) -> str:
     return f'{package}/msg/{rest}' if rest and '/' not in rest else name
 
 
-def _add_custom_data(bag: Bag, custom: object) -> None:
-    """Take the experiment from metadata.yaml where the file itself has no record of it."""
-    if isinstance(custom, dict) and EXPERIMENT_RECORD not in bag.records:
-        texts = {
-            key: value for key, value in custom.items()
-            if isinstance(key, str) and isinstance(value, str)}
-        if texts:
-            bag.records[EXPERIMENT_RECORD] = texts
+def _custom_data(facts: Mapping[str, Any]) -> dict[str, dict[str, str]]:
+    """Return the record of the experiment that metadata.yaml keeps, by its name."""
+    custom = facts.get('custom_data')
+    texts = {} if not isinstance(custom, dict) else {
+        key: value for key, value in custom.items()
+        if isinstance(key, str) and isinstance(value, str)}
+    return {EXPERIMENT_RECORD: texts} if texts else {}

@@ -26,7 +26,7 @@ from pam_actuation.bags.ending import Ending
 from pam_actuation.bags.ending import ending_of
 from pam_actuation.bags.ending import EndWatch
 from pam_actuation.bags.ending import RECORDED_FILE
-from pam_actuation.bags.metadata import experiment_metadata
+from pam_actuation.bags.metadata import experiment_metadata, names_text, TOPIC_NAMES
 from pam_actuation.bags.recorder import RecorderCore, RecordingSummary
 from pam_actuation.bags.writer import BagWriter, check_limits
 from pam_actuation.drivers.parameter import node_parameter
@@ -141,6 +141,11 @@ class ExperimentRecorder(ManagedNode):
             row = KNOWN[topic]
             name = row.full_name('') if row.place == ROOT else topic
             self._record(topic, name, row.type_name, row.service.recorder)
+        names = {name: source.topic for topic, source in self.sources.items() if (
+            name := KNOWN[topic].full_name('') if KNOWN[topic].place == ROOT
+            else f'{self.get_namespace().rstrip("/")}/{topic}') != source.topic}
+        if names:
+            self.metadata[TOPIC_NAMES] = names_text(names)
         for name, type_name in self.extra.items():
             self._record(name, name, type_name, USUAL.recorder)
 

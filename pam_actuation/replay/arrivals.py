@@ -29,6 +29,7 @@ import numpy as np
 from pam_actuation.bags import series
 from pam_actuation.bags.load import is_read, topics_of
 from pam_actuation.bags.load_joint import topics_of_joint
+from pam_actuation.bags.metadata import names_of
 from pam_actuation.bags.source import read_bag, TopicData
 from pam_actuation.loops.bus import Bus
 from pam_actuation.messages import Message
@@ -134,8 +135,9 @@ def recorded_topics(run: Run, topics: Iterable[str],
 
     """
     topics, ticks = set(topics), set(ticks)
-    bag = read_bag(run.path, recover=True, wanted=lambda name, *kind: (
-        name.rsplit('/', 1)[-1] in topics and is_read(name, *kind)))
+    bag = read_bag(run.path, recover=True, names=names_of(run.metadata),
+                   wanted=lambda name, *kind: (
+                       name.rsplit('/', 1)[-1] in topics and is_read(name, *kind)))
     found = {}
     for short, topic in topics_of(bag, run.namespace).items():
         if short in topics:
@@ -152,7 +154,7 @@ def recorded_topics_of_joint(run: Run) -> dict[str, RecordedTopic]:
     Commands and signals of each muscle are beside each other: the flexor comes first, as in a
     simulation. Errors are those of ``recorded_topics``.
     """
-    bag = read_bag(run.path, recover=True)
+    bag = read_bag(run.path, recover=True, names=names_of(run.metadata))
     found = topics_of_joint(bag, run.namespace)
     ordered = sorted(
         (name for name in found if short_name(name) in ORDER_OF_JOINT),

@@ -15,6 +15,9 @@
 """Bags in the forms that other writers choose, for tests of reading."""
 
 from mcap.writer import CompressionType, Writer
+from pam_actuation.bags.metadata import names_text, TOPIC_NAMES
+from pam_actuation.bags.source import read_bag
+from pam_actuation.bags.writer import BagWriter, EXPERIMENT_RECORD
 from pam_actuation.topics import codec, definitions
 from pam_actuation.topics.table import RECORDED
 from rosbags.rosbag2 import CompressionFormat
@@ -65,4 +68,24 @@ def write_with_rosbags(directory, count, plugin, compression=None, namespaces=('
                             name, RECORDED[short].type_name, typestore=definitions.typestore())
                     writer.write(
                         connections[name], START_NS + i * STEP_NS, codec.encode(short, message))
+    return directory
+
+
+def with_other_names(bag, directory, names, told=True):
+    """
+    Copy a bag with topics under other names, {full name: other}; return the directory.
+
+    ``told``: the copy says so, as the recorder of a rig with remapped topics does.
+    """
+    old = read_bag(bag)
+    records = {EXPERIMENT_RECORD: {**old.experiment, TOPIC_NAMES: names_text(names)} if told
+               else old.experiment}
+    with BagWriter(directory, records) as writer:
+        messages = []
+        for name, topic in old.topics.items():
+            writer.add_topic(names.get(name, name), topic.type_name)
+            messages += zip(topic.log_time_ns.tolist(), topic.publish_time_ns.tolist(),
+                            [names.get(name, name)] * len(topic.payloads), topic.payloads)
+        for log_ns, publish_ns, name, data in sorted(messages, key=lambda one: one[0]):
+            writer.write(name, data, log_ns, publish_ns)
     return directory

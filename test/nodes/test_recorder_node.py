@@ -25,6 +25,7 @@ from live_rig import LiveRig, wait_for                                      # no
 from pam_actuation.bags.check import independent_readers                    # noqa: E402
 from pam_actuation.bags.info import bag_info                                # noqa: E402
 from pam_actuation.bags.recover import recover_bag                          # noqa: E402
+from pam_actuation.bags.source import read_bag                              # noqa: E402
 from pam_actuation.messages import Pressure                                 # noqa: E402
 from pam_actuation.nodes import qos                                         # noqa: E402
 from pam_actuation.nodes.experiment_recorder import ExperimentRecorder      # noqa: E402
@@ -116,6 +117,34 @@ def test_a_bag_of_its_own_is_written_each_time_the_node_is_activated(tmp_path):
         lock.release()
     for name in ('first', 'second'):
         assert (tmp_path / name / 'metadata.yaml').is_file()
+
+
+def test_the_bag_of_a_remapped_rig_says_which_topic_is_which(tmp_path):
+    lock = DomainLock()
+    context = local_context(lock.domain_id)
+    recorder = ExperimentRecorder(
+        context=context, namespace='/lab/arm', enable_rosout=False,
+        cli_args=['--ros-args', '-r', 'pressure:=/daq/p1', '-r', '/diagnostics:=/lab/health'],
+        parameter_overrides=[Parameter('output', value=str(tmp_path / 'bag')),
+                             Parameter('topics', value=['pressure', 'force', 'diagnostics'])])
+    sensor = rclpy.create_node('sensor', context=context)
+    try:
+        recorder.trigger_configure()
+        recorder.trigger_activate()
+        publisher = sensor.create_publisher(FluidPressure, '/daq/p1', qos.PUBLISHER)
+        wait_for(lambda: publisher.get_subscription_count() > 0
+                 and recorder.count_publishers('/daq/p1') > 0, 10.0, 'the subscription')
+        for number in range(5):
+            publisher.publish(message(number))
+        recorder.trigger_deactivate()
+    finally:
+        sensor.destroy_node()
+        recorder.destroy_node()
+        rclpy.try_shutdown(context=context)
+        lock.release()
+    bag = read_bag(tmp_path / 'bag')
+    assert bag.names == {'/lab/arm/pressure': '/daq/p1', '/diagnostics': '/lab/health'}
+    assert bag.counts['/lab/arm/pressure'] == 5 and '/daq/p1' not in bag.counts
 
 
 def test_nodes_that_come_up_with_the_recorder_are_recorded_from_their_first_message(tmp_path):
