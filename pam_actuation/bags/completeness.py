@@ -17,9 +17,9 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from pam_actuation.bags.load import is_rig_topic
 from pam_actuation.bags.losses import (
     count_of, DIAGNOSTICS, missing_messages, PublishedCounts)
+from pam_actuation.bags.rig_topics import is_rig_topic
 from pam_actuation.bags.source import Bag, TopicData
 
 if TYPE_CHECKING:

@@ -21,6 +21,7 @@ Completeness is judged twice. One measure is the count of the recorder, kept in 
 may begin long after the nodes: then only what they published since counts.
 """
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cache
 from pathlib import Path
@@ -34,11 +35,12 @@ from pam_actuation.bags.completeness import (
 from pam_actuation.bags.ending import Ending, ending_of
 from pam_actuation.bags.facts import recorded_rig_title
 from pam_actuation.bags.info_text import render_text
-from pam_actuation.bags.load import is_rig_topic, namespaces
 from pam_actuation.bags.load_joint import is_joint_topic
 from pam_actuation.bags.markers import markers_of
 from pam_actuation.bags.recorder import RECORDING_RECORD
 from pam_actuation.bags.recover import RECOVERY_RECORD
+from pam_actuation.bags.renamed import full_names
+from pam_actuation.bags.rig_topics import is_rig_topic, namespaces
 from pam_actuation.bags.source import Bag, read_bag, TopicData
 from pam_actuation.bags.writer import EXPERIMENT_RECORD
 from pam_actuation.topics.cdr import CdrError
@@ -172,7 +174,8 @@ class BagInfo:
             'ending': {**asdict(self.ending), 'sentence': self.ending.sentence}}
 
 
-def bag_info(path: StrPath, recover: bool = False) -> BagInfo:
+def bag_info(path: StrPath, recover: bool = False, namespace: str | None = None,
+             topics: Mapping[str, object] | None = None) -> BagInfo:
     """
     Look through a bag.
 
@@ -182,6 +185,10 @@ def bag_info(path: StrPath, recover: bool = False) -> BagInfo:
         As for ``load_run``.
     recover : bool
         Also look at a bag that ended early.
+    namespace : str, optional
+        Where ``topics`` belong. The whole bag is looked at; see ``in_namespace``.
+    topics : dict of str to str, optional
+        Topics with other names than ours, as of ``load_recording``.
 
     Raises
     ------
@@ -189,7 +196,8 @@ def bag_info(path: StrPath, recover: bool = False) -> BagInfo:
         As ``load_run``, but any bag with any topics will do.
 
     """
-    bag = read_bag(path, recover=recover)
+    _, names = full_names(path, topics, namespace, recover)
+    bag = read_bag(path, recover=recover, names=names)
     recording = bag.records.get(RECORDING_RECORD, {})
     published = reported_counts(bag)
     # Of any other bag nobody knows that it began with the nodes.
@@ -203,7 +211,7 @@ def bag_info(path: StrPath, recover: bool = False) -> BagInfo:
         remarks.append(
             'The recording broke off and was made a whole bag again; '
             f'{recovery.get("unreadable_bytes", "?")} bytes were not readable.')
-    topics = []
+    infos: list[TopicInfo] = []
     length_m = cache(lambda: plausibility.recorded_length_m(bag.experiment))
     for name in sorted(bag.topics):
         topic = bag.topics[name]
@@ -214,7 +222,7 @@ def bag_info(path: StrPath, recover: bool = False) -> BagInfo:
         remarks += loss_remarks(info)
         remarks += plausibility.topic_remarks(
             topic, info, stamp_ns, values, length_m)
-        topics.append(info)
+        infos.append(info)
     muscles = namespaces(bag)
     missing, notes = plausibility.missing_topics(
         muscles, bag.experiment.get('valve', ''))
@@ -227,7 +235,7 @@ def bag_info(path: StrPath, recover: bool = False) -> BagInfo:
     if bag.experiment.get('controller_other_rig'):
         notes.append(f'The controller was {bag.experiment["controller_other_rig"]}; '
                      'this was accepted.')
-    before = sum(topic.sent_before or 0 for topic in topics)
+    before = sum(topic.sent_before or 0 for topic in infos)
     if before:
         notes.append(f'{before} messages were published before this bag begins; losses are '
                      'counted from the first report of each node in it.')
@@ -235,7 +243,7 @@ def bag_info(path: StrPath, recover: bool = False) -> BagInfo:
     return BagInfo(
         path=str(path), storage=bag.storage, size_bytes=_size(Path(path)), start_ns=start_ns,
         duration_s=(end_ns - start_ns) * 1e-9, message_count=sum(bag.counts.values()),
-        namespaces=sorted(muscles), topics=topics, metadata=bag.experiment, remarks=remarks,
+        namespaces=sorted(muscles), topics=infos, metadata=bag.experiment, remarks=remarks,
         notes=notes, recovered=bag.recovered or bool(recovery), absent=bag.absent,
         markers=[{'time_s': (one.stamp_ns - start_ns) * 1e-9, 'text': one.text,
                   'namespace': place} for place, one in markers_of(bag)])

@@ -29,11 +29,11 @@ from pam_actuation.bags import renamed, series
 from pam_actuation.bags.markers import is_marker, markers_of
 from pam_actuation.bags.plausibility import (
     Implausible, not_finite, recorded_length_m, topic_findings)
+from pam_actuation.bags.rig_topics import is_read, is_rig_topic, namespaces
 from pam_actuation.bags.source import Bag, read_bag, TopicData
 from pam_actuation.messages import Marker, ReferenceTrajectory, VALVE_NAMES, valve_of
 from pam_actuation.topics.codec import decode
-from pam_actuation.topics.table import (
-    BY_NAME, KEPT, OF_A_RUN, RECORDED, short_name, TOLD, Topic)
+from pam_actuation.topics.table import BY_NAME, KEPT, OF_A_RUN, TOLD, Topic
 from pam_sim.annotations import BoolArray, FloatArray, IntArray
 from pam_sim.errors import InputError
 from pam_sim.files import StrPath
@@ -106,7 +106,8 @@ def load_run(path: StrPath, namespace: str | None = None, recover: bool = False,
     topics : dict of str to str, optional
         Topics with other names than ours, such as ``{'contraction': '/robot/encoder',
         'pressure': '/robot/p'}``; their message types are those of our topics. The others
-        come from the namespace, if there is one and no choice is left.
+        come from the namespace, if there is one and no choice is left. Names that the recorder
+        of this package has told in the bag need not be given.
 
     Returns
     -------
@@ -122,28 +123,16 @@ def load_run(path: StrPath, namespace: str | None = None, recover: bool = False,
         topic of another type.
 
     """
-    named = renamed.checked(topics)
-    bag = read_bag(path, recover=recover, wanted=lambda name, type_name, encoding: (
-        name in named.values() or is_read(name, type_name, encoding)
-        or is_marker(name, type_name, encoding)))
-    return run_of(bag, path, namespace, named)
+    namespace, names = renamed.full_names(path, topics, namespace, recover)
+    bag = read_bag(path, recover=recover, names=names, wanted=lambda *topic: (
+        is_read(*topic) or is_marker(*topic)))
+    return run_of(bag, path, namespace)
 
 
-def run_of(bag: Bag, path: StrPath, namespace: str | None = None,
-           named: dict[str, str] | None = None) -> RecordedRun:
-    """
-    Return the run of one muscle of a bag that was read.
-
-    Parameters and errors are those of ``load_run``; ``named`` are its ``topics``, checked.
-    """
-    named = named or {}
-    given = renamed.topics_by_name(bag, named)
-    if given and namespace is None:
-        present = list(namespaces(bag))
-        chosen = present[0] if len(present) == 1 else None
-    else:
-        chosen = _choose_namespace(bag, namespace)
-    found = {**(topics_of(bag, chosen) if chosen is not None else {}), **given}
+def run_of(bag: Bag, path: StrPath, namespace: str | None = None) -> RecordedRun:
+    """Return the run of one muscle of a bag that was read; errors are those of ``load_run``."""
+    chosen = _choose_namespace(bag, namespace)
+    found = topics_of(bag, chosen)
     remarks = list(bag.remarks)
     series_of: dict[str, Series] = {}
     trajectories: tuple[ReferenceTrajectory, ...] = ()
@@ -155,9 +144,9 @@ def run_of(bag: Bag, path: StrPath, namespace: str | None = None,
             if len(one):
                 series_of[short] = one
     return RecordedRun(
-        topics=series_of, metadata=bag.experiment, namespace=chosen or '', path=str(path),
+        topics=series_of, metadata=bag.experiment, namespace=chosen, path=str(path),
         reference_trajectories=trajectories, remarks=tuple(remarks),
-        markers=tuple(marker for _, marker in markers_of(bag, chosen or '')))
+        markers=tuple(marker for _, marker in markers_of(bag, chosen)))
 
 
 def topics_of(bag: Bag, namespace: str) -> dict[str, TopicData]:
@@ -182,31 +171,6 @@ def topics_of(bag: Bag, namespace: str) -> dict[str, TopicData]:
     return found
 
 
-def is_rig_topic(topic: TopicData) -> bool:
-    """Return whether a TopicData has the name and the message type of a topic of the rig."""
-    return _is_of_rig(topic.name, topic.type_name, topic.encoding)
-
-
-def is_read(name: str, type_name: str, encoding: str) -> bool:
-    """Return whether ``load_run`` makes numbers of a topic; the bytes of others are not kept."""
-    return short_name(name) in OF_A_RUN and _is_of_rig(name, type_name, encoding)
-
-
-def _is_of_rig(name: str, type_name: str, encoding: str) -> bool:
-    row = RECORDED.get(short_name(name))
-    return encoding == 'cdr' and row is not None and row.type_name == type_name
-
-
-def namespaces(bag: Bag) -> dict[str, set[str]]:
-    """Return the namespaces with messages of the rig: dict of namespace to set of short names."""
-    found: dict[str, set[str]] = {}
-    for name, topic in bag.topics.items():
-        parent, _, short = name.rpartition('/')
-        if short in OF_A_RUN and is_rig_topic(topic) and len(topic.payloads):
-            found.setdefault(parent, set()).add(short)
-    return found
-
-
 def _choose_namespace(bag: Bag, wanted: str | None) -> str:
     present = namespaces(bag)
     if wanted is not None:
@@ -225,9 +189,11 @@ def _choose_namespace(bag: Bag, wanted: str | None) -> str:
                 f'the bag has several muscles, {_listed(candidates)}; choose one with {NAMESPACE}',
                 bag.path)
     names = ', '.join(sorted(bag.topics)) or 'none at all'
-    raise InputError(
-        f'the bag has no messages on a pressure or contraction topic of a muscle; its topics: '
-        f'{names}', bag.path)
+    types = {name: topic.type_name for name, topic in bag.topics.items()}
+    hints = filter(None, (renamed.may_be(short, types) for short in ('pressure', 'contraction')))
+    raise InputError('; '.join([
+        'the bag has no messages on a pressure or contraction topic of a muscle', *hints,
+        f'its topics: {names}']), bag.path)
 
 
 def _listed(names: Iterable[str]) -> str:

@@ -18,20 +18,24 @@ Load the run of a joint, or of a muscle: ``load_recording(path)``.
 The topics of a joint are named relative to it: ``joint_state``, ``flexor/pressure`` and so on.
 """
 
+from collections.abc import Mapping
 import os
 
 from pam_actuation.bags.load import NAMESPACE, read_series, RecordedRun, run_of
 from pam_actuation.bags.markers import is_marker, markers_of
+from pam_actuation.bags.renamed import full_names
 from pam_actuation.bags.source import Bag, read_bag, TopicData
 from pam_actuation.topics.table import BY_NAME, JOINT, MUSCLE, short_name
 from pam_sim.errors import InputError
 from pam_sim.joint.parameters import SIDES
+from pam_sim.run import Series
 
 MEASURED = 'joint_state'
 
 
 def load_recording(path: str | os.PathLike[str], namespace: str | None = None,
-                   recover: bool = False) -> RecordedRun:
+                   recover: bool = False,
+                   topics: Mapping[str, object] | None = None) -> RecordedRun:
     """
     Load the run of a muscle, or of a joint where the bag has one and no muscle is chosen.
 
@@ -45,6 +49,8 @@ def load_recording(path: str | os.PathLike[str], namespace: str | None = None,
         Of the muscle or the joint; needed only if the bag has several.
     recover : bool
         Also read what precedes the damage in a bag that ended early.
+    topics : dict of str to str, optional
+        As of ``load_run``; of a joint also such as ``{'flexor/pressure': '/robot/p'}``.
 
     Raises
     ------
@@ -52,7 +58,8 @@ def load_recording(path: str | os.PathLike[str], namespace: str | None = None,
         As of ``load_run``; the bag has both muscles of a joint but not its angle.
 
     """
-    bag = read_bag(path, recover=recover, wanted=lambda *topic: (
+    namespace, names = full_names(path, topics, namespace, recover)
+    bag = read_bag(path, recover=recover, names=names, wanted=lambda *topic: (
         _is_of_rig(*topic) or is_marker(*topic)))
     joints = joints_of(bag)
     if namespace is not None:
@@ -64,13 +71,14 @@ def load_recording(path: str | os.PathLike[str], namespace: str | None = None,
     if len(joints) > 1:
         raise InputError(f'the bag has several joints, {", ".join(sorted(joints))}; choose one '
                          f'with {NAMESPACE}', str(path))
-    topics, remarks = {}, list(bag.remarks)
+    found: dict[str, Series] = {}
+    remarks = list(bag.remarks)
     for relative, topic in topics_of_joint(bag, joints[0]).items():
         if BY_NAME[short_name(relative)].numeric is not None:
             series = read_series(short_name(relative), topic, remarks)
             if len(series):
-                topics[relative] = series
-    return RecordedRun(topics=topics, metadata=bag.experiment, namespace=joints[0],
+                found[relative] = series
+    return RecordedRun(topics=found, metadata=bag.experiment, namespace=joints[0],
                        path=str(path), remarks=tuple(remarks),
                        markers=tuple(one for _, one in markers_of(bag, joints[0])))
 

@@ -16,13 +16,18 @@
 
 from collections.abc import Mapping
 
-from pam_actuation.bags.source import Bag, read_bag, TopicData
-from pam_actuation.topics.table import BY_NAME, OF_A_RUN, short_name
+from pam_actuation.bags.rig_topics import namespaces
+from pam_actuation.bags.source import read_bag
+from pam_actuation.topics.table import (
+    BY_NAME, MARKER, OF_A_RUN, RECORDED_OF_JOINT, ROOT, short_name)
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.files import StrPath
+from pam_sim.joint.parameters import SIDES
 
-# What a run can hold, by the names of this project.
+# What a run of a muscle can hold, by the names of this project, and what that of a joint.
 NAMES = tuple(OF_A_RUN)
+OF_A_JOINT = tuple(name for name, row in RECORDED_OF_JOINT.items()
+                   if row.place != ROOT and name != MARKER)
 _MOST = 5                   # topics that are listed
 
 
@@ -38,9 +43,10 @@ def checked(topics: Mapping[str, object] | None) -> dict[str, str]:
     """
     found: dict[str, str] = {}
     for short, name in (topics or {}).items():
-        if short not in NAMES:
+        if short not in NAMES and short not in OF_A_JOINT:
             raise InputError(f'`{short}` is no topic of a run{did_you_mean(short, NAMES)}; '
-                             f'allowed: {", ".join(NAMES)}', 'topics')
+                             f'allowed: {", ".join(NAMES)}; of a joint also '
+                             f'{OF_A_JOINT[0]}, {SIDES[0]}/pressure and so on', 'topics')
         if not isinstance(name, str) or not name.strip('/ '):
             raise InputError(f'`{short}` needs the name of a topic in the bag, not {name!r}',
                              'topics')
@@ -51,29 +57,52 @@ def checked(topics: Mapping[str, object] | None) -> dict[str, str]:
     return found
 
 
-def topics_by_name(bag: Bag, wanted: Mapping[str, str]) -> dict[str, TopicData]:
+def full_names(path: StrPath, topics: Mapping[str, object] | None, namespace: str | None = None,
+               recover: bool = False) -> tuple[str | None, dict[str, str]]:
     """
-    Return {own name: TopicData} of the topics that ``wanted`` names in a bag.
+    Return (namespace, {full name: name in the bag}) of topics that go by other names in a bag.
+
+    Parameters
+    ----------
+    path : path
+        The bag; it is looked through where ``topics`` has any.
+    topics : dict of str to str, optional
+        By names of this project, for a joint relative to it: ``flexor/pressure``.
+    namespace : str, optional
+        Where they belong. By default that of the one muscle of the bag, or of the one joint if
+        a topic is one of a joint; else none, ``''``. Without ``topics`` it is returned as it is.
+    recover : bool
+        As of ``read_bag``.
 
     Raises
     ------
     InputError
-        A topic that the bag does not have, is of another message type, or has no messages.
+        A name that is none of ours; a topic that the bag does not have, is of another message
+        type, or has no messages.
 
     """
-    found = {}
+    wanted = checked(topics)
+    if not wanted:
+        return namespace, {}
+    bag = read_bag(path, recover, wanted=lambda *_: False)
+    present = {topic.recorded_name: topic for topic in bag.topics.values()}
     for short, name in wanted.items():
-        if name not in bag.topics:
-            raise InputError(f'has no topic {name}{did_you_mean(name, bag.topics)}; its topics: '
-                             f'{", ".join(sorted(bag.topics)) or "none"}', bag.path)
-        topic, needed = bag.topics[name], OF_A_RUN[short].type_name
+        if name not in present:
+            raise InputError(f'has no topic {name}{did_you_mean(name, present)}; its topics: '
+                             f'{", ".join(sorted(present)) or "none"}', bag.path)
+        topic, needed = present[name], BY_NAME[short_name(short)].type_name
         if (topic.type_name, topic.encoding) != (needed, 'cdr'):
             raise InputError(f'{name} is {topic.type_name} in {topic.encoding}; `{short}` is read '
                              f'from {needed} in cdr', bag.path)
         if not len(topic.payloads):
             raise InputError(f'{name} has no messages', bag.path)
-        found[short] = topic
-    return found
+    if namespace is None:
+        muscles = {*namespaces(bag)}
+        places = muscles if all(short in OF_A_RUN for short in wanted) else {
+            place.rpartition('/')[0] for place in muscles if short_name(place) in SIDES}
+        namespace = places.pop() if len(places) == 1 else ''
+    place = namespace.strip('/') and f'/{namespace.strip("/")}'
+    return place, {f'{place}/{short}': name for short, name in wanted.items()}
 
 
 def may_be(short: str, types: Mapping[str, str]) -> str:
@@ -95,7 +124,8 @@ def may_be(short: str, types: Mapping[str, str]) -> str:
     more = f' and {len(others) - _MOST} more' if len(others) > _MOST else ''
     verb = 'has' if len(others) == 1 else 'have'
     return (f'{short} may have another name in the bag: {", ".join(others[:_MOST])}{more} {verb} '
-            f"its type. In Python load_run(bag, topics={{'{short}': '{others[0]}'}}) reads it")
+            f"its type. `--topic {short}={others[0]}` reads it (in Python: topics={{'{short}': "
+            f"'{others[0]}'}})")
 
 
 def may_be_in(path: StrPath, short: str) -> str:

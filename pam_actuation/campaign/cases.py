@@ -26,8 +26,8 @@ import os
 from pathlib import Path
 import re
 
-from pam_actuation.bags.load import namespaces
 from pam_actuation.bags.load_joint import joints_of
+from pam_actuation.bags.rig_topics import namespaces
 from pam_actuation.bags.source import Bag, read_bag
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.files import StrPath

@@ -18,7 +18,7 @@ import argparse
 from typing import Any, TYPE_CHECKING
 
 from pam_actuation.cli.common import (
-    add_overwrite_option, add_recover_option, add_seed_option, emit, EXIT_DONE,
+    add_overwrite_option, add_recover_option, add_seed_option, add_topic_option, emit, EXIT_DONE,
     note_implausible, progress)
 from pam_actuation.cli.options import count, number, out_path, Parser, source
 
@@ -71,6 +71,7 @@ def add_arguments(parser: Parser) -> None:
                         help='a line for the provenance, may be repeated')
     add_overwrite_option(parser)
     add_recover_option(parser)
+    add_topic_option(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -130,7 +131,7 @@ def _characterised(args: argparse.Namespace, sources: list[str]) -> 'Characteris
         runs = []
         with progress(args, len(sources), ' bags', 'reading') as bar:
             for path in sources:
-                runs.append(load_run(path, args.namespace, recover=args.recover))
+                runs.append(load_run(path, args.namespace, args.recover, args.renamed))
                 bar.update()
         note_implausible(args, runs, must_be_right=True)
         if args.held_mm is not None:

@@ -23,7 +23,7 @@ from typing import Any, TYPE_CHECKING
 
 from pam_actuation.cli.options import (  # noqa: F401, the codes are for the verbs
     count, EXIT_BAD_INPUT as EXIT_BAD_INPUT, EXIT_DONE as EXIT_DONE,
-    EXIT_FINDING as EXIT_FINDING, HIGHEST_SEED, Parser, source)
+    EXIT_FINDING as EXIT_FINDING, HIGHEST_SEED, pair, Pairs, Parser, source)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -265,3 +265,11 @@ def add_recover_option(parser: Parser) -> None:
     parser.add_argument(
         '--recover', action='store_true',
         help='of a recording that broke off, read the messages that are whole')
+
+
+def add_topic_option(parser: Parser) -> None:
+    """Add the option that names topics which go by other names in a bag of others."""
+    parser.add_argument(
+        '--topic', dest='renamed', type=pair, action=Pairs, default=None, metavar='NAME=TOPIC',
+        help='which topic of the bag is one of ours, such as pressure=/daq/p1 (may be repeated); '
+             'bags of remapped rigs say it themselves')

@@ -17,7 +17,8 @@
 import argparse
 
 from pam_actuation.cli.common import (
-    add_overwrite_option, add_recover_option, check_outputs, emit, EXIT_DONE, note_implausible)
+    add_overwrite_option, add_recover_option, add_topic_option, check_outputs, emit, EXIT_DONE,
+    note_implausible)
 from pam_actuation.cli.options import number, out_path, Parser, source
 
 HELP = 'Write a bag as a table: CSV, Excel, MAT, Parquet or NumPy. All in SI, pressures absolute.'
@@ -38,6 +39,7 @@ def add_arguments(parser: Parser) -> None:
                              'flexor/pressure (default: all that have numbers)')
     parser.add_argument('--namespace', type=source, default=None, metavar='NS',
                         help='which muscle or joint, if the bag has several')
+    add_topic_option(parser)
     add_recover_option(parser)
     add_overwrite_option(parser)
 
@@ -48,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
     from pam_actuation.tables.export import check_ending, write_table
     check_ending(args.out)
     check_outputs(args, args.out)
-    loaded = load_recording(args.bag, namespace=args.namespace, recover=args.recover)
+    loaded = load_recording(args.bag, args.namespace, args.recover, args.renamed)
     note_implausible(args, [loaded])
     topics = [name.strip() for name in args.topics.split(',')] if args.topics else None
     frame = loaded.to_dataframe(args.rate, topics)

@@ -21,8 +21,8 @@ import shlex
 from typing import TYPE_CHECKING
 
 from pam_actuation.cli.common import (
-    add_overwrite_option, effect_names, emit, EXIT_DONE, EXIT_FINDING, note_implausible,
-    progress)
+    add_overwrite_option, add_topic_option, effect_names, emit, EXIT_DONE, EXIT_FINDING,
+    note_implausible, progress)
 from pam_actuation.cli.options import number, out_path, Parser, source
 
 if TYPE_CHECKING:
@@ -62,6 +62,7 @@ def add_arguments(parser: Parser) -> None:
                         help='bag for the proof (default: every fifth block of the first bag)')
     parser.add_argument('--namespace', default=None,
                         help='namespace of the muscle or the joint in the bags')
+    add_topic_option(parser)
     parser.add_argument('--effects', type=source, default=None, metavar='A,B',
                         help='names to try (default: all)')
     parser.add_argument('--seconds', type=number(1.0, None, 's'), default=SECONDS, metavar='N',
@@ -84,7 +85,7 @@ def run(args: argparse.Namespace) -> int | None:
         raise InputError('needs at least one recorded bag and --out DIR')
     found: dict[str, GapResult] = {}
     lines: list[str] = []
-    for question in questions(args.model, args.run[0], args.namespace):
+    for question in questions(args.model, args.run[0], args.namespace, args.renamed):
         out = os.path.join(args.out, question.side) if question.side else args.out
         found[question.side], runs = _ask(args, question, out)
         result = found[question.side]
@@ -180,7 +181,7 @@ def _explain(args: argparse.Namespace) -> int:
     from pam_sim.units import behind_number
     entry = find(catalogue(), args.explain)
     if args.run:
-        run = load_run(args.run[0], namespace=args.namespace)
+        run = load_run(args.run[0], args.namespace, topics=args.renamed)
         note_implausible(args, [run], must_be_right=True)
         rig = model_for(run, args.model)
     else:

@@ -18,7 +18,8 @@ import argparse
 from pathlib import Path
 
 from pam_actuation.cli.common import (
-    add_overwrite_option, add_seed_option, emit, EXIT_DONE, note_implausible, progress)
+    add_overwrite_option, add_seed_option, add_topic_option, emit, EXIT_DONE, note_implausible,
+    progress)
 from pam_actuation.cli.options import number, out_path, Parser, source
 
 HELP = 'Determine the unknown numbers of a rig, and say which the recordings do not determine.'
@@ -42,6 +43,7 @@ def add_arguments(parser: Parser) -> None:
                         help='folder for rig.yaml with the numbers found, identify.json, '
                         'report.html and next_experiment.yaml')
     parser.add_argument('--namespace', default=None, help='namespace of the muscle in the bags')
+    add_topic_option(parser)
     add_seed_option(parser, 'seed of the starts of the fit')
     add_overwrite_option(parser)
 
@@ -57,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
     if args.out is not None:
         check_folder(args.out, FILES, args.overwrite)
     rig = load_rig(args.rig)
-    runs = [load_run(path, namespace=args.namespace) for path in args.run]
+    runs = [load_run(path, args.namespace, topics=args.renamed) for path in args.run]
     note_implausible(args, runs)
     with progress(args, 1.0, '', 'identify') as bar:
         found = identify(runs, rig, args.unknown, args.added_kg, args.seed,

@@ -19,7 +19,7 @@ from pathlib import Path
 import re
 from typing import TYPE_CHECKING
 
-from pam_actuation.cli.common import emit, EXIT_DONE, EXIT_FINDING
+from pam_actuation.cli.common import add_topic_option, emit, EXIT_DONE, EXIT_FINDING
 from pam_actuation.cli.options import Parser, source
 
 if TYPE_CHECKING:
@@ -36,6 +36,7 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument(
         '--namespace', default=None,
         help='show only topics in this namespace, of a muscle, a joint or a robot')
+    add_topic_option(parser)
     parser.add_argument(
         '--recover', action='store_true',
         help='first repair a recording that broke off: rebuild the index of its files and '
@@ -49,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
     if args.recover and _is_mcap(Path(args.bag)):
         from pam_actuation.bags.recover import recover_bag
         recovery = recover_bag(args.bag)
-    info = bag_info(args.bag, recover=args.recover)
+    info = bag_info(args.bag, args.recover, args.namespace, args.renamed)
     types = {topic.name: topic.type_name for topic in info.topics}      # of the whole bag
     if args.namespace is not None:
         from pam_actuation.bags.in_namespace import in_namespace

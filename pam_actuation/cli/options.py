@@ -185,6 +185,28 @@ def source(text: str) -> str:
     return text
 
 
+def pair(text: str) -> tuple[str, str]:
+    """Return the two sides of ``NAME=TOPIC``; refuse what is not of this form."""
+    name, equals, other = (part.strip() for part in text.partition('='))
+    if not (name and equals and other):
+        raise argparse.ArgumentTypeError(
+            f'{shown(text)!r} is not NAME=TOPIC, such as pressure=/daq/p1')
+    return name, other
+
+
+class Pairs(argparse.Action):
+    """Gather what ``pair`` returns into one dict; a name given twice is a mistake."""
+
+    def __call__(self, parser: argparse.ArgumentParser, namespace: argparse.Namespace,
+                 values: Any, option_string: str | None = None) -> None:
+        """Take one more pair."""
+        name, other = values
+        found = getattr(namespace, self.dest) or {}
+        if name in found:
+            raise argparse.ArgumentError(self, f'{name} is given twice')
+        setattr(namespace, self.dest, {**found, name: other})
+
+
 def _check_text(text: str, wanted: str) -> None:
     if not text.strip():
         raise argparse.ArgumentTypeError(f'is empty; {wanted}')

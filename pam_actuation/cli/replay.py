@@ -17,8 +17,8 @@
 import argparse
 
 from pam_actuation.cli.common import (
-    add_other_rig_option, add_overwrite_option, add_recover_option, check_outputs, emit,
-    EXIT_DONE, EXIT_FINDING, note_implausible)
+    add_other_rig_option, add_overwrite_option, add_recover_option, add_topic_option,
+    check_outputs, emit, EXIT_DONE, EXIT_FINDING, note_implausible)
 from pam_actuation.cli.options import out_path, Parser, source
 
 HELP = ('Step controller, driver and plant offline on the recorded inputs, each alone or '
@@ -31,6 +31,7 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument('bag', type=source, help='bag directory, or a lone .mcap file')
     parser.add_argument(
         '--namespace', default=None, help='namespace of the muscle or joint in the bag')
+    add_topic_option(parser)
     parser.add_argument(
         '--model', type=source, default=None, metavar='NAME|FILE',
         help='model YAML or preset of the rig or joint that was recorded (default: the one that '
@@ -63,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
     from pam_actuation.replay.model import is_joint, model_of, with_model
     from pam_actuation.replay.settings import changed_controller
     check_outputs(args, args.out)
-    recorded = load_recording(args.bag, args.namespace, args.recover)
+    recorded = load_recording(args.bag, args.namespace, args.recover, args.renamed)
     note_implausible(args, [recorded])
     replayed = replay_joint if is_joint(recorded) else replay_run
     model = model_of(recorded, args.model) if args.model else None

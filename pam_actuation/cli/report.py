@@ -17,7 +17,8 @@
 import argparse
 
 from pam_actuation.cli.common import (
-    add_overwrite_option, add_recover_option, check_outputs, emit, EXIT_DONE, note_implausible)
+    add_overwrite_option, add_recover_option, add_topic_option, check_outputs, emit, EXIT_DONE,
+    note_implausible)
 from pam_actuation.cli.options import out_path, Parser, source
 
 HELP = 'Write a self-contained HTML page with plots and metrics of one or several bags.'
@@ -29,6 +30,7 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument('bag', type=source, nargs='+', help='bag directories or .mcap files')
     parser.add_argument(
         '--namespace', default=None, help='namespace of the muscle or joint in the bags')
+    add_topic_option(parser)
     parser.add_argument('--out', type=out_path, default=None, metavar='FILE',
                         help='page to write (default: report.html beside the first bag, made '
                         'again if it is the page of the same bags, else report_BAG.html)')
@@ -46,7 +48,8 @@ def run(args: argparse.Namespace) -> int:
     out = args.out or default_page(args.bag, args.overwrite)
     if args.out:
         check_outputs(args, args.out)
-    runs = [load_recording(bag, args.namespace, args.recover) for bag in args.bag]
+    runs = [load_recording(bag, args.namespace, args.recover, args.renamed)
+            for bag in args.bag]
     note_implausible(args, runs)
     write = joint_report if any(MEASURED in run for run in runs) else bag_report
     summary = write(runs, out, of=origin(args.bag, out))

@@ -20,8 +20,9 @@ import os
 from typing import TYPE_CHECKING
 
 from pam_actuation.cli.common import (
-    add_controller_options, add_overwrite_option, add_seed_option, check_outputs,
-    default_controller, emit, EXIT_DONE, EXIT_FINDING, note_implausible, progress, say_remarks)
+    add_controller_options, add_overwrite_option, add_seed_option, add_topic_option,
+    check_outputs, default_controller, emit, EXIT_DONE, EXIT_FINDING, note_implausible, progress,
+    say_remarks)
 from pam_actuation.cli.options import count, number, out_path, Parser, source
 
 if TYPE_CHECKING:
@@ -47,6 +48,7 @@ def add_arguments(parser: Parser) -> None:
     """Declare the options of the verb."""
     parser.add_argument('bag', type=source, nargs='*',
                         help='bags that say rig, controller and experiment')
+    add_topic_option(parser)
     parser.add_argument('--model', '--rig', dest='rig', type=source, default=None,
                         metavar='NAME|FILE',
                         help='model to tune on (default: the rig of the first bag)')
@@ -101,7 +103,7 @@ def run(args: argparse.Namespace) -> int | None:
     from pam_sim.files import whole_files
     from pam_sim.joint import load_rig_or_joint
     written = _targets(args)
-    runs = [load_recording(bag) for bag in args.bag]
+    runs = [load_recording(bag, topics=args.renamed) for bag in args.bag]
     note_implausible(args, runs, must_be_right=True)
     rig = load_rig_or_joint(_rig_source(args, runs), args.valve)
     check_kind(runs, rig)

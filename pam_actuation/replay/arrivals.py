@@ -27,9 +27,10 @@ from typing import Any
 
 import numpy as np
 from pam_actuation.bags import series
-from pam_actuation.bags.load import is_read, topics_of
+from pam_actuation.bags.load import topics_of
 from pam_actuation.bags.load_joint import topics_of_joint
 from pam_actuation.bags.metadata import names_of
+from pam_actuation.bags.rig_topics import is_read
 from pam_actuation.bags.source import read_bag, TopicData
 from pam_actuation.loops.bus import Bus
 from pam_actuation.messages import Message

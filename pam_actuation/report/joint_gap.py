@@ -19,6 +19,7 @@ The contraction of a muscle in a joint is an input: what the other muscle, the l
 to it is in there. Its tension is what the load cell on its tendon reads.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 import os
 from typing import TYPE_CHECKING
@@ -52,6 +53,8 @@ class Question:
         Its namespace in the bags.
     joint : JointRig or None
         The joint it belongs to, by which a contraction follows from the angle.
+    topics : dict of str to str or None
+        Topics of this muscle with other names in the bags, as of ``load_run``.
 
     """
 
@@ -59,6 +62,7 @@ class Question:
     model: 'str | Rig'
     namespace: str | None
     joint: JointRig | None = None
+    topics: Mapping[str, str] | None = None
 
     def load(self, path: str) -> RecordedRun:
         """
@@ -66,7 +70,7 @@ class Question:
 
         A contraction that was not recorded is that of the joint angle.
         """
-        run = load_run(path, namespace=self.namespace)
+        run = load_run(path, self.namespace, topics=self.topics)
         if self.joint is None or 'contraction' in run:
             return run
         whole = load_recording(path, run.namespace.rpartition('/')[0])
@@ -83,7 +87,8 @@ def contraction_of(angle: Series, joint: JointRig, side: str) -> Series:
                   {'contraction_m': unit_of('contraction_m')})
 
 
-def questions(model: str, bag: str, namespace: str | None = None) -> list[Question]:
+def questions(model: str, bag: str, namespace: str | None = None,
+              topics: Mapping[str, str] | None = None) -> list[Question]:
     """
     Return the questions that a model and a bag make: one, or one for each muscle of a joint.
 
@@ -95,24 +100,30 @@ def questions(model: str, bag: str, namespace: str | None = None) -> list[Questi
         The first recording; it tells the namespace of a joint.
     namespace : str, optional
         Of the muscle or of the joint.
+    topics : dict of str to str, optional
+        Topics of one muscle with other names in the bags.
 
     Raises
     ------
     InputError
-        The model is a joint, and the bag has none or several.
+        The model is a joint, and the bag has none or several; ``topics`` without a choice of its
+        muscle.
 
     """
     if not _may_be_joint(model):
-        return [Question('', model, namespace)]
+        return [Question('', model, namespace, topics=topics)]
     joint = load_rig_or_joint(model)
     if not isinstance(joint, JointRig):
-        return [Question('', model, namespace)]
+        return [Question('', model, namespace, topics=topics)]
     models: dict[str, str | Rig] = {
         side: f'{model}/{side}' if model in joint_preset_names() else joint.muscles[f'{side}/']
         for side in SIDES}
     side = (namespace or '').rpartition('/')[2]
     if side in SIDES:
-        return [Question('', models[side], namespace, joint)]
+        return [Question('', models[side], namespace, joint, topics)]
+    if topics:
+        raise InputError('names the topics of one muscle, and the model is a joint; choose a '
+                         'muscle with --namespace, such as /knee/flexor', '--topic')
     whole = _namespace_of(bag, namespace)
     return [Question(side, models[side], f'{whole}/{side}', joint) for side in SIDES]
 

@@ -17,8 +17,8 @@
 from pathlib import Path
 import shlex
 
-from pam_actuation.bags.load import namespaces
 from pam_actuation.bags.load_joint import is_joint_topic, joints_of
+from pam_actuation.bags.rig_topics import namespaces
 from pam_actuation.bags.source import Bag, read_bag
 from pam_actuation.tables.formats import kind_of
 from pam_sim.errors import InputError

@@ -121,8 +121,9 @@ def test_a_topic_under_another_name_is_looked_for(tmp_path, capsys):
         assert main(['info', str(tmp_path / 'run'), *options]) == 1
         printed = capsys.readouterr().out
         assert '/hip has no messages on contraction' in printed
-        assert ('Note: contraction may have another name in the bag: /enc/hip has its type. In '
-                "Python load_run(bag, topics={'contraction': '/enc/hip'}) reads it.") in printed
+        assert ('Note: contraction may have another name in the bag: /enc/hip has its type. '
+                "`--topic contraction=/enc/hip` reads it (in Python: topics={'contraction': "
+                "'/enc/hip'}).") in printed
         assert 'force may have' not in printed
     types = {f'/enc/{k}': RECORDED['contraction'].type_name for k in range(7)}
     assert '/enc/4 and 2 more have its type' in may_be('contraction', types)

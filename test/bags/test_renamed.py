@@ -14,6 +14,7 @@
 
 """Topics of a bag under names of its own: taken where they are named, refused in a sentence."""
 
+import json
 import shutil
 
 import numpy as np
@@ -22,14 +23,17 @@ from pam_actuation.bags.load import load_run
 from pam_actuation.bags.load_joint import load_recording
 from pam_actuation.bags.metadata import names_of
 from pam_actuation.bags.source import read_bag
+from pam_actuation.cli.main import main
 from pam_actuation.control.config import load_controller
 from pam_actuation.experiments import load_experiment
 from pam_actuation.experiments.offline import simulate_experiment
 from pam_actuation.replay.compare import replay_run
+from pam_actuation.report.joint_gap import questions
 from pam_actuation.topics import codec, definitions
 from pam_actuation.topics.table import RECORDED
 from pam_sim import load_rig
 from pam_sim.errors import InputError
+from pam_sim.joint import load_rig_or_joint
 import pytest
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as RosbagsWriter
@@ -90,13 +94,21 @@ def test_names_that_lead_nowhere_are_told_in_a_sentence(bag, topics, words):
     assert '\n' not in str(told.value)
 
 
-def test_without_names_nothing_changes(bag):
-    with pytest.raises(InputError, match='no messages on a pressure or contraction topic'):
+def test_without_names_the_refusal_gives_the_option(bag):
+    with pytest.raises(InputError, match='no messages on a pressure or contraction topic') as told:
         load_run(bag)
+    assert '`--topic pressure=/robot/p` reads it' in str(told.value)
+    assert '`--topic contraction=/robot/encoder` reads it' in str(told.value)
 
 
 REMAPPED = {'/muscle/pressure': '/daq/p1', '/muscle/contraction': '/daq/enc1',
             '/muscle/valve_signal': '/daq/valve'}
+ANGLE = """
+name: short_angle
+domain: joint_angle
+segments:
+- rest: {duration_s: 0.5}
+"""
 SHORT = """
 name: short
 segments:
@@ -157,3 +169,84 @@ def test_a_remapped_recording_is_replayed_as_any_other(tmp_path):
     remapped = with_other_names(made['bag'], tmp_path / 'remapped', REMAPPED)
     result = replay_run(load_run(remapped))
     assert result.controller.identical and result.driver.identical
+
+
+@pytest.fixture(scope='module')
+def silent(tmp_path_factory):
+    """Return a bag with the same other names that does not say so, and its plain original."""
+    folder = tmp_path_factory.mktemp('silent')
+    plain = write_bag(folder / 'plain', 200)
+    return with_other_names(plain, folder / 'other', REMAPPED, told=False), plain
+
+
+OPTIONS = [word for name, other in REMAPPED.items()
+           for word in ('--topic', f'{name.removeprefix("/muscle/")}={other}')]
+
+
+def test_every_verb_that_reads_bags_takes_the_names(silent, tmp_path, capsys):
+    bag = str(silent[0])
+    more = {'tune': ['--out', str(tmp_path / 'tuned.yaml')],
+            'identify': ['--rig', 'dmsp_5_300_hanging_mass'],
+            **{verb: ['--out', str(tmp_path / verb)] for verb in ('gap', 'characterise')},
+            'export': ['--out', str(tmp_path / 'table.csv')]}
+    for verb in ('info', 'replay', 'report', 'gap', 'tune', 'identify', 'export', 'characterise'):
+        assert main([verb, bag, *more.get(verb, []), '--topic', 'pressure=/daq/p2']) == 2
+        said = capsys.readouterr().err
+        assert 'has no topic /daq/p2 (did you mean `/daq/p1`?)' in said, (verb, said)
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_option_reads_what_goes_by_other_names(silent, tmp_path, capsys):
+    bag, plain = map(str, silent)
+    names = dict(word.split('=') for word in OPTIONS if '=' in word)
+    assert_same(load_run(bag, topics=names), load_run(plain))
+    assert main(['info', bag, '--json', *OPTIONS]) == 0
+    info = json.loads(capsys.readouterr().out)
+    assert info['namespaces'] == ['/muscle'] and info['remarks'] == []
+    tables = []
+    for path, options in ((bag, OPTIONS), (plain, [])):
+        out = tmp_path / f'{len(tables)}.csv'
+        assert main(['export', path, '--out', str(out), *options]) == 0
+        tables.append(out.read_bytes())
+    assert tables[0] == tables[1]
+    question, = questions('dmsp_5_300_hanging_mass', bag, None, names)
+    assert_same(question.load(bag), load_run(plain))
+
+
+@pytest.mark.parametrize('words, said', [
+    (['pressure'], "'pressure' is not NAME=TOPIC, such as pressure=/daq/p1"),
+    (['=/daq/p1'], 'is not NAME=TOPIC'), (['pressure='], 'is not NAME=TOPIC'),
+    (['pressure=/daq/p1', 'pressure=/daq/p1'], 'pressure is given twice'),
+    (['presure=/daq/p1'], '`presure` is no topic of a run (did you mean `pressure`?)'),
+    (['pressure=/daq/enc1'], '/daq/enc1 is sensor_msgs/msg/JointState'),
+    (['pressure=/daq/p1', 'supply_pressure=/daq/p1'], '/daq/p1 is given for two topics')])
+def test_mistakes_in_the_option_are_told_in_a_sentence(silent, capsys, words, said):
+    options = [part for word in words for part in ('--topic', word)]
+    try:
+        code = main(['replay', str(silent[0]), *options])
+    except SystemExit as ended:
+        code = ended.code
+    assert code == 2 and said in capsys.readouterr().err
+
+
+def test_a_topic_of_ours_gives_way_to_the_one_that_is_named(silent):
+    run = load_run(silent[1], topics={'pressure': '/muscle/supply_pressure'})
+    assert (run['pressure']['pressure_pa'] == 8.0e5).all() and 'supply_pressure' not in run
+    info = bag_info(silent[1], topics={'pressure': '/muscle/supply_pressure'})
+    assert info.topic('/muscle/pressure (replaced)').count == 200
+
+
+def test_topics_of_a_joint_have_their_place_in_the_name(tmp_path):
+    plain = simulate_experiment(
+        load_experiment(ANGLE), rig := load_rig_or_joint('joint_dmsp_5_300_realistic'),
+        load_controller('sofc_joint_ppr', rig), tmp_path / 'plain')['bag']
+    other = with_other_names(plain, tmp_path / 'other', {
+        '/knee/flexor/pressure': '/daq/p1', '/knee/joint_state': '/daq/angle'}, told=False)
+    with pytest.raises(InputError, match='both muscles of the joint /knee but no joint_state'):
+        load_recording(other)
+    run = load_recording(other, topics={'flexor/pressure': '/daq/p1', 'joint_state': '/daq/angle'})
+    assert_same(run, load_recording(plain))
+    with pytest.raises(InputError, match='choose a muscle with --namespace'):
+        questions('joint_dmsp_5_300', other, None, {'pressure': '/daq/p1'})
+    question, = questions('joint_dmsp_5_300', other, '/knee/flexor', {'pressure': '/daq/p1'})
+    assert_same(question.load(other), load_run(plain, '/knee/flexor'))

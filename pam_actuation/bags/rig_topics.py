@@ -1,0 +1,43 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Which topics of a bag are those of a muscle, by their names and message types."""
+
+from pam_actuation.bags.source import Bag, TopicData
+from pam_actuation.topics.table import OF_A_RUN, RECORDED, short_name
+
+
+def is_rig_topic(topic: TopicData) -> bool:
+    """Return whether a TopicData has the name and the message type of a topic of the rig."""
+    return _is_of_rig(topic.name, topic.type_name, topic.encoding)
+
+
+def is_read(name: str, type_name: str, encoding: str) -> bool:
+    """Return whether ``load_run`` makes numbers of a topic; the bytes of others are not kept."""
+    return short_name(name) in OF_A_RUN and _is_of_rig(name, type_name, encoding)
+
+
+def _is_of_rig(name: str, type_name: str, encoding: str) -> bool:
+    row = RECORDED.get(short_name(name))
+    return encoding == 'cdr' and row is not None and row.type_name == type_name
+
+
+def namespaces(bag: Bag) -> dict[str, set[str]]:
+    """Return the namespaces with messages of the rig: dict of namespace to set of short names."""
+    found: dict[str, set[str]] = {}
+    for name, topic in bag.topics.items():
+        parent, _, short = name.rpartition('/')
+        if short in OF_A_RUN and is_rig_topic(topic) and len(topic.payloads):
+            found.setdefault(parent, set()).add(short)
+    return found
