@@ -170,6 +170,15 @@ def _file_metadata(file: FileFacts) -> dict[str, Any]:
         'duration': times['duration'], 'message_count': file.count}
 
 
+def read_metadata(directory: StrPath) -> Any:
+    """
+    Return the content of metadata.yaml below its root key.
+
+    Raises OSError, ValueError for what is no YAML, KeyError or TypeError for other YAML.
+    """
+    return from_yaml((Path(directory) / METADATA_FILE).read_text(encoding='utf-8'))[METADATA_ROOT]
+
+
 def write_metadata(directory: StrPath, content: Mapping[str, Any]) -> None:
     """Write metadata.yaml atomically and onto the disk."""
     directory = Path(directory)

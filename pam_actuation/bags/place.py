@@ -190,10 +190,9 @@ def _bag_in(directory: Path, overwrite: bool) -> list[str]:
 def _files_of_bag(directory: Path) -> list[str]:
     """Return the names of metadata.yaml and of the files it lists; InputError without a bag."""
     listed = None
-    file = directory / layout.METADATA_FILE
     with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
-        if _is_regular(file):
-            facts = layout.from_yaml(file.read_text(encoding='utf-8'))[layout.METADATA_ROOT]
+        if _is_regular(directory / layout.METADATA_FILE):
+            facts = layout.read_metadata(directory)
             if facts['storage_identifier'] == layout.STORAGE_IDENTIFIER:
                 listed = facts['relative_file_paths']
     if not isinstance(listed, list) or not listed:

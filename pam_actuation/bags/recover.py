@@ -36,6 +36,7 @@ from mcap.reader import make_reader
 from mcap.records import Metadata
 from pam_actuation.bags import disk, layout, mcap_salvage
 from pam_actuation.bags.data_file import LIBRARY
+from pam_actuation.bags.directory import by_number
 from pam_actuation.bags.mcap_write import MAGIC, McapWriter
 from pam_actuation.bags.metadata import software_version
 from pam_actuation.bags.writer import EXPERIMENT_RECORD, ROSBAG2_RECORD
@@ -116,7 +117,7 @@ def recover_bag(path: StrPath) -> Recovery:
     """
     path = Path(path)
     if path.is_dir():
-        files = sorted(path.glob('*.mcap'), key=_by_number)
+        files = sorted(path.glob('*.mcap'), key=by_number)
     else:
         files = [path] if path.is_file() and path.suffix == '.mcap' else []
     if not files:
@@ -127,11 +128,6 @@ def recover_bag(path: StrPath) -> Recovery:
         raise InputError(
             f'the repaired bag cannot be written ({error.strerror or error}); the recording is '
             'as it was, copy it where there is space and the right to write', path) from None
-
-
-def _by_number(path: Path) -> tuple[int, str]:
-    digits = path.stem.rsplit('_', 1)[-1]
-    return (int(digits) if digits.isdigit() else -1, path.name)
 
 
 def _recover(path: Path, files: Sequence[Path]) -> Recovery:
@@ -148,8 +144,7 @@ def _recover(path: Path, files: Sequence[Path]) -> Recovery:
 def _announced(path: Path) -> object:
     """Return the number of messages metadata.yaml announces, None if it cannot be read."""
     try:
-        text = (path / layout.METADATA_FILE).read_text(encoding='utf-8')
-        return layout.from_yaml(text)[layout.METADATA_ROOT]['message_count']
+        return layout.read_metadata(path)['message_count']
     except (OSError, ValueError, KeyError, TypeError):
         return None
 

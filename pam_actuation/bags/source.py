@@ -21,7 +21,6 @@ All of it is read into memory as bytes per topic; decoding is the business of
 """
 
 from collections.abc import Callable, Mapping, Sequence
-import contextlib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -29,6 +28,8 @@ from typing import Any
 import numpy as np
 from pam_actuation.bags import layout
 from pam_actuation.bags.database import scan_database
+from pam_actuation.bags.directory import (
+    announced_counts, by_number, custom_data, directory_facts, listed_files)
 from pam_actuation.bags.mcap_scan import MAGIC, McapContent, scan
 from pam_actuation.bags.message_batch import MessageColumns
 from pam_actuation.bags.metadata import names_of, names_text, TOPIC_NAMES
@@ -180,10 +181,10 @@ def _name_here(recorded: str, names: Mapping[str, str]) -> str:
 
 
 def _read_directory(path: Path, how: _How) -> Bag:
-    facts = _directory_facts(path)
+    facts = directory_facts(path)
     if facts is None:
         for suffix, storage in _STORAGES.items():
-            files = sorted(filter(Path.is_file, path.glob(f'*{suffix}')), key=_by_number)
+            files = sorted(filter(Path.is_file, path.glob(f'*{suffix}')), key=by_number)
             if files:
                 return _read_files(path, files, storage, how)
         raise InputError(
@@ -192,24 +193,10 @@ def _read_directory(path: Path, how: _How) -> Bag:
     kind = str(facts.get('storage_identifier'))
     if kind not in _STORAGES.values():
         raise InputError(f'its storage is {kind}; allowed: {", ".join(_STORAGES.values())}', path)
-    bag = _read_files(path, _listed_files(path, facts), kind, how, _custom_data(facts))
+    bag = _read_files(path, listed_files(path, facts), kind, how, custom_data(facts))
     if not bag.recovered:
         _compare_counts(bag, facts)
     return bag
-
-
-def _listed_files(path: Path, facts: Mapping[str, Any]) -> list[Path]:
-    """Return the data files that metadata.yaml lists."""
-    files = []
-    for name in facts['relative_file_paths']:
-        # Version 3 and older repeat the directory's name in front of the file's.
-        candidates = [path / name, path / Path(name).name]
-        found = [candidate for candidate in candidates if candidate.is_file()]
-        if not found:
-            raise InputError(
-                f'the file {name} named in {layout.METADATA_FILE} is missing', path)
-        files.append(found[0])
-    return files
 
 
 def _compare_counts(bag: Bag, facts: Mapping[str, Any]) -> None:
@@ -222,49 +209,11 @@ def _compare_counts(bag: Bag, facts: Mapping[str, Any]) -> None:
     bag.absent = max(announced - present, 0)
     if announced != present:
         differ = [f'{counts.get(name, 0)} of {count} on {name}'
-                  for name, count in _announced_counts(facts) if counts.get(name, 0) != count]
+                  for name, count in announced_counts(facts) if counts.get(name, 0) != count]
         more = [f'{len(differ) - _MOST} more topics'] if len(differ) > _MOST else []
         listed = f' ({", ".join(differ[:_MOST] + more)})' if differ else ''
         bag.remarks.append(f'{layout.METADATA_FILE} announces {announced} messages, the files '
                            f'hold {present}{listed}.')
-
-
-def _announced_counts(facts: Mapping[str, Any]) -> list[tuple[str, int]]:
-    """Return (topic, number of messages) as metadata.yaml lists them; [] where it does not."""
-    with contextlib.suppress(KeyError, TypeError):
-        return [(str(row['topic_metadata']['name']), int(row['message_count']))
-                for row in facts['topics_with_message_count']]
-    return []
-
-
-def _directory_facts(path: Path) -> dict[str, Any] | None:
-    """Return what metadata.yaml says, None where there is no such file."""
-    file = path / layout.METADATA_FILE
-    if not file.is_file():
-        return None
-    try:
-        facts = layout.from_yaml(file.read_text(encoding='utf-8'))[layout.METADATA_ROOT]
-        names = facts['relative_file_paths']
-        if isinstance(names, list) and names and all(map(_is_file_name, names)):
-            return facts
-        problem = 'relative_file_paths is not a list of file names'
-    except (KeyError, TypeError):
-        problem = f'it has no {layout.METADATA_ROOT} with relative_file_paths'
-    except ValueError:
-        problem = 'it is not YAML'
-    raise InputError(
-        f'not the metadata of a rosbag2 bag: {problem}; remove the file to read the data files '
-        'without it', file)
-
-
-def _is_file_name(name: object) -> bool:
-    return isinstance(name, str) and 0 < len(name) < 4096 and name.isprintable()
-
-
-def _by_number(path: Path) -> tuple[int, str]:
-    """Return a sort key: run_2 before run_10."""
-    digits = path.stem.rsplit('_', 1)[-1]
-    return (int(digits) if digits.isdigit() else -1, path.name)
 
 
 def _read_files(path: Path, files: Sequence[Path], storage: str, how: _How,
@@ -350,12 +299,3 @@ def _full_type_name(name: str) -> str:
     """Return package/msg/Name also for the short package/Name that some writers use."""
     package, _, rest = name.partition('/')
     return f'{package}/msg/{rest}' if rest and '/' not in rest else name
-
-
-def _custom_data(facts: Mapping[str, Any]) -> dict[str, dict[str, str]]:
-    """Return the record of the experiment that metadata.yaml keeps, by its name."""
-    custom = facts.get('custom_data')
-    texts = {} if not isinstance(custom, dict) else {
-        key: value for key, value in custom.items()
-        if isinstance(key, str) and isinstance(value, str)}
-    return {EXPERIMENT_RECORD: texts} if texts else {}
