@@ -23,7 +23,7 @@ from pam_actuation.bags.rig_topics import is_rig_topic
 from pam_actuation.bags.source import Bag, TopicData
 
 if TYPE_CHECKING:
-    from pam_actuation.bags.info import TopicInfo
+    from pam_actuation.bags.topic_info import TopicInfo
 
 # Without send times a message may arrive this long before a report that was sent after it.
 _ARRIVES_NS = 100_000_000

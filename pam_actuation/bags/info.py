@@ -28,64 +28,25 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from pam_actuation.bags import plausibility, series
+from pam_actuation.bags import plausibility
 from pam_actuation.bags.completeness import (
     add_counts, count_from_first_report, loss_remarks, reported_counts)
 from pam_actuation.bags.ending import Ending, ending_of
 from pam_actuation.bags.facts import recorded_rig_title
 from pam_actuation.bags.info_text import render_text
-from pam_actuation.bags.load_joint import is_joint_topic
 from pam_actuation.bags.markers import markers_of
 from pam_actuation.bags.recorder import RECORDING_RECORD
 from pam_actuation.bags.recover import RECOVERY_RECORD
 from pam_actuation.bags.renamed import full_names
-from pam_actuation.bags.rig_topics import is_rig_topic, namespaces
-from pam_actuation.bags.source import Bag, read_bag, TopicData
+from pam_actuation.bags.rig_topics import namespaces
+from pam_actuation.bags.source import Bag, read_bag
+from pam_actuation.bags.topic_info import topic_info, TopicInfo
 from pam_actuation.bags.writer import EXPERIMENT_RECORD
-from pam_actuation.topics.cdr import CdrError
-from pam_actuation.topics.definitions import typestore
-from pam_actuation.topics.table import BY_NAME, OF_A_RUN, short_name, TOPICS
-from pam_sim.annotations import FloatArray, IntArray
+from pam_actuation.topics.table import OF_A_RUN, short_name
 from pam_sim.errors import InputError
 from pam_sim.files import StrPath
 
 __all__ = ['BagInfo', 'TopicInfo', 'bag_info', 'render_text']
-
-# An interval between stamps this many times the usual one counts as a gap.
-GAP_FACTOR = 2.5
-# Every message of the rig begins with a header; of others the type store has to be read.
-_WITH_HEADER = {row.type_name for row in TOPICS}
-
-
-@dataclass
-class TopicInfo:
-    """
-    One topic of a bag; times by header stamp where the message has one.
-
-    ``rate_hz`` (between gaps), ``max_gap_s`` and ``stamp_jitter_s`` (rms difference of the
-    stamp intervals from their median) are None with fewer than three messages.
-    ``published`` is None where no node reports it. ``lost`` is the larger of
-    what the recorder missed by sequence numbers and what published counts say,
-    None where neither is known. ``sent_before`` is what nodes published before the bag of a
-    logger of one's own begins, None for bags of this package.
-    """
-
-    name: str
-    type_name: str
-    count: int
-    rate_hz: float | None = None
-    max_gap_s: float | None = None
-    gaps: int = 0
-    stamp_jitter_s: float | None = None
-    stamps_backward: int = 0
-    stamps_repeated: int = 0
-    published: int | None = None
-    lost: int | None = None
-    dropped: int | None = None
-    missed_at_start: int | None = None
-    sent_before: int | None = None
-    ranges: dict[str, tuple[float, float]] = field(default_factory=dict)
 
 
 @dataclass
@@ -198,39 +159,61 @@ def bag_info(path: StrPath, recover: bool = False, namespace: str | None = None,
     """
     _, names = full_names(path, topics, namespace, recover)
     bag = read_bag(path, recover=recover, names=names)
-    recording = bag.records.get(RECORDING_RECORD, {})
-    published = reported_counts(bag)
-    # Of any other bag nobody knows that it began with the nodes.
-    told = bag.records.get(EXPERIMENT_RECORD, {})
-    simulated = bool(told) and told.get('origin') != 'live'
-    remarks = list(bag.remarks)
-    if recording.get('write_error'):
-        remarks.append(f'The recorder could not go on: {recording["write_error"]}.')
+    experiment = bag.experiment
+    remarks = [*bag.remarks, *_broke_off(bag)]
+    infos = _topic_infos(bag, remarks)
+    muscles = namespaces(bag)
+    missing, notes = plausibility.missing_topics(muscles, experiment.get('valve', ''))
+    remarks += missing
+    if ending_of(experiment).early:
+        remarks.append(ending_of(experiment).sentence)
+    start_ns, end_ns = _span(bag)
+    return BagInfo(
+        path=str(path), storage=bag.storage, size_bytes=_size(Path(path)), start_ns=start_ns,
+        duration_s=(end_ns - start_ns) * 1e-9, message_count=sum(bag.counts.values()),
+        namespaces=sorted(muscles), topics=infos, metadata=experiment, remarks=remarks,
+        notes=[*notes, *_notes(bag, infos)], absent=bag.absent,
+        recovered=bag.recovered or bool(bag.records.get(RECOVERY_RECORD)),
+        markers=[{'time_s': (one.stamp_ns - start_ns) * 1e-9, 'text': one.text,
+                  'namespace': place} for place, one in markers_of(bag)])
+
+
+def _broke_off(bag: Bag) -> list[str]:
+    """Return a sentence on each way in which the recorder itself failed."""
+    error = bag.records.get(RECORDING_RECORD, {}).get('write_error')
+    remarks = [f'The recorder could not go on: {error}.'] if error else []
     recovery = bag.records.get(RECOVERY_RECORD)
     if recovery:
         remarks.append(
             'The recording broke off and was made a whole bag again; '
             f'{recovery.get("unreadable_bytes", "?")} bytes were not readable.')
-    infos: list[TopicInfo] = []
-    length_m = cache(lambda: plausibility.recorded_length_m(bag.experiment))
-    for name in sorted(bag.topics):
-        topic = bag.topics[name]
-        info, stamp_ns, values = _topic_info(topic, remarks)
+    return remarks
+
+
+def _topic_infos(bag: Bag, remarks: list[str]) -> list[TopicInfo]:
+    """Return what is known of every topic, by name; what is odd is appended to ``remarks``."""
+    recording, experiment = (
+        bag.records.get(name, {}) for name in (RECORDING_RECORD, EXPERIMENT_RECORD))
+    published = reported_counts(bag)
+    # Of any other bag nobody knows that it began with the nodes.
+    simulated = bool(experiment) and experiment.get('origin') != 'live'
+    length_m = cache(lambda: plausibility.recorded_length_m(experiment))
+    infos = []
+    for _, topic in sorted(bag.topics.items()):
+        info, stamp_ns, values = topic_info(topic, remarks)
         add_counts(info, topic, recording, published)
         if not recording and not simulated:
             count_from_first_report(info, topic, published)
         remarks += loss_remarks(info)
-        remarks += plausibility.topic_remarks(
-            topic, info, stamp_ns, values, length_m)
+        remarks += plausibility.topic_remarks(topic, info, stamp_ns, values, length_m)
         infos.append(info)
-    muscles = namespaces(bag)
-    missing, notes = plausibility.missing_topics(
-        muscles, bag.experiment.get('valve', ''))
-    remarks += missing
-    if ending_of(bag.experiment).early:
-        remarks.append(ending_of(bag.experiment).sentence)
-    notes += [f'{topic.name} is {topic.recorded_name} in the bag.'
-              for topic in bag.topics.values() if topic.name != topic.recorded_name]
+    return infos
+
+
+def _notes(bag: Bag, infos: list[TopicInfo]) -> list[str]:
+    """Return sentences on what is harmless and worth knowing."""
+    notes = [f'{topic.name} is {topic.recorded_name} in the bag.'
+             for topic in bag.topics.values() if topic.name != topic.recorded_name]
     notes += [text + '.' for text in bag.experiment.get('remarks', '').splitlines()]
     if bag.experiment.get('controller_other_rig'):
         notes.append(f'The controller was {bag.experiment["controller_other_rig"]}; '
@@ -239,14 +222,7 @@ def bag_info(path: StrPath, recover: bool = False, namespace: str | None = None,
     if before:
         notes.append(f'{before} messages were published before this bag begins; losses are '
                      'counted from the first report of each node in it.')
-    start_ns, end_ns = _span(bag)
-    return BagInfo(
-        path=str(path), storage=bag.storage, size_bytes=_size(Path(path)), start_ns=start_ns,
-        duration_s=(end_ns - start_ns) * 1e-9, message_count=sum(bag.counts.values()),
-        namespaces=sorted(muscles), topics=infos, metadata=bag.experiment, remarks=remarks,
-        notes=notes, recovered=bag.recovered or bool(recovery), absent=bag.absent,
-        markers=[{'time_s': (one.stamp_ns - start_ns) * 1e-9, 'text': one.text,
-                  'namespace': place} for place, one in markers_of(bag)])
+    return notes
 
 
 def _size(path: Path) -> int:
@@ -259,54 +235,3 @@ def _span(bag: Bag) -> tuple[int, int]:
     if not times:
         return 0, 0
     return int(min(map(np.min, times))), int(max(map(np.max, times)))
-
-
-def _topic_info(topic: TopicData,
-                remarks: list[str]) -> tuple[TopicInfo, IntArray, dict[str, FloatArray]]:
-    info = TopicInfo(topic.name, topic.type_name, len(topic.payloads))
-    stamp_ns, values = _stamps_and_values(topic, remarks)
-    if len(stamp_ns) > 1:
-        steps = np.diff(stamp_ns)
-        info.stamps_backward = int((steps < 0).sum())
-        info.stamps_repeated = int((steps == 0).sum())
-    if len(stamp_ns) > 2 and topic.name != '/diagnostics':
-        steps_s: FloatArray = np.multiply(np.diff(np.sort(stamp_ns)), 1e-9)
-        usual_s = float(np.median(steps_s))
-        gaps = steps_s > GAP_FACTOR * usual_s if usual_s > 0 else np.zeros(steps_s.size, bool)
-        span_s = float(steps_s[~gaps].sum())
-        info.rate_hz = int((~gaps).sum()) / span_s if span_s > 0 else None
-        info.max_gap_s = float(steps_s.max())
-        info.gaps = int(gaps.sum())
-        info.stamp_jitter_s = float(np.sqrt(np.mean((steps_s - usual_s)**2)))
-    for name, column in values.items():
-        finite = column[np.isfinite(column)]
-        if len(finite) and not OF_A_RUN[short_name(topic.name)].internals:
-            info.ranges[name] = (float(finite.min()), float(finite.max()))
-    return info, stamp_ns, values
-
-
-def _stamps_and_values(topic: TopicData,
-                       remarks: list[str]) -> tuple[IntArray, dict[str, FloatArray]]:
-    """Return header stamps in file order (receive times if these tell more) and values."""
-    short = short_name(topic.name)
-    if is_rig_topic(topic) and short in OF_A_RUN and OF_A_RUN[short].numeric is not None:
-        stamp_ns, values, bad = series.table(short, topic.payloads)
-        if bad.any():
-            remarks.append(f'{topic.name}: {int(bad.sum())} messages cannot be decoded.')
-        return stamp_ns[~bad], {name: column[~bad] for name, column in values.items()}
-    row = BY_NAME.get(short)
-    if _has_header(topic) and (row is None or row.stamped or not is_joint_topic(topic)):
-        try:
-            return series.stamps(topic.payloads), {}
-        except CdrError:
-            remarks.append(f'{topic.name}: some messages cannot be decoded.')
-    return topic.log_time_ns, {}
-
-
-def _has_header(topic: TopicData) -> bool:
-    if topic.encoding == 'cdr' and topic.type_name in _WITH_HEADER:
-        return True
-    fields = typestore().fielddefs.get(topic.type_name)
-    return bool(
-        topic.encoding == 'cdr' and fields and fields[1]
-        and fields[1][0][1][1] == 'std_msgs/msg/Header')

@@ -27,8 +27,8 @@ from pam_sim.joint.parameters import SIDES
 from pam_sim.units import allowed_range, gauge_kpa, P_ATM_PA
 
 if TYPE_CHECKING:
-    from pam_actuation.bags.info import TopicInfo
     from pam_actuation.bags.source import TopicData
+    from pam_actuation.bags.topic_info import TopicInfo
 
 Length = Callable[[], float]           # gives the length of the muscle at rest [m]
 # What judges the finite values of a column, their lowest and highest.
