@@ -82,11 +82,13 @@ def open_valve(name: str, valve_type: str, values: dict[str, Any], config: 'Driv
             f'{name} does not drive a valve of type {valve_type}, choose '
             f'{" or ".join(fitting)}', 'parameter backend')
     device = back_end(values, config)
+    device.safe_efforts = safe_efforts
     _tell(device.open)
+    _tell(device.vent)
     watchdog = None
     if watchdog_s and device.safe_writes():
         watchdog = _tell(lambda: DeviceWatchdog(device.safe_writes(), watchdog_s))
-    return GuardedOutput(device, safe_efforts, watchdog)
+    return GuardedOutput(device, watchdog)
 
 
 def open_sensors(name: str, values: dict[str, Any]) -> SensorInput:

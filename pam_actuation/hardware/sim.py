@@ -19,3 +19,6 @@ from pam_actuation.hardware.valve_output import ValveOutput
 
 class SimulatedValve(ValveOutput):
     """Do nothing: what drives the simulated valve is the message the node sends."""
+
+    def write(self, efforts: tuple[float, ...]) -> None:
+        """Do nothing."""

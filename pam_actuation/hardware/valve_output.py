@@ -44,7 +44,8 @@ class ValveOutput:
     One device, or pair of channels, that a valve hangs on.
 
     Derived classes set ``VALVE_TYPES``, which they can drive, and ``PARAMETERS``, and
-    override ``open``, ``write`` and ``safe_writes``.
+    override ``open`` and ``write``. Where files vent the device they override ``safe_writes``,
+    where another call does, ``vent``. Without either the safe signal is written by ``write``.
 
     Parameters
     ----------
@@ -53,17 +54,23 @@ class ValveOutput:
     config : pam_actuation.drivers.config.DriverConfig
         What the driver knows of the valve: range of the voltage, PWM period.
 
+    Attributes
+    ----------
+    safe_efforts : tuple of float
+        The signal that vents; set before ``open``.
+
     """
 
     VALVE_TYPES: tuple[str, ...] = VALVES
     PARAMETERS: tuple[Parameter, ...] = ()
+    safe_efforts: tuple[float, ...] = ()
 
     def __init__(self, values: dict[str, Any], config: 'DriverConfig') -> None:
         self.values = values
         self.config = config
 
     def open(self) -> None:  # noqa: A003
-        """Find the device, check it and vent; raise DeviceError if it is not usable."""
+        """Find the device and check it; raise DeviceError if it is not usable."""
 
     def write(self, efforts: tuple[float, ...]) -> None:
         """
@@ -75,14 +82,19 @@ class ValveOutput:
             PPR: volts. HSV: duties 0..1 of filling and venting valve.
 
         """
+        raise NotImplementedError
 
     def safe_writes(self) -> tuple[tuple[Path, int], ...]:
-        """Return (attribute, value) of all that is written to vent, in order; () for nothing."""
+        """Return (file, value) of all that is written to vent, in order; () without such files."""
         return ()
 
     def vent(self) -> None:
         """Send the safe signal as far as possible; raise DeviceError if any of it failed."""
-        sysfs.write_all(self.safe_writes())
+        writes = self.safe_writes()
+        if writes:
+            sysfs.write_all(writes)
+        else:
+            self.write(self.safe_efforts)
 
 
 def check_pair(fill_duty: float, vent_duty: float) -> None:
@@ -108,19 +120,16 @@ class GuardedOutput:
     Parameters
     ----------
     device : ValveOutput
-        An open output.
-    safe_efforts : tuple of float
-        The signal that vents.
+        An open output, with its ``safe_efforts``.
     watchdog : DeviceWatchdog, optional
         The process that vents the device when this one can not.
 
     """
 
-    def __init__(self, device: ValveOutput, safe_efforts: tuple[float, ...],
+    def __init__(self, device: ValveOutput,
                  watchdog: 'DeviceWatchdog | None' = None) -> None:
         self._device = device
         self._watchdog = watchdog
-        self._safe_efforts = tuple(safe_efforts)
         self._last_resort = weakref.finalize(self, _vent_quietly, device)
         self.failures = 0
 
@@ -134,7 +143,7 @@ class GuardedOutput:
             What is wrong with the device, '' if it took the signal.
 
         """
-        if tuple(efforts) == self._safe_efforts:
+        if tuple(efforts) == tuple(self._device.safe_efforts):
             return self.vent()
         problem = self._try(lambda: self._write(efforts))
         if problem:

@@ -48,6 +48,8 @@ while True:
 class OneAttribute(ValveOutput):
     """A device of one attribute that takes whole volts."""
 
+    safe_efforts = (0.0,)
+
     def __init__(self, path):
         super().__init__({}, None)
         self._path = path
@@ -151,7 +153,7 @@ def test_a_watchdog_that_was_killed_is_a_fault_and_comes_back(tmp_path):
     path = tmp_path / 'volts'
     put(path, 0)
     watchdog = DeviceWatchdog([(path, 0)], 0.05)
-    output = GuardedOutput(OneAttribute(path), (0.0,), watchdog)
+    output = GuardedOutput(OneAttribute(path), watchdog)
     assert output.send((3.0,)) == '' and number_in(path) == 3
     first = watchdog.pid
     os.kill(first, signal.SIGKILL)

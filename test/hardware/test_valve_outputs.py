@@ -38,8 +38,9 @@ from pam_actuation.hardware.valve_output import GuardedOutput
 values = {{'sysfs_root': {root!r}, 'dac.device': 'mcp4725', 'dac.channel': 0,
           'dac.amplification': 1.0}}
 device = IioDac(values, DriverConfig())
+device.safe_efforts = (0.0,)
 device.open()
-output = GuardedOutput(device, (0.0,))
+output = GuardedOutput(device)
 output.send((3.0,))
 assert open({raw!r}).read() == '2000\\n'
 raise RuntimeError('something else went wrong')

@@ -1,0 +1,56 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A valve output of another package that has ``write`` alone, as behind a serial line."""
+
+from pathlib import Path
+import time
+
+from fake_sysfs import put
+from pam_actuation.drivers.parameter import node_parameter
+from pam_actuation.hardware.valve_output import ValveOutput
+
+BLOCKED, TIMED_OUT = 'blocked', 'timed out'
+
+
+class WriteOnly(ValveOutput):
+    """Write the signal into a file; what stands in the file ``fault`` beside it goes wrong."""
+
+    PARAMETERS = (node_parameter('own_dac.file', '', 'File of the signal.'),)
+
+    def open(self):  # noqa: A003
+        """Find the files."""
+        self._file = Path(self.values['own_dac.file'])
+        self._fault = self._file.with_name('fault')
+
+    def write(self, efforts):
+        """Write the signal."""
+        if self._told() == TIMED_OUT:
+            raise TimeoutError(TIMED_OUT)
+        while self._told() == BLOCKED:
+            time.sleep(0.01)
+        put(self._file, ' '.join(f'{effort:g}' for effort in efforts))
+
+    def _told(self):
+        return self._fault.read_text() if self._fault.exists() else ''
+
+
+def installed(folder, monkeypatch):
+    """Let Python find this module as if it were installed, in this process and its children."""
+    about = folder / 'own_dac-0.1.0.dist-info'
+    about.mkdir()
+    (about / 'METADATA').write_text('Metadata-Version: 2.1\nName: own-dac\nVersion: 0.1.0\n')
+    (about / 'entry_points.txt').write_text(
+        '[pam_actuation.valve_outputs]\nown_dac = own_dac:WriteOnly\n')
+    monkeypatch.setenv('PYTHONPATH', f'{folder}:{Path(__file__).parent}')

@@ -1,0 +1,115 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Test a back end that has ``write`` alone: it vents wherever those of this package do."""
+
+import gc
+import signal
+
+from own_dac import installed, WriteOnly
+from pam_actuation.drivers.config import DriverConfig
+from pam_actuation.hardware import back_ends
+from pam_actuation.messages import SAFE_EFFORTS
+import pytest
+
+COMMAND_PA = 350_000.0
+
+
+class Bench:
+    """The file that stands for the device, and what goes wrong there."""
+
+    def __init__(self, folder):
+        self.file, self._fault = folder / 'signal', folder / 'fault'
+
+    def breaks(self, how):
+        """Let the device go wrong."""
+        self._fault.write_text(how)
+
+    def is_well(self):
+        """Let the device be as it was."""
+        self._fault.unlink(missing_ok=True)
+
+    def signal(self):
+        """Return what the valve gets."""
+        text = self.file.read_text() if self.file.exists() else ''
+        return tuple(float(part) for part in text.split())
+
+
+@pytest.fixture
+def bench(tmp_path):
+    return Bench(tmp_path)
+
+
+@pytest.fixture
+def opened(bench, monkeypatch):
+    """Return a function that opens the back end behind the guard."""
+    monkeypatch.setitem(back_ends.VALVE_OUTPUTS, 'own_dac', WriteOnly)
+
+    def open_it(valve='ppr'):
+        return back_ends.open_valve(
+            'own_dac', valve, {'own_dac.file': str(bench.file)}, DriverConfig(),
+            SAFE_EFFORTS[valve], 0.1)
+    return open_it
+
+
+@pytest.mark.parametrize('valve, signal_', [('ppr', (3.0,)), ('hsv', (0.25, 0.0))])
+def test_it_vents_when_it_is_opened_told_to_and_closed(bench, opened, valve, signal_):
+    safe = SAFE_EFFORTS[valve]
+    bench.file.write_text('5 5')
+    output = opened(valve)
+    assert bench.signal() == safe
+    for vent in (lambda: output.send(safe), output.vent, output.close):
+        assert output.send(signal_) == '' and bench.signal() == signal_
+        assert vent() == '' and bench.signal() == safe
+
+
+def test_it_vents_when_nobody_holds_it_any_more(bench, opened):
+    output = opened()
+    output.send((3.0,))
+    del output
+    gc.collect()
+    assert bench.signal() == (0.0,)
+
+
+@pytest.fixture
+def rig(bench, tmp_path, monkeypatch):
+    """Start a driver on the back end and a sender of commands; the muscle is under pressure."""
+    pytest.importorskip('rclpy')
+    from live_rig import Commander, LiveRig, wait_for
+    installed(tmp_path, monkeypatch)
+    live = LiveRig(tmp_path)
+    live.wait_for = wait_for
+    live.start('valve_driver', **{'backend': 'own_dac', 'own_dac.file': str(bench.file)})
+    live.listen()
+    wait_for(lambda: live.health['valve_driver'], 60.0, 'the driver')
+    live.commander = Commander(live, COMMAND_PA)
+    live.follows = lambda: wait_for(lambda: bench.signal()[0] > 2.0, 20.0, 'the wanted voltage')
+    live.follows()
+    yield live
+    bench.is_well()
+    live.commander.end()
+    live.close()
+
+
+@pytest.mark.ros
+def test_an_emergency_stop_and_ctrl_c_vent_it(bench, rig):
+    from std_srvs.srv import Trigger
+    assert rig.call(Trigger, 'valve_driver/emergency_stop').success
+    assert bench.signal() == (0.0,)
+    assert rig.call(Trigger, 'valve_driver/reset').success
+    rig.follows()
+    driver = rig.processes['valve_driver']
+    driver.send_signal(signal.SIGINT)
+    assert driver.wait(10.0) and driver.exit_code == 0
+    assert bench.signal() == (0.0,)
