@@ -19,13 +19,13 @@ from typing import Any, TYPE_CHECKING, TypeVar
 
 from pam_actuation.hardware.device_watchdog import DeviceWatchdog
 from pam_actuation.hardware.dummy import DummySensors, DummyValve
+from pam_actuation.hardware.failures import device_error
 from pam_actuation.hardware.iio_adc import IioAdc
 from pam_actuation.hardware.iio_dac import IioDac
 from pam_actuation.hardware.other_packages import SENSOR_GROUP, VALVE_GROUP, with_others
 from pam_actuation.hardware.pwm_sysfs import PwmPair
 from pam_actuation.hardware.sensor_input import SensorInput
 from pam_actuation.hardware.sim import SimulatedValve
-from pam_actuation.hardware.sysfs import DeviceError
 from pam_actuation.hardware.valve_output import GuardedOutput, ValveOutput
 from pam_sim.errors import InputError
 from pam_sim.parameters import Parameter
@@ -81,14 +81,15 @@ def open_valve(name: str, valve_type: str, values: dict[str, Any], config: 'Driv
         raise InputError(
             f'{name} does not drive a valve of type {valve_type}, choose '
             f'{" or ".join(fitting)}', 'parameter backend')
-    device = back_end(values, config)
-    device.safe_efforts = safe_efforts
-    _tell(device.open)
-    _tell(device.vent)
-    watchdog = None
-    if watchdog_s and device.safe_writes():
-        watchdog = _tell(lambda: DeviceWatchdog(device.safe_writes(), watchdog_s))
-    return GuardedOutput(device, watchdog)
+
+    def opened() -> GuardedOutput:
+        device = back_end(values, config)
+        device.safe_efforts = safe_efforts
+        device.open()
+        device.vent()
+        writes = device.safe_writes() if watchdog_s else ()
+        return GuardedOutput(device, DeviceWatchdog(writes, watchdog_s) if writes else None)
+    return _tell(opened, back_end, values)
 
 
 def open_sensors(name: str, values: dict[str, Any]) -> SensorInput:
@@ -103,12 +104,14 @@ def open_sensors(name: str, values: dict[str, Any]) -> SensorInput:
         A device is not usable.
 
     """
-    return _tell(lambda: SENSOR_INPUTS[name](values))
+    back_end = SENSOR_INPUTS[name]
+    return _tell(lambda: back_end(values), back_end, values)
 
 
-def _tell(action: Callable[[], Told]) -> Told:
+def _tell(action: Callable[[], Told], back_end: BackEnd, values: Mapping[str, Any]) -> Told:
     """Return what an action returns; a device that is not usable is a mistake of the user."""
     try:
         return action()
-    except DeviceError as error:
+    except Exception as raised:
+        error = device_error(raised, back_end, values)
         raise InputError(error.problem, error.where) from None

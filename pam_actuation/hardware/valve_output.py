@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-The interface of all valve outputs, and the guard that vents when one refuses.
+The interface of all valve outputs, and the guard that vents when one refuses or fails.
 
 A back end is a class made from ``ValveOutput``. The valve driver speaks to it
 through ``GuardedOutput`` only.
@@ -27,6 +27,7 @@ import weakref
 
 from pam_actuation.drivers.hsv_pulses import LONGEST_OF_A_PAIR
 from pam_actuation.hardware import sysfs
+from pam_actuation.hardware.failures import device_error
 from pam_actuation.hardware.sysfs import DeviceError
 from pam_sim.parameters import Parameter
 from pam_sim.valve import VALVES
@@ -188,9 +189,9 @@ class GuardedOutput:
     def _try(self, action: Callable[..., Any]) -> str:
         try:
             action()
-        except DeviceError as error:
+        except Exception as error:      # of a back end of somebody else
             self.failures += 1
-            return str(error)
+            return str(device_error(error, type(self._device), self._device.values))
         return ''
 
 
@@ -198,5 +199,5 @@ def _vent_quietly(device: ValveOutput) -> None:
     """Vent at the very end, where nobody is left to be told of a failure."""
     try:
         device.vent()
-    except DeviceError:
+    except Exception:
         pass

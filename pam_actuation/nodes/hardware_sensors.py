@@ -22,8 +22,8 @@ from pam_actuation.drivers.parameter import node_parameter
 from pam_actuation.hardware.back_ends import open_sensors
 from pam_actuation.hardware.back_ends import parameters_of
 from pam_actuation.hardware.back_ends import SENSOR_INPUTS
+from pam_actuation.hardware.failures import device_error
 from pam_actuation.hardware.sensor_input import MUSCLE, PLACE, TOPICS
-from pam_actuation.hardware.sysfs import DeviceError
 from pam_actuation.nodes.diagnostics import ERROR, Values
 from pam_actuation.nodes.diagnostics import OK
 from pam_actuation.nodes.managed import ManagedNode
@@ -87,9 +87,10 @@ class HardwareSensors(ManagedNode):
             now_ns = self.now_ns()
             try:
                 value = self.sensors.read(topic)
-            except DeviceError as error:
+            except Exception as error:      # of a back end of somebody else
                 self.failures += 1
-                problem = problem or f'{topic} is not measured: {error}'
+                told = device_error(error, type(self.sensors), self.sensors.values)
+                problem = problem or f'{topic} is not measured: {told}'
             else:
                 self.send(topic, topic_of(topic).content.message(now_ns, value))
         if problem:

@@ -17,10 +17,11 @@
 import gc
 import signal
 
-from own_dac import installed, WriteOnly
+from own_dac import installed, TIMED_OUT, WriteOnly
 from pam_actuation.drivers.config import DriverConfig
 from pam_actuation.hardware import back_ends
 from pam_actuation.messages import SAFE_EFFORTS
+from pam_sim.errors import InputError
 import pytest
 
 COMMAND_PA = 350_000.0
@@ -82,6 +83,29 @@ def test_it_vents_when_nobody_holds_it_any_more(bench, opened):
     assert bench.signal() == (0.0,)
 
 
+def test_what_it_raises_is_told_with_its_parameters_and_vents(bench, opened):
+    output = opened()
+    bench.breaks(TIMED_OUT)
+    told = f'back end WriteOnly (own_dac.file {bench.file}): TimeoutError: timed out'
+    assert output.send((3.0,)) == told and output.failures == 2
+    assert output.close() == told
+    with pytest.raises(InputError) as refused:
+        opened()
+    assert str(refused.value) == told
+    bench.is_well()
+    assert output.send((3.0,)) == ''
+    bench.breaks(TIMED_OUT)
+    output.send((2.0,))
+    bench.is_well()
+    assert output.send((0.0,)) == '' and bench.signal() == (0.0,)
+
+
+def test_a_mistake_in_its_code_is_told_with_its_line(opened, monkeypatch):
+    monkeypatch.setattr(WriteOnly, 'write', back_ends.ValveOutput.write)
+    with pytest.raises(InputError, match=r'NotImplementedError \(valve_output.py:\d+\)'):
+        opened()
+
+
 @pytest.fixture
 def rig(bench, tmp_path, monkeypatch):
     """Start a driver on the back end and a sender of commands; the muscle is under pressure."""
@@ -113,3 +137,15 @@ def test_an_emergency_stop_and_ctrl_c_vent_it(bench, rig):
     driver.send_signal(signal.SIGINT)
     assert driver.wait(10.0) and driver.exit_code == 0
     assert bench.signal() == (0.0,)
+
+
+@pytest.mark.ros
+def test_a_device_that_times_out_is_a_fault_and_is_vented_when_it_answers(bench, rig):
+    from std_srvs.srv import Trigger
+    bench.breaks(TIMED_OUT)
+    rig.wait_for(lambda: rig.health['valve_driver'][-1].level == 2, 10.0, 'the fault')
+    assert 'TimeoutError: timed out' in rig.health['valve_driver'][-1].message
+    bench.is_well()
+    rig.wait_for(lambda: bench.signal() == (0.0,), 5.0, 'the safe voltage')
+    assert rig.call(Trigger, 'valve_driver/reset').success
+    rig.follows()

@@ -83,3 +83,15 @@ def test_sensors_that_are_not_there_read_a_muscle_at_rest():
     sensors = open_sensors('dummy', {})
     assert {topic: sensors.read(topic) for topic in sensors.topics} == {
         'pressure': P_ATM_PA, 'contraction': 0.0, 'force': 0.0}
+
+
+def test_garbage_of_a_board_is_told_with_its_parameters(tmp_path, monkeypatch):
+    def garbage(self, topic):
+        raise ConnectionError('no such board')
+    path, = make_adc(tmp_path, [1.0])
+    monkeypatch.setattr(SENSOR_INPUTS['iio_adc'], 'read', garbage)
+    with pytest.raises(InputError) as told:
+        open_adc(tmp_path, pressure__channel=0)
+    assert str(told.value) == (
+        f'back end IioAdc (sysfs_root {tmp_path}, adc.device ads1115, pressure.channel 0): '
+        'ConnectionError: no such board')
