@@ -44,6 +44,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
 SIGNALS: dict[int, str] = {number: number.name for number in interrupts.ENDING}
+SAFE_STOP_S = 1.0           # for a device that may hang as the main thread does
 SERVICE_WAIT_S = 0.5        # longest sleep of the thread that answers services
 SERVICE_END_S = 3.0         # for a service that is still being answered at the end
 LONGEST_START_S = 60.0      # compiling at the first start cannot be interrupted
@@ -60,7 +61,7 @@ class _Stopper(threading.Thread):
     Python runs a handler only between two steps of the main thread, which may hang inside the
     middleware. The wake-up file informs this thread at once, whichever thread the system
     interrupted. If the main thread does not end its work within the node's ``STUCK_AFTER_S``, this
-    thread makes the output safe itself and ends the process.
+    thread makes the output safe itself and ends the process, also where the device does not answer.
     """
 
     def __init__(self) -> None:
@@ -84,10 +85,15 @@ class _Stopper(threading.Thread):
         self.node.stopping = True
         limit_s = self.node.STUCK_AFTER_S if self.node.loops else LONGEST_START_S
         if not self.safe.wait(limit_s):
-            try:
-                self.node.safe_stop(f'{self.reason}, the loop did not answer')
-            finally:
-                os._exit(1)
+            stopping = threading.Thread(
+                target=self.node.safe_stop, args=[f'{self.reason}, the loop did not answer'],
+                daemon=True, name='safe stop')
+            stopping.start()
+            stopping.join(SAFE_STOP_S)
+            if stopping.is_alive():
+                os.write(2, f'{self.node.NAME}: {self.reason}, but the device does not answer: '
+                         'NOT MADE SAFE\n'.encode())
+            os._exit(1)
 
 
 def _noted(number: int, frame: object) -> None:

@@ -16,8 +16,9 @@
 
 import gc
 import signal
+import time
 
-from own_dac import installed, TIMED_OUT, WriteOnly
+from own_dac import BLOCKED, installed, TIMED_OUT, WriteOnly
 from pam_actuation.drivers.config import DriverConfig
 from pam_actuation.hardware import back_ends
 from pam_actuation.messages import SAFE_EFFORTS
@@ -149,3 +150,14 @@ def test_a_device_that_times_out_is_a_fault_and_is_vented_when_it_answers(bench,
     rig.wait_for(lambda: bench.signal() == (0.0,), 5.0, 'the safe voltage')
     assert rig.call(Trigger, 'valve_driver/reset').success
     rig.follows()
+
+
+@pytest.mark.ros
+def test_a_device_that_blocks_keeps_no_driver_alive(bench, rig):
+    bench.breaks(BLOCKED)
+    time.sleep(0.5)
+    driver = rig.processes['valve_driver']
+    driver.send_signal(signal.SIGTERM)
+    assert driver.wait(10.0), 'the driver does not end'
+    assert driver.exit_code == 1
+    assert driver.last_line().endswith('the device does not answer: NOT MADE SAFE')
