@@ -194,7 +194,7 @@ class ControllerState:
 
 LEVEL_OK, LEVEL_WARN, LEVEL_ERROR, LEVEL_STALE = 0, 1, 2, 3      # of a status
 # Of a status: a node that waits to be activated, and one that has not ticked since.
-CONFIGURED, ACTIVE = 'configured, not active', 'active'
+CONFIGURED, ACTIVE, DEACTIVATED = 'configured, not active', 'active', 'deactivated'
 
 
 @dataclass(frozen=True, slots=True)

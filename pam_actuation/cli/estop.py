@@ -40,6 +40,7 @@ def add_arguments(parser: Parser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Stop all drivers; exit code 1 unless every one vents, 2 if there is none."""
+    from pam_actuation.drivers.faults import BY_HAND
     from pam_sim.errors import InputError
     with operators(args) as opened:
         from pam_actuation.nodes.operator import trigger_all
@@ -62,8 +63,8 @@ def run(args: argparse.Namespace) -> int:
     findings = [f'{name} is not configured: it drives no valve and cannot vent one'
                 for name in names]
     if failed:
-        findings.append(f'{len(failed)} of {len(answers)} drivers did not say that they vent: '
-                        'shut the supply and open the dump valve')
+        findings.append(
+            f'{len(failed)} of {len(answers)} drivers did not say that they vent: {BY_HAND}')
     text = '\n'.join(f'finding: {one}' for one in findings) or (
         f'all {len(answers)} drivers vent until "pam reset"' if len(answers) > 1
         else 'the driver vents until "pam reset"')

@@ -25,6 +25,7 @@ VENT = 'vent'
 HOLD = 'hold'
 IGNORE = 'ignore'
 CLAMP = 'clamp'
+BY_HAND = 'shut the supply and open the dump valve'     # where nobody else is known to vent
 
 
 @dataclass(frozen=True)

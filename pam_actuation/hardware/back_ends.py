@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 OWN_VALVE_OUTPUTS: dict[str, type[ValveOutput]] = {
     'sim': SimulatedValve, 'dummy': DummyValve, 'iio_dac': IioDac, 'pwm_sysfs': PwmPair}
 OWN_SENSOR_INPUTS: dict[str, type[SensorInput]] = {'dummy': DummySensors, 'iio_adc': IioAdc}
+NO_DEVICE = ('sim', 'dummy')        # behind these outputs
 VALVE_OUTPUTS = with_others(OWN_VALVE_OUTPUTS, VALVE_GROUP, ValveOutput)
 SENSOR_INPUTS = with_others(OWN_SENSOR_INPUTS, SENSOR_GROUP, SensorInput)
 

@@ -44,6 +44,7 @@ END_TIMEOUT_S = 1.0
 TRY_AGAIN_S = 0.01
 LONGEST_TRY_S = 60.0
 WHERE = 'watchdog of the device'
+GONE = f'{WHERE}: the valve driver is gone: vented'
 # What ends the driver must not end this: it goes when the driver has gone.
 OUTLIVED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
@@ -186,8 +187,9 @@ class _LastWord:
             time.sleep(TRY_AGAIN_S)
             if not gone and select.select([self._inlet], [], [], 0.0)[0]:
                 return
-        if not told:
+        if gone or not told:
             _report(f'the valve driver {why}: vented')
+        if not told:
             self._say(VENTED)
 
     def _write_all(self) -> str:

@@ -31,7 +31,7 @@ import traceback
 from typing import Any
 
 from pam_actuation.drivers.parameter import node_parameter
-from pam_actuation.messages import ACTIVE, CONFIGURED
+from pam_actuation.messages import ACTIVE, CONFIGURED, DEACTIVATED
 from pam_actuation.namespaces import node_name_of
 from pam_actuation.nodes import lockstep
 from pam_actuation.nodes import qos
@@ -53,7 +53,6 @@ from pam_sim.parameters import Parameter
 from rclpy.lifecycle import LifecycleNode, LifecycleState
 from rclpy.lifecycle import TransitionCallbackReturn
 
-DEACTIVATED = 'deactivated'
 EVERY_TICK_S = 1e-9     # in lockstep: due at every clock message
 FAREWELL_S = 0.1        # for the last messages to be confirmed; many receivers confirm later
 
@@ -296,7 +295,7 @@ class ManagedNode(LifecycleNode):
         self._make_safe(why)
         self._end_loops()
         self.exit_code = 1
-        self.diagnostics.update(ERROR, why)
+        self.diagnostics.update(ERROR, self.last_status(why)[1])
 
     def _make_safe(self, why: str) -> None:
         """Call ``safe_stop``; a fault in it must not stop the way out."""

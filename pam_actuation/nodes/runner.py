@@ -61,7 +61,8 @@ class _Stopper(threading.Thread):
     Python runs a handler only between two steps of the main thread, which may hang inside the
     middleware. The wake-up file informs this thread at once, whichever thread the system
     interrupted. If the main thread does not end its work within the node's ``STUCK_AFTER_S``, this
-    thread makes the output safe itself and ends the process, also where the device does not answer.
+    thread makes the output safe itself and ends the process. It also ends the process of a device
+    that does not answer.
     """
 
     def __init__(self) -> None:

@@ -20,10 +20,12 @@ from typing import Any
 
 from pam_actuation.drivers.config import DRIVER_PARAMETERS, DriverConfig
 from pam_actuation.drivers.parameter import node_parameter
+from pam_actuation.hardware.back_ends import NO_DEVICE
 from pam_actuation.hardware.back_ends import open_valve
 from pam_actuation.hardware.back_ends import parameters_of
 from pam_actuation.hardware.back_ends import VALVE_OUTPUTS
 from pam_actuation.hardware.valve_output import TRIES
+from pam_actuation.messages import DEACTIVATED
 from pam_actuation.messages import Pressure
 from pam_actuation.messages import ValveSignal
 from pam_actuation.namespaces import node_name_of
@@ -31,7 +33,6 @@ from pam_actuation.nodes import lockstep
 from pam_actuation.nodes.diagnostics import ERROR, Values
 from pam_actuation.nodes.endpoints import PolledSubscription
 from pam_actuation.nodes.lockstep import TickInput
-from pam_actuation.nodes.managed import DEACTIVATED
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import valve_of_rig
 from pam_actuation.nodes.runner import run
@@ -46,6 +47,8 @@ from std_srvs.srv import Trigger
 COMMAND_POLL_S = 0.001      # PPR: how soon a command is passed on
 EARLY_SHARE = 0.9           # of a period: a tick by the clock is left out this soon after another
 GRAPH_PERIOD_S = 0.5
+NO_WATCHDOG = ('device_watchdog', 'none, so nobody vents the device where the driver is killed or '
+               'hangs: fit a watchdog between computer and valve')
 SHORTEST_SILENCE_S = 0.03   # three signals
 
 
@@ -97,7 +100,7 @@ class ValveDriver(ManagedNode):
 
     def check(self) -> None:
         """Refuse to drive a device on a time that may stand still, or to vent between signals."""
-        if self.uses_simulated_time and self.value('backend') not in ('sim', 'dummy'):
+        if self.uses_simulated_time and self.value('backend') not in NO_DEVICE:
             raise InputError('a real valve is not driven in simulated time', 'use_sim_time')
         self._watchdog = node_name_of(
             self.value('watchdog'), self.get_namespace().rstrip('/'), 'parameter watchdog')
@@ -127,6 +130,8 @@ class ValveDriver(ManagedNode):
             self.value('backend'), valve,
             {p.name: self.value(p.name) for p in parameters_of(VALVE_OUTPUTS)}, config,
             loop.safe_signal(0).efforts, self.value('device_watchdog_s'))
+        if self._is_unwatched():
+            self.get_logger().warning(': '.join(NO_WATCHDOG))
         if self._stopped is not None:
             loop.safety.take_over(self._stopped)
         self.loop = loop
@@ -188,7 +193,13 @@ class ValveDriver(ManagedNode):
         for name, latency in self._latencies.items():
             values = (*values, *latency.values(f'{name}.latency'))
         vents = self.output.watchdog_vents
-        return values if vents is None else (*values, ('device_watchdog_vents', vents))
+        if vents is not None:
+            return (*values, ('device_watchdog_vents', vents))
+        return (*values, NO_WATCHDOG) if self._is_unwatched() else values
+
+    def _is_unwatched(self) -> bool:
+        """Tell whether no process of its own vents the device."""
+        return self.value('backend') not in NO_DEVICE and self.output.watchdog_vents is None
 
     def start(self) -> None:
         """Tick by the clock, and for the PPR also by the command."""

@@ -142,6 +142,8 @@ class RigClient:
     ----------
     statuses : dict
         Full node name to (level, message, values) of its last diagnostic status.
+    heard_s : dict
+        Full node name to the steady time of its last status [s].
     changes : list of (float, str, int, str)
         Steady time [s], full node name, level, message of every change.
 
@@ -155,6 +157,7 @@ class RigClient:
         self.executor.add_node(self.node)
         self._clients: dict[str, Any] = {}
         self.statuses: dict[str, tuple[int, str, dict[str, str]]] = {}
+        self.heard_s: dict[str, float] = {}
         self.changes: list[tuple[float, str, int, str]] = []
         self._read = Reader('diagnostics')
         # A bare depth is a reliable, volatile subscription to rclpy, as of all topics of the rig.
@@ -168,6 +171,7 @@ class RigClient:
     def _on_diagnostics(self, raw: bytes) -> None:
         for status in self._read(raw) or ():
             known = self.statuses.get(status.name)
+            self.heard_s[status.name] = time.monotonic()
             if known is None or known[:2] != (status.level, status.message):
                 self.changes.append(
                     (time.monotonic(), status.name, status.level, status.message))

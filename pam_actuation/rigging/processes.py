@@ -106,6 +106,8 @@ class NodeProcess:
 
     """
 
+    killed_after_s: float | None = None         # by ``end_all``, in vain asked to end
+
     def __init__(self, name: str, namespace: str, parameters: Mapping[str, Any],
                  environment: Mapping[str, str], log_dir: str | os.PathLike[str],
                  remap: Mapping[str, str] | None = None, parameter_file: str = '',
@@ -159,6 +161,9 @@ class NodeProcess:
         code = self.exit_code
         if code is None:
             return f'{self.label} runs'
+        if code == -signal.SIGKILL and self.killed_after_s is not None:
+            return (f'{self.label} did not end within {self.killed_after_s:g} s of SIGTERM and '
+                    'was killed')
         if code < 0:
             return f'{self.label} was ended by {signal.Signals(-code).name}'
         last = self.last_line()
@@ -166,11 +171,15 @@ class NodeProcess:
 
     def last_line(self) -> str:
         """Return the last line the node printed, without the time."""
+        lines = self.printed().strip().splitlines()
+        return lines[-1].rsplit(']: ', 1)[-1] if lines else ''
+
+    def printed(self) -> str:
+        """Return all that the node printed."""
         try:
-            lines = self.log_file.read_text(errors='replace').strip().splitlines()
+            return self.log_file.read_text(errors='replace')
         except OSError:
             return ''
-        return lines[-1].rsplit(']: ', 1)[-1] if lines else ''
 
     def cpu_s(self) -> float | None:
         """Return the processor time used so far [s]; None once the process is gone."""
@@ -206,6 +215,7 @@ def end_all(processes: Iterable[NodeProcess], timeout_s: float = 5.0) -> None:
         process.send_signal(signal.SIGTERM)
     late = [one for one in processes if not one.wait(max(deadline - time.monotonic(), 0.0))]
     for process in late:
+        process.killed_after_s = timeout_s
         process.send_signal(signal.SIGKILL)
     for process in late:
         process.wait(timeout_s)

@@ -24,12 +24,15 @@ from pam_actuation.drivers.safety import EMERGENCY_STOP
 from pam_actuation.messages import LEVEL_ERROR
 from pam_actuation.namespaces import node_name_of
 from pam_actuation.rigging.node_group import NodeGroup
+from pam_actuation.rigging.plan import DRIVER, WATCHDOG
 from pam_actuation.rigging.transitions import SessionFailed
+from pam_actuation.rigging.venting import has_vented, MAY_HOLD, NOT_KNOWN, Silence
 
 if TYPE_CHECKING:
     from pam_actuation.rigging.node_spec import NodeSpec
     from pam_actuation.rigging.processes import NodeProcess
 
+SILENT_S = 3.0            # without a status, which comes twice in a second
 SETTLED_S = 1.0           # from the last node active to the first command and reading of all
 
 
@@ -57,6 +60,8 @@ class Supervisor:
             for node in nodes}, domain_id=domain_id)
         self.faults: list[str] = []
         self._faulty: set[str] = set()
+        self._silent: set[str] = set()
+        self._unwatched: set[str] = set()       # drivers of which that was told
         self._from_start: set[str] = set()      # not well yet when the nodes became active
         self._heard = 0
 
@@ -106,6 +111,7 @@ class Supervisor:
         """
         begun = time.monotonic()
         deadline = None if seconds is None else begun + seconds
+        silence, looked = Silence(self._group.started.heard_s), begun
         # A driver is not well before the first command; what lasts is told after a second.
         started = self._group.started
         self._heard = len(started.changes)
@@ -114,6 +120,10 @@ class Supervisor:
         while deadline is None or time.monotonic() < deadline:
             started.spin(0.05)
             self._hear(tell, time.monotonic() > begun + SETTLED_S)
+            looked, before = time.monotonic(), looked
+            for name in self._group.of_kind(DRIVER):
+                self._tell_silence(name, silence.of(name, looked - before), tell)
+                self._tell_unwatched(name, tell)
             ended = self._group.ended()
             if ended is not None:
                 raise SessionFailed(self._how_it_ended(ended))
@@ -144,6 +154,30 @@ class Supervisor:
                 self._faulty.discard(name)
                 tell(f'{name} is well again: {message}')
 
+    def _tell_silence(self, name: str, silent_s: float, tell: Callable[[str], None]) -> None:
+        """Tell of a driver that fell silent, as where its device blocks, and is heard again."""
+        if silent_s > SILENT_S and name not in self._silent and self.processes[name].running:
+            self._silent.add(name)
+            self.faults.append(
+                f'{name}: sent no status for {SILENT_S:g} s: {self._by_watchdog(name)}')
+            tell(self.faults[-1])
+        elif silent_s == 0.0 and name in self._silent:
+            self._silent.remove(name)
+            tell(f'{name} is heard again')
+
+    def _by_watchdog(self, name: str) -> str:
+        """Return what happens to the muscle of a driver that is silent."""
+        values = self._group.started.statuses.get(name, (0, '', {}))[2]
+        watched = 'device_watchdog_vents' in values or _watchdog(name) in self.processes
+        return 'its watchdog vents' if watched else f'its valve holds the last signal, {MAY_HOLD}'
+
+    def _tell_unwatched(self, name: str, tell: Callable[[str], None]) -> None:
+        """Tell once of a driver whose device no watchdog process vents."""
+        why = self._group.started.statuses.get(name, (0, '', {}))[2].get('device_watchdog')
+        if why and name not in self._unwatched:
+            self._unwatched.add(name)
+            tell(f'{name}: watchdog of the device: {why}')
+
     def finish(self) -> list[str]:
         """
         Take the nodes down, the last one to come first.
@@ -158,7 +192,21 @@ class Supervisor:
         ended = {one.how_it_ended() for one in self.processes.values()}
         return [one for one in problems if one not in ended] + [
             self._how_it_ended(name) for name, one in self.processes.items()
-            if one.exit_code != 0]
+            if one.exit_code != 0] + [
+            f'{name}: {NOT_KNOWN}' for name in self._group.of_kind(DRIVER)
+            if self._group.was_asked(name) and not self._has_vented(name)]
+
+    def _has_vented(self, name: str) -> bool:
+        client = self._group.started
+        said = [message for when, node, _, message in client.changes
+                if node == _watchdog(name) and when > client.heard_s.get(name, 0.0)]
+        return has_vented(self.processes[name], client.statuses.get(name, (0, '', {})),
+                          next(filter(None, said), ''))
 
     def _how_it_ended(self, name: str) -> str:
         return f'{name}: {self.processes[name].how_it_ended()}'
+
+
+def _watchdog(driver: str) -> str:
+    """Return the full name of the node that watches a driver."""
+    return f'{driver.rpartition("/")[0]}/{WATCHDOG}'

@@ -35,6 +35,8 @@ DEAF = 'import signal, time; signal.signal(signal.SIGTERM, signal.SIG_IGN); ' \
 class DeafNode(NodeProcess):
     """A process that hears no SIGTERM, as a node does while it compiles."""
 
+    label = 'deaf'
+
     def __init__(self):
         self._process = subprocess.Popen(
             [sys.executable, '-c', DEAF], stdout=subprocess.PIPE, text=True)
@@ -48,6 +50,7 @@ def test_nodes_that_do_not_end_share_the_time_they_are_given():
     end_all(nodes, timeout_s=1.5)
     assert 1.5 <= time.monotonic() - begin < 4.5        # one after the other: 6 s
     assert [node.exit_code for node in nodes] == [-signal.SIGKILL] * 4
+    assert nodes[0].how_it_ended() == 'deaf did not end within 1.5 s of SIGTERM and was killed'
 
 
 @pytest.mark.skipif(sys.platform != 'linux', reason='asks Linux')

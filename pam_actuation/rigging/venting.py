@@ -1,0 +1,80 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What is known from outside of a valve driver that fell silent, or did not end in order."""
+
+from collections.abc import Mapping
+
+from pam_actuation.drivers.faults import BY_HAND
+from pam_actuation.drivers.safety import OK
+from pam_actuation.drivers.watchdog import RESTS, VENTS
+from pam_actuation.hardware.device_watchdog import GONE
+from pam_actuation.messages import DEACTIVATED
+from pam_actuation.rigging.processes import NodeProcess
+
+MAY_HOLD = f'the muscle may still be under pressure: {BY_HAND}'
+NOT_KNOWN = f'NOT KNOWN TO HAVE VENTED, {MAY_HOLD}'
+LONGEST_STEP_S = 0.2        # that counts as silence; for longer this process itself stood still
+
+Status = tuple[int, str, dict[str, str]]
+
+
+def has_vented(process: NodeProcess, last: Status, watchdog: str) -> bool:
+    """
+    Tell whether the muscle of a driver that has ended is known to be vented.
+
+    Parameters
+    ----------
+    process : NodeProcess
+        Of the driver.
+    last : tuple
+        Its last status: level, message, values.
+    watchdog : str
+        What its ``valve_watchdog`` said after that, '' for none.
+
+    """
+    _, message, values = last
+    if process.exit_code == 0 or values.get('backend') == 'dummy':
+        return True
+    if message == DEACTIVATED or message.endswith(', vented'):
+        return True
+    if watchdog.startswith((VENTS, RESTS)):
+        return True
+    if 'device_watchdog_vents' not in values:
+        return False
+    return values.get('state') != OK or GONE in process.printed()
+
+
+class Silence:
+    """
+    Count for how long nodes sent no status.
+
+    Parameters
+    ----------
+    heard_s : mapping
+        Full node name to the time of its last status [s].
+
+    """
+
+    def __init__(self, heard_s: Mapping[str, float]) -> None:
+        self._heard_s = heard_s
+        self._counted: dict[str, tuple[float, float]] = {}
+
+    def of(self, name: str, elapsed_s: float) -> float:
+        """Return for how long a node has been silent [s]; ``elapsed_s``: since it was asked."""
+        heard_s = self._heard_s.get(name, 0.0)
+        before_s, silent_s = self._counted.get(name, (heard_s, 0.0))
+        silent_s = silent_s + min(elapsed_s, LONGEST_STEP_S) if heard_s == before_s else 0.0
+        self._counted[name] = heard_s, silent_s
+        return silent_s
