@@ -86,6 +86,7 @@ def run(args: argparse.Namespace) -> int:
         prepare_template()
     from pam_actuation.bags.place import check_bag_target
     from pam_actuation.interrupts import undisturbed
+    from pam_actuation.nodes.hardware_check import check_hardware
     from pam_actuation.rigging.plan import RECORDER
     from pam_actuation.rigging.supervisor import Supervisor
     from pam_actuation.rigging.transitions import SessionFailed, termination_as_interrupt
@@ -93,6 +94,7 @@ def run(args: argparse.Namespace) -> int:
         check_file(args.policy, args.overwrite, ours='Made from the code, as docs/')
     args.valve = args.valve or _model(args).valve
     nodes = _nodes(args)
+    check_hardware(nodes)
     if args.policy is None:
         for node in nodes:
             if node.name == RECORDER:

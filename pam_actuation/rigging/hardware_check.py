@@ -1,0 +1,113 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What a file of hardware says to nobody: nodes and parameters that are not there.
+
+A node only warns of a parameter that it does not know, and ROS is silent on a node that does not
+run. With a wrong name a pressure limit would not be the one that is stated.
+"""
+
+from collections.abc import Iterable, Iterator
+import re
+
+from pam_actuation.hardware.files import PARAMETERS
+from pam_actuation.namespaces import node_name_of
+from pam_actuation.rigging.node_spec import NodeSpec, ORDER
+from pam_actuation.rigging.plan import DRIVER
+from pam_actuation.ros_missing import ros_missing
+from pam_sim.errors import did_you_mean, InputError
+from pam_sim.located_yaml import load_yaml, Located
+
+BACK_END = 'backend'
+WILDCARDS = {'**': '(/[^/]+)*', '*': '/[^/]+'}
+OF_ROS = ('use_sim_time', 'qos_overrides.')
+
+
+def check_hardware(nodes: Iterable[NodeSpec]) -> None:
+    """
+    Check the parameter files of nodes before any of them starts.
+
+    Raises
+    ------
+    InputError
+        A file names a node or a parameter that there is not, or no back end of a driver.
+
+    """
+    told: dict[str, list[NodeSpec]] = {}
+    for node in nodes:
+        if node.parameter_file:
+            told.setdefault(node.parameter_file, []).append(node)
+    for file, readers in told.items():
+        _check_file(load_yaml(file), readers)
+
+
+def _check_file(tree: Located, readers: list[NodeSpec]) -> None:
+    names = {node_name_of(node.name, node.namespace): node.name for node in readers}
+    without = {full_name for full_name, kind in names.items() if kind == DRIVER}
+    for words, holder, key in _entries(tree):
+        kind, given = words[-1], holder[key][PARAMETERS]
+        if kind not in WILDCARDS and kind not in ORDER:
+            raise holder.error(
+                f'unknown node `{kind}`{did_you_mean(kind, names.values())}; this file is for '
+                f'{" and ".join(sorted({*names.values()}))}', key)
+        reached = {name for name in names if _matches(words, name)}
+        kinds = sorted({names[name] for name in reached} or {kind} - {*WILDCARDS})
+        _check_names(given, kinds)
+        if BACK_END in given:
+            without -= reached
+    if without:
+        raise tree.error(f'`{BACK_END}` is missing for {" and ".join(sorted(without))}: nothing '
+                         'would drive the valve')
+
+
+def _entries(tree: Located, above: tuple[str, ...] = ()) -> Iterator[
+        tuple[tuple[str, ...], Located, str]]:
+    """Return the words of the name of each node, the mapping that holds it, and its key there."""
+    for key, value in tree.items():
+        words = (*above, *filter(None, key.split('/')))
+        if PARAMETERS in value:
+            yield words, tree, key
+        else:
+            yield from _entries(value, words)
+
+
+def _matches(words: tuple[str, ...], full_name: str) -> bool:
+    """Tell whether a name with wildcards, as ROS reads them, is that of a node."""
+    pattern = ''.join(WILDCARDS.get(word) or f'/{re.escape(word)}' for word in words)
+    return re.fullmatch(pattern, full_name) is not None
+
+
+def _check_names(given: Located, kinds: list[str]) -> None:
+    """Raise InputError on the first parameter that none of some nodes has."""
+    try:
+        from pam_actuation.nodes.interfaces import node_class
+        from pam_actuation.nodes.managed import COMMON_PARAMETERS
+    except ImportError as error:
+        raise InputError(ros_missing(error.name or 'rclpy')) from None
+    known = {one.name for kind in kinds
+             for one in (*COMMON_PARAMETERS, *node_class(kind).PARAMETERS)}
+    for name, holder, key in _flat(given):
+        if kinds and name not in known and not name.startswith(OF_ROS):
+            raise holder.error(f'unknown parameter `{name}` of {" and ".join(kinds)}'
+                               f'{did_you_mean(name, known)}', key)
+
+
+def _flat(given: Located, above: str = '') -> Iterator[tuple[str, Located, str]]:
+    """Return the full name of each parameter, the mapping that holds it, and its key there."""
+    for key, value in given.items():
+        if isinstance(value, Located):
+            yield from _flat(value, f'{above}{key}.')
+        else:
+            yield f'{above}{key}', given, key

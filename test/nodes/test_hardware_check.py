@@ -1,0 +1,91 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Test that a wrong name in a file of hardware is refused before any node starts."""
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from pam_actuation.cli.main import main                                     # noqa: E402, I100
+from pam_actuation.nodes.hardware_check import check_hardware               # noqa: E402
+from pam_actuation.rigging import layouts                                   # noqa: E402
+from pam_sim.errors import InputError                                       # noqa: E402
+
+DRIVER = """/**/valve_driver:
+  ros__parameters:
+    backend: dummy
+    dac: {channel: 1}
+    diagnostics_period_s: 0.2
+    use_sim_time: false
+"""
+SENSORS = """/**:
+  hardware_sensors:
+    ros__parameters: {backend: dummy, place: muscle}
+"""
+WILD = '/**:\n  ros__parameters: {backend: dummy, publish_rate_hz: 200.0, hsv.period_s: 0.01}\n'
+OTHER = '/**/experiment_recorder:\n  ros__parameters: {overwrite: true}\n'
+
+MISTAKES = {
+    'a parameter': (
+        DRIVER.replace('use_sim_time: false', 'max_pressure_gauge: 1.0e5'),
+        ':6: unknown parameter `max_pressure_gauge` of valve_driver (did you mean '
+        '`max_pressure_gauge_pa`?)'),
+    'a nested one': (
+        DRIVER.replace('channel: 1', 'chanel: 1'),
+        ':4: unknown parameter `dac.chanel` of valve_driver (did you mean `dac.channel`?)'),
+    'one of another node': (
+        SENSORS.replace('place', 'valve_type'),
+        ':3: unknown parameter `valve_type` of hardware_sensors'),
+    'a node': (
+        DRIVER.replace('valve_driver', 'valve_drivr'),
+        ':1: unknown node `valve_drivr` (did you mean `valve_driver`?)'),
+    'no back end': (
+        DRIVER.replace('    backend: dummy\n', ''),
+        '`backend` is missing for /muscle/valve_driver'),
+    'another namespace': (
+        DRIVER.replace('**', 'flexor'), '`backend` is missing for /muscle/valve_driver'),
+    'no namespace': (
+        DRIVER.replace('/**', ''), '`backend` is missing for /muscle/valve_driver')}
+
+
+@pytest.mark.parametrize('case', MISTAKES)
+def test_a_wrong_name_is_one_sentence_with_its_line(tmp_path, capsys, case):
+    text, words = MISTAKES[case]
+    file = tmp_path / 'mine.yaml'
+    file.write_text(text)
+    assert main(['up', 'rig', '--hardware', str(file)]) == 2
+    told = capsys.readouterr().err
+    assert f'{file}' in told and words in told and told.count('\n') == 1
+
+
+@pytest.mark.parametrize('text', [DRIVER, DRIVER + SENSORS, WILD, DRIVER + OTHER])
+def test_what_is_right_is_taken(tmp_path, text):
+    file = tmp_path / 'mine.yaml'
+    file.write_text(text)
+    check_hardware(layouts.rig(hardware=str(file)))
+
+
+def test_each_muscle_of_a_joint_needs_a_back_end(tmp_path):
+    file = tmp_path / 'mine.yaml'
+    file.write_text(DRIVER.replace('/**', '/**/flexor'))
+    with pytest.raises(InputError, match='missing for /knee/extensor/valve_driver: nothing'):
+        check_hardware(layouts.knee(hardware=str(file)))
+    file.write_text(file.read_text() + DRIVER.replace('/**', '/*/extensor'))
+    check_hardware(layouts.knee(hardware=str(file)))
+
+
+@pytest.mark.parametrize('name', ['dummy', 'ppr_iio', 'hsv_pwm'])
+def test_the_shipped_files_are_right(name):
+    check_hardware(layouts.rig(hardware=name))
