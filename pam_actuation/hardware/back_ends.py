@@ -86,10 +86,14 @@ def open_valve(name: str, valve_type: str, values: dict[str, Any], config: 'Driv
     def opened() -> GuardedOutput:
         device = back_end(values, config)
         device.safe_efforts = safe_efforts
-        device.open()
-        device.vent()
-        writes = device.safe_writes() if watchdog_s else ()
-        return GuardedOutput(device, DeviceWatchdog(writes, watchdog_s) if writes else None)
+        try:
+            device.open()
+            device.vent()
+            writes = device.safe_writes() if watchdog_s else ()
+            return GuardedOutput(device, DeviceWatchdog(writes, watchdog_s) if writes else None)
+        except Exception:
+            device.release()
+            raise
     return _tell(opened, back_end, values)
 
 

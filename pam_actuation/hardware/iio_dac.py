@@ -42,6 +42,7 @@ class IioDac(ValveOutput):
         self._voltage = IioVoltage(
             self.values['sysfs_root'], self.values['dac.device'], 'out',
             self.values['dac.channel'], 'dac.device')
+        self.claim(self._voltage.raw_path)
         self._check_range()
         self.vent()
         power_down = self._voltage.attribute('powerdown')

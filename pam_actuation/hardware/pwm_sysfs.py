@@ -115,6 +115,7 @@ class PwmPair(ValveOutput):
             chip, values['pwm.vent_channel'], values['pwm.vent_normally_open'])
         for channel in (self._fill, self._vent):
             channel.export()
+            self.claim(channel.folder)
         period_ns = round(self.config.hsv.period_s * NS_PER_S)
         self._fill.start(period_ns, 0.0)
         self._vent.start(period_ns, 1.0)

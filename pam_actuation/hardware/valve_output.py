@@ -27,6 +27,7 @@ import weakref
 
 from pam_actuation.drivers.hsv_pulses import LONGEST_OF_A_PAIR
 from pam_actuation.hardware import sysfs
+from pam_actuation.hardware.claim import Claim
 from pam_actuation.hardware.failures import device_error
 from pam_actuation.hardware.sysfs import DeviceError
 from pam_sim.parameters import Parameter
@@ -65,6 +66,7 @@ class ValveOutput:
     VALVE_TYPES: tuple[str, ...] = VALVES
     PARAMETERS: tuple[Parameter, ...] = ()
     safe_efforts: tuple[float, ...] = ()
+    _claims: tuple[Claim, ...] = ()
 
     def __init__(self, values: dict[str, Any], config: 'DriverConfig') -> None:
         self.values = values
@@ -72,6 +74,20 @@ class ValveOutput:
 
     def open(self) -> None:  # noqa: A003
         """Find the device and check it; raise DeviceError if it is not usable."""
+
+    def claim(self, path: Path | str) -> None:
+        """
+        Ask in ``open`` for the device alone, until the output is closed.
+
+        ``path`` is a file or folder that stands for it. DeviceError if another driver has it.
+        """
+        self._claims = (*self._claims, Claim(path))
+
+    def release(self) -> None:
+        """Let others have the device."""
+        for claim in self._claims:
+            claim.release()
+        self._claims = ()
 
     def write(self, efforts: tuple[float, ...]) -> None:
         """
@@ -184,6 +200,7 @@ class GuardedOutput:
         if self._watchdog is not None:
             self._watchdog.close()
             self._watchdog = None
+        self._device.release()
         return problem
 
     def _try(self, action: Callable[..., Any]) -> str:

@@ -25,6 +25,8 @@ from fake_sysfs import (
 from pam_actuation.drivers.config import DriverConfig
 from pam_actuation.hardware import sysfs
 from pam_actuation.hardware.back_ends import open_valve, parameters_of, VALVE_OUTPUTS
+from pam_actuation.hardware.claim import Claim
+from pam_actuation.hardware.sysfs import DeviceError
 from pam_sim.errors import InputError
 import pytest
 
@@ -182,6 +184,34 @@ def test_a_program_that_fails_vents_at_its_very_end(tmp_path):
     done = subprocess.run([sys.executable, '-c', program], capture_output=True, text=True)
     assert done.returncode == 1 and 'something else went wrong' in done.stderr
     assert number_in(raw) == 0
+
+
+@pytest.mark.parametrize('valve', ['ppr', 'hsv'])
+def test_a_channel_has_one_driver_at_a_time(tmp_path, valve):
+    make_dac(tmp_path)
+    make_pwm(tmp_path)
+    output = open_one(tmp_path, valve)
+    with pytest.raises(InputError, match='is driven by another driver in this process already'):
+        open_one(tmp_path, valve)
+    assert output.close() == ''
+    output = open_one(tmp_path, valve)
+    del output
+    gc.collect()
+    assert open_one(tmp_path, valve).close() == ''
+
+
+def test_the_process_that_drives_a_channel_is_named(tmp_path):
+    folder = make_dac(tmp_path).parent
+    program = ('import sys; from pam_actuation.hardware.claim import Claim; '
+               'claim = Claim(sys.argv[1]); print(flush=True); input()')
+    with subprocess.Popen([sys.executable, '-c', program, str(folder)], stdin=subprocess.PIPE,
+                          stdout=subprocess.PIPE) as other:
+        other.stdout.readline()
+        with pytest.raises(DeviceError, match=f'is driven by process {other.pid} .*python'):
+            Claim(folder)
+        other.stdin.close()
+    Claim(folder)
+    Claim(tmp_path / 'nothing')
 
 
 def no_device(root):

@@ -70,6 +70,7 @@ class TextFileValve(ValveOutput):
         """Find the folder, make both files, vent."""
         self._valve, self._pressure = (
             _folder(self.values) / name for name in ('valve', 'pressure'))
+        self.claim(self._valve.parent)
         for file in (self._valve, self._pressure):
             file.touch()
         self.vent()
