@@ -111,6 +111,9 @@ FAULT_TABLE = (
           'newest valid pressure older than 0.1 s (sensor lost; or only readings that are '
           'NaN, below -20 kPa gauge, above 1500 kPa absolute, or stamped more than 0.02 s '
           'ahead)', VENT, False, 'next valid reading, ' + _RAMP),
+    Fault('pressure_relapses', 'Measured pressure lost again and again',
+          'the fifth vent within 30 s for readings that are NaN or not believable, as of a sensor '
+          'with the wrong sign', VENT, True, 'service ~/reset, ' + _RAMP),
     Fault('pressure_frozen', 'Measured pressure frozen (HSV)',
           'reading unchanged to the last bit for 0.2 s or longer while the valve flow should have '
           'moved it by 100 kPa; where filling comes near the pressure limit less is enough, '
@@ -132,6 +135,10 @@ FAULT_TABLE = (
     Fault('driver_paused', 'Driver stopped and continued',
           'more than 0.3 s between two ticks of the driver', VENT, False,
           'first command and reading stamped after the pause, ' + _RAMP),
+    Fault('clock_ahead', 'Clock set ahead',
+          'more than 0.3 s between two ticks by the clock of the stamps, but not by the steady '
+          'clock of the computer', VENT, False,
+          'first command and reading on the new clock, ' + _RAMP),
     Fault('clock_back', 'Clock set back',
           'time of a tick before that of the former one', VENT, False,
           'first command and reading on the new clock, ' + _RAMP),

@@ -150,6 +150,10 @@ class DriverLoop:
         """Tell how the valve's device took the last signal: what is wrong, '' if nothing."""
         self.safety.on_device(problem)
 
+    def on_steady(self, steady_ns: int) -> None:
+        """Tell, before a tick, the time [ns] of a clock that nobody sets."""
+        self.safety.clock.steady(steady_ns)
+
     def set_command_publishers(self, count: int, names: str = '') -> None:
         """Tell how many publishers of pressure_command send or may yet, and their names."""
         self.safety.publishers = count

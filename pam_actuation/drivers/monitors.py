@@ -44,6 +44,58 @@ def stamp_problem(stamp_ns: int, now_ns: int, oldest_s: float, ahead_s: float) -
     return ''
 
 
+class ClockMonitor:
+    """
+    Tells a clock that was set from a driver that was stopped, by a clock that nobody sets.
+
+    Without the time of that clock a clock set ahead counts as a stop.
+    """
+
+    def __init__(self, pause_s: float) -> None:
+        """Call it a stop from ``pause_s`` [s] between two ticks."""
+        self._pause_ns = pause_s * NS_PER_S
+        self._steady_ns: int | None = None
+        self._stood_ns: int | None = None       # between two ticks
+
+    def steady(self, steady_ns: int) -> None:
+        """Tell, before a tick, the time [ns] of a clock that nobody sets."""
+        self._stood_ns = None if self._steady_ns is None else steady_ns - self._steady_ns
+        self._steady_ns = steady_ns
+
+    def fault(self, gap_ns: int) -> tuple[str, str] | None:
+        """Return what is wrong with the time [ns] between two ticks, None if nothing."""
+        if gap_ns < 0:
+            return 'clock_back', (
+                f'the clock was set back by {-gap_ns * 1e-6:.0f} ms, waiting for new messages')
+        if gap_ns <= self._pause_ns:
+            return None
+        if self._stood_ns is not None and self._stood_ns <= self._pause_ns:
+            return 'clock_ahead', (
+                f'the clock was set ahead by {(gap_ns - self._stood_ns) * 1e-6:.0f} ms, waiting '
+                'for new messages')
+        return 'driver_paused', (
+            f'the driver itself was stopped for {gap_ns * 1e-6:.0f} ms, waiting for new messages')
+
+
+class Relapses:
+    """Notices that something happens again and again."""
+
+    def __init__(self, most: int, window_s: float) -> None:
+        """Call ``most`` times within ``window_s`` [s] too often."""
+        self.most, self.window_s = most, window_s
+        self._at_ns: deque[int] = deque(maxlen=most)
+
+    def forget(self) -> None:
+        """Begin anew."""
+        self._at_ns.clear()
+
+    def too_often(self, now_ns: int) -> bool:
+        """Note that it happened; return whether that is too often."""
+        self._at_ns.append(now_ns)
+        return len(self._at_ns) == self.most and (
+            0 <= now_ns - self._at_ns[0] <= self.window_s * NS_PER_S)
+
+
 class Channel:
     """
     The newest valid reading of one pressure topic and why later ones were refused.
@@ -69,10 +121,12 @@ class Channel:
         self.stamp_ns: int | None = None
         self.pressure_pa = math.nan
         self.problem = ''
+        self.implausible = False        # the value of the newest reading, whatever its stamp
 
     def offer(self, stamp_ns: int, pressure_pa: float, now_ns: int) -> bool:
         """Judge a reading; return True if it became the newest valid one."""
         self.received += 1
+        self.implausible = not self.lowest_pa <= pressure_pa <= self.highest_pa     # so NaN
         problem = stamp_problem(stamp_ns, now_ns, self.oldest_s, self.ahead_s)
         if not math.isfinite(pressure_pa):
             problem = f'is not a number ({pressure_pa})'

@@ -30,7 +30,7 @@ import re
 from pam_actuation.drivers.faults import FAULTS
 from pam_actuation.drivers.limits import SafetyLimits
 from pam_actuation.drivers.monitors import (
-    AirMonitor, Channel, CommandOrder, FrozenMonitor, stamp_problem)
+    AirMonitor, Channel, ClockMonitor, CommandOrder, FrozenMonitor, Relapses, stamp_problem)
 from pam_actuation.drivers.steady_age import SteadyAge
 from pam_actuation.messages import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN
 from pam_actuation.slow_rise import SlowRise, WAITS_LONG_S
@@ -111,6 +111,7 @@ class SafetySupervisor:
         self.supply = Channel(lim.supply_timeout_s, lim.stamp_ahead_s, lowest, 5e6)
         self.frozen = FrozenMonitor(lim.frozen_after_s, lim.frozen_change_pa)
         self.air = AirMonitor(lag_s, dead_time_s)
+        self.clock = ClockMonitor(lim.pause_s)
         self.order = CommandOrder(lim.two_publishers_window_s, lim.two_publishers_clear_s)
         # A regulator is told of each command as it comes: nothing waits there.
         self.ages = SteadyAge(
@@ -139,6 +140,7 @@ class SafetySupervisor:
         self._rise = SlowRise(lim.resume_rate_pa_per_s, lim.resume_until_followed_s,
                               lag_s=lag_s, dead_time_s=dead_time_s,
                               nearly_pa=lim.resume_nearly_pa)
+        self._relapses = Relapses(5, 30.0)
         self._now_ns: int | None = None
         self._first_tick_ns = 0
         self._grace_until_ns = 0
@@ -198,6 +200,7 @@ class SafetySupervisor:
             return False, (f'Not reset: the measured pressure of {gauge_kpa(measured):.0f} kPa '
                            f'gauge is above the limit of {limit * 1e-3:.0f} kPa.')
         text = self._latched[1].removesuffix(_TO_GO_ON)
+        self._relapses.forget()
         self._latched = None
         self._seen_command = False
         self.command_stamp_ns = None
@@ -234,20 +237,14 @@ class SafetySupervisor:
             self._first_tick_ns = now_ns
             return None
         gap_ns = now_ns - last
-        pause_ns = self.limits.pause_s * _NS
-        if 0 <= gap_ns <= pause_ns:
-            if gap_ns > _LATE_TICK_NS:
-                self._grace_until_ns = now_ns + _GRACE_NS
-                self._grace_ns = gap_ns
-            return None
-        self._forget()
-        if gap_ns < 0:
-            self._standing = ('clock_back', 'the clock was set back by '
-                              f'{-gap_ns * 1e-6:.0f} ms, waiting for new messages')
-        else:
-            self._standing = ('driver_paused', 'the driver itself was stopped for '
-                              f'{gap_ns * 1e-6:.0f} ms, waiting for new messages')
-        return self._standing
+        fault = self.clock.fault(gap_ns)
+        if fault is not None:
+            self._forget()
+            self._standing = fault
+        elif gap_ns > _LATE_TICK_NS:
+            self._grace_until_ns = now_ns + _GRACE_NS
+            self._grace_ns = gap_ns
+        return fault
 
     def _forget(self) -> None:
         self._pending = _Pending()
@@ -383,6 +380,7 @@ class SafetySupervisor:
     def _vent(self, fault: Fault) -> Decision:
         if self._fault is None:
             self.vents += 1
+            fault = self._relapsed(fault)
         # The first text stays while only its figures change: the reason must not flicker.
         if self._fault is None or _without_figures(self._fault) != _without_figures(fault):
             self._fault = fault
@@ -395,6 +393,15 @@ class SafetySupervisor:
         if key in ('no_command', 'no_pressure'):
             return Decision(WAITING, None, LEVEL_WARN, text + ' (venting)', key)
         return Decision(VENTED, None, LEVEL_ERROR, 'vented because ' + text, key)
+
+    def _relapsed(self, fault: Fault) -> Fault:
+        assert self._now_ns is not None
+        if fault[0] != 'pressure_timeout' or not self.pressure.implausible or (
+                not self._relapses.too_often(self._now_ns)):
+            return fault
+        return self._latch('pressure_relapses', (
+            f'{fault[1]}; for the {self._relapses.most}th time in '
+            f'{self._relapses.window_s:g} s: sign, range or wiring of the sensor?'))
 
     def _latched_if_raw(self, fault: Fault) -> Fault:
         # What an opening does depends on all that went before: it is not taken up again.

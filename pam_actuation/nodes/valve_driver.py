@@ -16,6 +16,7 @@
 
 from collections.abc import Sequence
 import sys
+import time
 from typing import Any
 
 from pam_actuation.drivers.config import DRIVER_PARAMETERS, DriverConfig
@@ -251,6 +252,8 @@ class ValveDriver(ManagedNode):
         fault = self.ear.fault(now_ns)
         self.loop.set_sender_fault(fault)
         self._answering.every(ANSWER_PERIOD_S if fault else IDLE_PERIOD_S)
+        if not self.uses_simulated_time:
+            self.loop.on_steady(time.monotonic_ns())
         signal = self.loop.act(now_ns)
         problem = self._refusal = self.output.send(signal.efforts)
         self.loop.on_device(problem)

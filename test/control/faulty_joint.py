@@ -44,6 +44,8 @@ class FaultyJoint:
         Loops that do not tick: ``controller``, ``flexor``, ``extensor`` (their drivers).
     late_ns : dict
         Side to the error [ns] of its driver's clock.
+    unnoticed_ns : dict
+        Side to the time [ns] that the steady clock of its driver does not know of.
     gauge_pa, angle_rad, commands_pa, reasons : list
         What the joint did at each tick of the controller.
 
@@ -57,6 +59,7 @@ class FaultyJoint:
         self.drivers = {side: DriverLoop(valve, driver_config(rig))
                         for side, rig in zip(SIDES, (joint.flexor, joint.extensor))}
         self.spoil, self.stopped, self.late_ns = {}, set(), dict.fromkeys(SIDES, 0)
+        self.unnoticed_ns = dict.fromkeys(SIDES, 0)
         self.gauge_pa, self.angle_rad, self.commands_pa, self.reasons = [], [], [], []
         self.faults = {side: set() for side in SIDES}       # what the drivers told
         self.now_ns = START_NS
@@ -95,6 +98,7 @@ class FaultyJoint:
 
         def tick_unless_stopped(now_ns):
             if side not in self.stopped:
+                self.drivers[side].on_steady(now_ns - self.unnoticed_ns[side])
                 tick(now_ns + self.late_ns[side])
         return tick_unless_stopped
 

@@ -358,6 +358,61 @@ def test_pause_and_clock_set_back():
     assert bench.last(150).state == VENTED
 
 
+def test_a_clock_set_ahead_is_no_stopped_driver():
+    """A clock that nobody sets tells them apart."""
+    for stood_ms, fault in ((5, 'clock_ahead'), (2000, 'driver_paused')):
+        bench = Bench()
+        bench.run(100)
+        bench.safety.clock.steady(7 * MS)
+        bench.last(5)
+        bench.safety.clock.steady((7 + stood_ms) * MS)
+        bench.now += 2000 * MS
+        decision = bench.safety.tick(bench.now)
+        assert decision.fault == fault and decision.pressure_pa is None
+    assert 'stopped for 2000 ms' in decision.message
+    bench = Bench()
+    bench.run(100)
+    for k in (0, 1):
+        bench.safety.clock.steady(5 * k * MS)
+        bench.now += 3_600_000 * k * MS
+        decision = bench.safety.tick(bench.now)
+    assert 'the clock was set ahead by 3599995 ms' in decision.message
+
+
+def test_a_pressure_that_is_lost_again_and_again_latches():
+    """A sensor with the wrong sign reads well at rest: fill and vent in turn end with a latch."""
+    bench = Bench()
+    for sound_pa, wrong_pa in ((P_ATM_PA, P_ATM_PA - 27e3), (P_ATM_PA, math.nan)):
+        for _ in range(5):
+            bench.pressure = sound_pa
+            assert bench.last(50).state == OK
+            bench.pressure = wrong_pa
+            decision = bench.last(200)
+            assert decision.pressure_pa is None
+        assert decision.fault == 'pressure_relapses' and decision.state == EMERGENCY_STOP
+        assert 'for the 5th time in 30 s: sign, range or wiring' in decision.message
+        bench.pressure = sound_pa
+        assert bench.last(1000).state == EMERGENCY_STOP
+        assert bench.safety.reset()[0] and bench.last(50).state == OK
+    for pause_ms, latched in ((8000, False), (6000, True)):
+        bench = Bench()
+        for _ in range(5):
+            bench.pressure = P_ATM_PA
+            bench.run(pause_ms)
+            bench.pressure = math.nan
+            decision = bench.last(200)
+        assert (decision.state == EMERGENCY_STOP) == latched
+
+
+def test_a_pressure_that_is_only_silent_again_and_again_does_not_latch():
+    bench = Bench()
+    for _ in range(8):
+        bench.pressure = P_ATM_PA
+        assert bench.last(50).state == OK
+        bench.pressure = None
+        assert bench.last(200).fault == 'pressure_timeout'
+
+
 def test_a_device_that_refuses_latches_and_reset_waits_for_it():
     """A write that failed vents until reset, which needs a device that takes signals again."""
     bench = Bench()
@@ -393,7 +448,7 @@ def test_every_fault_that_the_driver_names_is_a_row_and_every_row_is_named():
     folder = Path(safety.__file__).parent
     keys, strings = (set().union(*found) for found in zip(*(
         named_in((folder / name).read_text(encoding='utf-8'))
-        for name in ('safety.py', 'senders.py'))))
+        for name in ('safety.py', 'monitors.py', 'senders.py'))))
     assert len(keys) > 15 and keys <= set(FAULTS)
     assert set(FAULTS) - strings == {'driver_ends', 'driver_killed', 'reference_lost'}
 
@@ -404,5 +459,6 @@ def test_fault_table_is_complete():
     assert len(FAULTS) == len(FAULT_TABLE)
     assert all(fault.title in text for fault in FAULT_TABLE)
     assert {fault.key for fault in FAULT_TABLE if fault.latched} == {
-        'emergency_stop', 'over_pressure', 'valve_command_interrupted', 'device_refuses'}
+        'emergency_stop', 'over_pressure', 'valve_command_interrupted', 'device_refuses',
+        'pressure_relapses'}
     assert text.count('\n') == len(FAULT_TABLE) + 2
