@@ -21,12 +21,16 @@ reading of each of its topics, once per period.
 
 from typing import Any
 
+from pam_actuation.hardware.failures import device_error
+from pam_actuation.hardware.sysfs import DeviceError
 from pam_sim.parameters import Parameter
 
 MUSCLE, JOINT = 'muscle', 'joint'           # where the sensors sit, and in whose namespace
 TOPICS = {
     MUSCLE: ('pressure', 'supply_pressure', 'contraction', 'force'), JOINT: ('joint_state',)}
 PLACE = 'place'         # in ``values``, beside the parameters
+LONGEST_WAIT_NS = 1_000_000_000         # for a new value
+Reading = float | tuple[float, int] | None
 
 
 class SensorInput:
@@ -59,11 +63,58 @@ class SensorInput:
         self.values = values
         self.place: str = values.get(PLACE, MUSCLE)
 
-    def read(self, topic: str) -> float:
+    def read(self, topic: str) -> Reading:
         """
-        Return one reading in its SI unit; raise DeviceError if there is none.
+        Return one reading in its SI unit; raise DeviceError if the sensor does not answer.
+
+        It is asked for in every period, so it must not wait for the sensor. A slow sensor returns
+        None while there is no new value. A reading that was taken earlier is a tuple of the value
+        and its time: ``time.time_ns()`` then.
 
         ``pressure`` and ``supply_pressure`` [Pa, absolute], ``contraction`` [m], ``force`` [N],
         ``joint_state``: the angle [rad], flexion positive.
         """
         raise NotImplementedError
+
+
+class NewReadings:
+    """
+    Take from sensors what is new, whatever they raise.
+
+    Parameters
+    ----------
+    sensors : SensorInput
+        A back end.
+    begin_ns : int
+        Time [ns].
+
+    """
+
+    def __init__(self, sensors: SensorInput, begin_ns: int) -> None:
+        self._sensors = sensors
+        self._newest_ns = dict.fromkeys(sensors.topics, begin_ns)
+        self._stamps_ns: dict[str, int] = {}
+
+    def take(self, topic: str, now_ns: int) -> tuple[float, int] | None:
+        """
+        Return a new value and its stamp [ns], None if there is none.
+
+        Raises
+        ------
+        DeviceError
+            The sensor does not answer, or has had no new value for a second.
+
+        """
+        try:
+            reading = self._sensors.read(topic)
+            read, stamp_ns = reading if isinstance(reading, tuple) else (reading, now_ns)
+            value = None if read is None else float(read)
+        except Exception as error:      # of a back end of somebody else
+            raise device_error(error, type(self._sensors), self._sensors.values) from None
+        known = isinstance(reading, tuple) and stamp_ns == self._stamps_ns.get(topic)
+        if value is None or known:
+            if now_ns - self._newest_ns[topic] > LONGEST_WAIT_NS:
+                raise DeviceError(f'no new value for {LONGEST_WAIT_NS // 10 ** 9} s', topic)
+            return None
+        self._newest_ns[topic], self._stamps_ns[topic] = now_ns, stamp_ns
+        return value, stamp_ns

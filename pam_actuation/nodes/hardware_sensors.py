@@ -22,8 +22,8 @@ from pam_actuation.drivers.parameter import node_parameter
 from pam_actuation.hardware.back_ends import open_sensors
 from pam_actuation.hardware.back_ends import parameters_of
 from pam_actuation.hardware.back_ends import SENSOR_INPUTS
-from pam_actuation.hardware.failures import device_error
-from pam_actuation.hardware.sensor_input import MUSCLE, PLACE, TOPICS
+from pam_actuation.hardware.sensor_input import MUSCLE, NewReadings, PLACE, TOPICS
+from pam_actuation.hardware.sysfs import DeviceError
 from pam_actuation.nodes.diagnostics import ERROR, Values
 from pam_actuation.nodes.diagnostics import OK
 from pam_actuation.nodes.managed import ManagedNode
@@ -74,6 +74,7 @@ class HardwareSensors(ManagedNode):
 
     def start(self) -> None:
         """Read at a steady rate."""
+        self._readings = NewReadings(self.sensors, self.now_ns())
         self.add_loop(1.0 / self.value('publish_rate_hz'))
 
     def diagnostic_values(self) -> Values:
@@ -81,18 +82,19 @@ class HardwareSensors(ManagedNode):
         return (*super().diagnostic_values(), ('read_failures', self.failures))
 
     def tick(self) -> None:
-        """Read and send each sensor."""
+        """Read each sensor and send what is new."""
         problem = ''
         for topic in self.sensors.topics:
             now_ns = self.now_ns()
             try:
-                value = self.sensors.read(topic)
-            except Exception as error:      # of a back end of somebody else
+                new = self._readings.take(topic, now_ns)
+            except DeviceError as error:
                 self.failures += 1
-                told = device_error(error, type(self.sensors), self.sensors.values)
-                problem = problem or f'{topic} is not measured: {told}'
+                problem = problem or f'{topic} is not measured: {error}'
             else:
-                self.send(topic, topic_of(topic).content.message(now_ns, value))
+                if new is not None:
+                    value, stamp_ns = new
+                    self.send(topic, topic_of(topic).content.message(stamp_ns, value))
         if problem:
             self.diagnostics.update(ERROR, problem)
         else:

@@ -16,6 +16,7 @@
 
 from fake_sysfs import make_adc, put
 from pam_actuation.hardware.back_ends import open_sensors, parameters_of, SENSOR_INPUTS
+from pam_actuation.hardware.sensor_input import NewReadings, SensorInput
 from pam_actuation.hardware.sysfs import DeviceError
 from pam_sim.errors import InputError
 from pam_sim.units import P_ATM_PA
@@ -83,6 +84,40 @@ def test_sensors_that_are_not_there_read_a_muscle_at_rest():
     sensors = open_sensors('dummy', {})
     assert {topic: sensors.read(topic) for topic in sensors.topics} == {
         'pressure': P_ATM_PA, 'contraction': 0.0, 'force': 0.0}
+
+
+class SlowCell(SensorInput):
+    """A load cell with a new value now and then."""
+
+    topics = ('force',)
+
+    def read(self, topic):
+        reading = self.values['next'].pop(0)
+        if isinstance(reading, Exception):
+            raise reading
+        return reading
+
+
+def test_only_what_is_new_is_taken_with_the_time_it_was_measured():
+    begin_ns, ms = 1_700_000_000 * 10 ** 9, 10 ** 6
+    given = [None, (5.0, begin_ns + ms), (5.0, begin_ns + ms), (5.0, begin_ns + 9 * ms),
+             OSError('gone'), ValueError('no number'), 'text', 7]
+    readings = NewReadings(SlowCell({'next': given}), begin_ns)
+    now_ns = [begin_ns + k * 4 * ms for k in range(1, 9)]
+    assert [readings.take('force', now_ns[k]) for k in range(4)] == [
+        None, (5.0, begin_ns + ms), None, (5.0, begin_ns + 9 * ms)]
+    for k, words in ((4, 'back end SlowCell: OSError: gone'), (5, 'ValueError: no number'),
+                     (6, 'could not convert')):
+        with pytest.raises(DeviceError, match=words):
+            readings.take('force', now_ns[k])
+    assert readings.take('force', now_ns[7]) == (7.0, now_ns[7])
+    given += [7.5, None, None]
+    back_ns = now_ns[7] - 3600 * 1000 * ms          # a clock that was set back
+    assert readings.take('force', back_ns) == (7.5, back_ns)
+    now_ns[7] = back_ns
+    assert readings.take('force', now_ns[7] + 900 * ms) is None
+    with pytest.raises(DeviceError, match='force: no new value for 1 s'):
+        readings.take('force', now_ns[7] + 1100 * ms)
 
 
 def test_garbage_of_a_board_is_told_with_its_parameters(tmp_path, monkeypatch):
