@@ -45,6 +45,8 @@ MAX_CONTRACTION = 0.25                 # of the length, data sheet limit
 CONTRACTION_MARGIN_M = 1e-3
 MAX_GAUGE_PA = 800e3
 MAX_VOLTAGE = 10.0
+MEASURED = {'pressure_pa', 'contraction_m', 'force_n', 'angle_rad'}
+LEAST_CHANGES, STEADY_SHARE = 100, 0.9        # of a sensor that is slower than its topic
 LEAST_PA = 5e3                         # absolute: no rig has such a vacuum
 MOST_PA = 1e7
 LEAST_KPA = -200.0                     # gauge in kPa with noise; noise in Pa reaches further
@@ -101,7 +103,8 @@ def topic_remarks(topic: 'TopicData', info: 'TopicInfo', stamp_ns: IntArray,
     """
     if not values and info.type_name not in _WITHOUT_VALUES:
         return []
-    remarks = _time_remarks(topic, info, stamp_ns)
+    remarks = _time_remarks(topic, info, stamp_ns) + repeat_remarks(
+        topic.name, values, info.rate_hz)
     return remarks + [one.sentence for one in topic_findings(topic.name, values, length_m)]
 
 
@@ -192,6 +195,30 @@ def _time_remarks(topic: 'TopicData', info: 'TopicInfo', stamp_ns: IntArray) -> 
             f'{info.rate_hz:.0f} Hz.')
     if len(stamp_ns) == len(topic.log_time_ns) and len(stamp_ns):
         remarks += _clock_remarks(name, topic.log_time_ns - stamp_ns)
+    return remarks
+
+
+def repeat_remarks(topic: str, values: Mapping[str, FloatArray],
+                   rate_hz: float | None) -> list[str]:
+    """
+    Return a sentence on measured values that repeat: of a slow sensor that is sent too often.
+
+    Changes come at a steady rate there. Those of a coarse encoder do as well at a steady speed,
+    but all by one step.
+    """
+    remarks = []
+    for column in (values[name] for name in MEASURED & values.keys()):
+        at = np.flatnonzero(np.diff(column))
+        if len(at) < LEAST_CHANGES or rate_hz is None:
+            continue
+        steps, held = np.abs(np.diff(column)[at]), np.diff(at)
+        usual = np.median(held)
+        if usual >= 2.0 and np.mean(held <= 2.0 * usual) > STEADY_SHARE and (
+                np.median(steps) > 2.0 * steps.min()):
+            remarks.append(
+                f'{topic}: the value changes at {rate_hz / held.mean():.0f} Hz only, and each is '
+                'sent several times. Send a value of a slow sensor once, stamped when it was '
+                'measured.')
     return remarks
 
 

@@ -20,7 +20,7 @@ import numpy as np
 from pam_actuation.bags.info import bag_info
 from pam_actuation.bags.load import load_run
 from pam_actuation.bags.load_joint import load_recording
-from pam_actuation.bags.plausibility import value_findings
+from pam_actuation.bags.plausibility import repeat_remarks, value_findings
 from pam_actuation.bags.source import read_bag
 from pam_actuation.bags.writer import BagWriter
 from pam_actuation.cli.main import main
@@ -59,6 +59,22 @@ def test_pressures_in_other_units_are_told_with_the_fix(values, words):
     sentence, unusable = look('pressure_pa', values)
     assert unusable and all(word in sentence for word in words), sentence
     assert sentence.startswith('/muscle/pressure: ') and sentence.count('\n') == 0
+
+
+def slow(values, rate_hz):
+    """Return values at 200 Hz of a sensor that has new ones at a lower rate."""
+    return values[np.floor(np.floor(TIME_S * rate_hz) / rate_hz * 200.0).astype(int)]
+
+
+def test_a_slow_sensor_that_is_sent_too_often_is_told():
+    force_n = 50.0 + 20.0 * np.sin(TIME_S) + 0.2 * NOISE
+    told, = repeat_remarks('/muscle/force', {'force_n': slow(force_n, 80.0)}, 200.0)
+    assert told.startswith('/muscle/force: the value changes at 80 Hz only')
+    # Noise in few steps, a coarse encoder at a steady speed and at a changing one, a rest.
+    for values in (force_n, np.round(force_n), np.round(50.0 + 0.3 * NOISE),
+                   np.round(TIME_S * 30.0), np.round(40.0 * np.sin(2.0 * TIME_S)),
+                   np.where(TIME_S < 15.0, 0.0, force_n)):
+        assert repeat_remarks('/muscle/force', {'force_n': values}, 200.0) == []
 
 
 @pytest.mark.parametrize('name, values, words', [
