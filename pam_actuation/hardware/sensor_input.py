@@ -29,6 +29,9 @@ MUSCLE, JOINT = 'muscle', 'joint'           # where the sensors sit, and in whos
 TOPICS = {
     MUSCLE: ('pressure', 'supply_pressure', 'contraction', 'force'), JOINT: ('joint_state',)}
 PLACE = 'place'         # in ``values``, beside the parameters
+# Of a muscle or joint: highest speed [1/s], smallest step that is no noise, unit of the sentence.
+FASTEST = {'contraction': (1.0, 0.003, 1e3, 'mm'), 'joint_state': (30.0, 0.1, 1.0, 'rad')}
+JUMP_SHOWN_NS = 60_000_000_000
 LONGEST_WAIT_NS = 1_000_000_000         # for a new value
 Reading = float | tuple[float, int] | None
 
@@ -88,12 +91,20 @@ class NewReadings:
     begin_ns : int
         Time [ns].
 
+    Attributes
+    ----------
+    jumps : int
+        How often a reading changed faster than any muscle or joint moves.
+
     """
+
+    jumps = 0
+    _jump, _jumped_ns = '', 0
 
     def __init__(self, sensors: SensorInput, begin_ns: int) -> None:
         self._sensors = sensors
         self._newest_ns = dict.fromkeys(sensors.topics, begin_ns)
-        self._stamps_ns: dict[str, int] = {}
+        self._last: dict[str, tuple[float, int]] = {}        # value and stamp
 
     def take(self, topic: str, now_ns: int) -> tuple[float, int] | None:
         """
@@ -111,10 +122,26 @@ class NewReadings:
             value = None if read is None else float(read)
         except Exception as error:      # of a back end of somebody else
             raise device_error(error, type(self._sensors), self._sensors.values) from None
-        known = isinstance(reading, tuple) and stamp_ns == self._stamps_ns.get(topic)
+        last = self._last.get(topic)
+        known = isinstance(reading, tuple) and last is not None and stamp_ns == last[1]
         if value is None or known:
             if now_ns - self._newest_ns[topic] > LONGEST_WAIT_NS:
                 raise DeviceError(f'no new value for {LONGEST_WAIT_NS // 10 ** 9} s', topic)
             return None
-        self._newest_ns[topic], self._stamps_ns[topic] = now_ns, stamp_ns
+        if last is not None and topic in FASTEST:
+            self._look_for_jump(topic, value - last[0], stamp_ns - last[1], now_ns)
+        self._newest_ns[topic], self._last[topic] = now_ns, (value, stamp_ns)
         return value, stamp_ns
+
+    def _look_for_jump(self, topic: str, step: float, elapsed_ns: int, now_ns: int) -> None:
+        speed, least, factor, unit = FASTEST[topic]
+        if abs(step) > max(least, speed * abs(elapsed_ns) * 1e-9):
+            self.jumps += 1
+            self._jumped_ns = now_ns
+            self._jump = (
+                f'{topic} jumped by {factor * step:.1f} {unit} in {elapsed_ns * 1e-6:.0f} ms, '
+                'faster than any motion: lost index or overflow of the counter?')
+
+    def jump(self, now_ns: int) -> str:
+        """Return a sentence on a jump in the last minute, '' if there was none."""
+        return self._jump if 0 <= now_ns - self._jumped_ns <= JUMP_SHOWN_NS else ''

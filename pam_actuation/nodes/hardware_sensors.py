@@ -26,6 +26,7 @@ from pam_actuation.hardware.sensor_input import MUSCLE, NewReadings, PLACE, TOPI
 from pam_actuation.hardware.sysfs import DeviceError
 from pam_actuation.nodes.diagnostics import ERROR, Values
 from pam_actuation.nodes.diagnostics import OK
+from pam_actuation.nodes.diagnostics import WARN
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.runner import run
 from pam_actuation.topics.table import topic_of
@@ -54,6 +55,7 @@ class HardwareSensors(ManagedNode):
 
     sensors: Any = None         # of the back end, once configured
     failures = 0
+    _readings: NewReadings | None = None        # once active
 
     def check(self) -> None:
         """Refuse to stamp what is measured with a time that may stand still."""
@@ -78,12 +80,14 @@ class HardwareSensors(ManagedNode):
         self.add_loop(1.0 / self.value('publish_rate_hz'))
 
     def diagnostic_values(self) -> Values:
-        """Add how often a sensor did not answer."""
-        return (*super().diagnostic_values(), ('read_failures', self.failures))
+        """Add how often a sensor did not answer, and how often a reading jumped."""
+        jumps = () if self._readings is None else (('jumps', self._readings.jumps),)
+        return (*super().diagnostic_values(), ('read_failures', self.failures), *jumps)
 
     def tick(self) -> None:
         """Read each sensor and send what is new."""
         problem = ''
+        assert self._readings is not None
         for topic in self.sensors.topics:
             now_ns = self.now_ns()
             try:
@@ -95,8 +99,11 @@ class HardwareSensors(ManagedNode):
                 if new is not None:
                     value, stamp_ns = new
                     self.send(topic, topic_of(topic).content.message(stamp_ns, value))
+        jump = self._readings.jump(self.now_ns())
         if problem:
             self.diagnostics.update(ERROR, problem)
+        elif jump:
+            self.diagnostics.update(WARN, jump)
         else:
             self.diagnostics.update(OK, f'measuring {", ".join(self.sensors.topics)}')
 

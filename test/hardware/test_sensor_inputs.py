@@ -120,6 +120,26 @@ def test_only_what_is_new_is_taken_with_the_time_it_was_measured():
         readings.take('force', now_ns[7] + 1100 * ms)
 
 
+@pytest.mark.parametrize('topic, steps, sentence', [
+    ('contraction', (0.0, 0.0029, 0.0, 0.028), 'contraction jumped by 28.0 mm in 4 ms'),
+    ('contraction', (0.010, -0.005), 'contraction jumped by -15.0 mm in 4 ms'),
+    ('joint_state', (0.0, 0.05, 0.3), 'joint_state jumped by 0.2 rad in 4 ms'),
+    ('force', (0.0, 500.0), ''), ('contraction', (0.0, 0.0035, 0.0065), '')])
+def test_a_jump_that_is_no_motion_is_told_for_a_minute(topic, steps, sentence):
+    ms = 10 ** 6
+    now_ns = 1_700_000_000 * 10 ** 9
+    cell = SlowCell({'next': [*steps]})
+    cell.topics = (topic,)
+    readings = NewReadings(cell, now_ns)
+    for _ in steps:
+        assert readings.jump(now_ns) == ''
+        now_ns += 4 * ms
+        readings.take(topic, now_ns)
+    assert readings.jump(now_ns).startswith(sentence) and readings.jumps == bool(sentence)
+    assert bool(readings.jump(now_ns + 59_000 * ms)) == bool(sentence)
+    assert readings.jump(now_ns + 61_000 * ms) == ''
+
+
 def test_garbage_of_a_board_is_told_with_its_parameters(tmp_path, monkeypatch):
     def garbage(self, topic):
         raise ConnectionError('no such board')
