@@ -42,7 +42,8 @@ from launch_ros.parameter_descriptions import ParameterValue
 from pam_actuation.hardware.files import hardware_file
 from pam_actuation.namespaces import launch_namespace
 from pam_actuation.nodes.pid_controller import PidNode
-from pam_actuation.rigging.layouts import NO_CONTROLLER, played, SIMULATED, TOPICS
+from pam_actuation.rigging.layouts import controller_node, NO_CONTROLLER, played
+from pam_actuation.rigging.layouts import SIMULATED, TOPICS
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 
@@ -70,7 +71,8 @@ def _arguments():
                         'or a parameter file of your own.'),
         DeclareLaunchArgument(
             'controller', default_value='sofc', choices=['sofc', 'pid', NO_CONTROLLER],
-            description='Self-organizing fuzzy controller or PID; none: you start your own.'),
+            description='Self-organizing fuzzy controller or PID, where controller_file is empty; '
+                        'none: you start your own.'),
         DeclareLaunchArgument(
             'controller_file', default_value='',
             description='Controller preset or file; empty: the preset of valve and experiment.'),
@@ -155,8 +157,8 @@ def generate_launch_description():
         'reference_generator', valve,
         {'experiment': _text('experiment'), 'await_receiver': True, 'start_delay_s': 3.0,
          'exit_when_finished': True})
-    sofc = _node('sofc_controller', valve, control, learning, condition=chosen('sofc'))
-    pid = _node('pid_controller', valve, control, condition=chosen('pid'))
+    sofc = _node('sofc_controller', valve, control, learning, condition=chosen('sofc_controller'))
+    pid = _node('pid_controller', valve, control, condition=chosen('pid_controller'))
     nodes = [recorder, plant, sensors, driver, watchdog, sofc, pid, reference]
     ends = [
         RegisterEventHandler(OnProcessExit(target_action=node, on_exit=_shut_down(reason)))
@@ -184,7 +186,7 @@ def _note_what_is_needed(context):
         given('experiment'), given('rig'), valve, file,
         PidNode.DEFAULT_CONTROLLERS if kind == 'pid' else None)
     noted = {'valve': valve, HARDWARE_FILE: hardware_file(given('hardware')),
-             CONTROLLER: kind if name else NO_CONTROLLER, CONTROLLER_NAME: name,
+             CONTROLLER: controller_node(name) if name else NO_CONTROLLER, CONTROLLER_NAME: name,
              RAW: str(raw).lower(), 'namespace': launch_namespace(given('namespace')),
              # Real sensors have no seed.
              RECORDED_SEED: given('seed') if given('hardware') == SIMULATED else '-1'}

@@ -93,7 +93,7 @@ class DiagnosticsReporter:
             level, message = max(level, WARN), f'{message}; {self.remark}'
         self.publisher.publish(encode(TOPIC, Status(
             now_ns, level, self._node.get_fully_qualified_name(), message,
-            (*self.values_of(), *self._node.diagnostic_values(), *self._counts()), HARDWARE_ID)))
+            (*self._values(), *self._counts()), HARDWARE_ID)))
         self._say(now_ns, level, message)
 
     def _say(self, now_ns: int, level: int, message: str) -> None:
@@ -104,6 +104,15 @@ class DiagnosticsReporter:
             return              # the node logs itself why it ends; that is to be its last line
         if self._said != said and (level != OK or said[0] != OK):
             self.console.say(WORDS[level], now_ns, message)
+
+    def _values(self) -> Values:
+        """Return the values of the node; of one that failed, () where they fail as well."""
+        try:
+            return (*self.values_of(), *self._node.diagnostic_values())
+        except Exception:
+            if self._node.exit_code is None:
+                raise
+            return ()
 
     def _counts(self) -> Values:
         """Return the counts of all publishers; the status being sent counts itself."""

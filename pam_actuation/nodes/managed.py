@@ -425,7 +425,8 @@ class ManagedNode(LifecycleNode):
         self.diagnostics.silent = False
         # Also while a simulated time stands still.
         steady = None if self.simulated_time is None else SteadyTime()
-        self.loops.add(self.value('diagnostics_period_s'), self._report, steady)
+        self.loops.add(self.value('diagnostics_period_s'),
+                       lambda: self._guarded(self._report), steady)
         self.diagnostics.update(OK, ACTIVE)
         self.get_logger().info('active')
 

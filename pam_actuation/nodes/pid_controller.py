@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The PID baseline on ROS: same topics as the self-organizing controller, no learning."""
+"""PID and all other laws without rules on ROS: topics as of the self-organizing controller."""
 
 from collections.abc import Sequence
 import sys
@@ -23,7 +23,7 @@ from pam_sim.parameters import Parameter
 
 
 class PidNode(ControllerNode):
-    """Control with fixed gains."""
+    """Control with a PID, or with any other law of a controller file that has no rules."""
 
     NAME = 'pid_controller'
     REALTIME_RANK = 1

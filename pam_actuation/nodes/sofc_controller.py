@@ -50,6 +50,14 @@ class SofcNode(LearningSwitch, ControllerNode):
         from pam_actuation.control.sofc.settings import SETTINGS
         return SETTINGS
 
+    def build(self, rig: Any) -> None:
+        """Load the controller; refuse one without rules."""
+        super().build(rig)
+        if self.controller.kind != 'sofc':
+            raise InputError(
+                f'{self.value("controller")} is a {self.controller.kind} controller; this node '
+                'runs sofc controllers, pid_controller all others', 'parameter controller')
+
     def setup(self) -> None:
         """Load the controller and its rules, offer the services for the rules."""
         super().setup()

@@ -23,11 +23,12 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from pam_actuation.drivers.asked import asked_by
 from pam_actuation.hardware.files import hardware_file
 from pam_actuation.namespaces import namespace_of
+from pam_actuation.resources import find_config
 from pam_actuation.rigging.node_spec import NodeSpec
 from pam_sim.joint.parameters import SIDES
+from pam_sim.located_yaml import load_yaml
 
 NO_CONTROLLER = 'none'      # one of the user's own sends the pressure commands
 SIMULATED = 'sim'           # no hardware
@@ -78,9 +79,9 @@ def rig(namespace: str = '/muscle', rig: str = 'dmsp_5_300_realistic', valve: st
     kind = {'valve_type': valve}
     described = {**kind, 'rig': rig}
     name, raw = played(experiment, rig, valve, controller)
-    driver = {**described, **_asking(name), **({'accept_valve_command': True} if raw else {})}
+    driver = {**described, 'controller': name, **({'accept_valve_command': True} if raw else {})}
     accept = {'accept_other_rig': True} if accept_other_rig else {}
-    nodes = [NodeSpec('sofc_controller', namespace, {
+    nodes = [NodeSpec(controller_node(name), namespace, {
         **described, **accept, 'controller': name})] if name else []
     if hardware in BY_SIGNAL:
         if hardware == SIMULATED:
@@ -99,9 +100,14 @@ def rig(namespace: str = '/muscle', rig: str = 'dmsp_5_300_realistic', valve: st
         'output': record, 'experiment': experiment, 'controller': name}, overwrite)
 
 
-def _asking(controller: str) -> dict[str, str]:
-    """Return the parameter of a driver whose controller, '' for none, asks for its numbers."""
-    return {'controller': controller} if controller and asked_by(controller) else {}
+def controller_node(controller: str) -> str:
+    """Return the node that runs a controller, given by preset or file."""
+    return node_of_law(load_yaml(find_config('controllers', controller)).get('controller', str))
+
+
+def node_of_law(kind: str | None) -> str:
+    """Return the node that runs a control law: that of fixed gains runs all without rules."""
+    return 'sofc_controller' if kind == 'sofc' else 'pid_controller'
 
 
 def _recorded(nodes: list[NodeSpec], namespace: str, parameters: Mapping[str, Any],
@@ -180,7 +186,7 @@ def knee(namespace: str = '/knee', joint: str = 'joint_dmsp_5_300_realistic', va
         nodes.append(NodeSpec('joint_controller', namespace, {
             **of_joint, **({'accept_other_rig': True} if accept_other_rig else {}),
             'controller': controller}))
-    asking = _asking('' if controller == NO_CONTROLLER else controller)
+    asking = {'controller': '' if controller == NO_CONTROLLER else controller}
     for side in SIDES:
         below = f'{namespace}/{side}'
         nodes += [NodeSpec('valve_driver', below,

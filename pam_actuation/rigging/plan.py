@@ -25,6 +25,7 @@ from typing import Any, TYPE_CHECKING
 from pam_actuation.bags.metadata import experiment_metadata
 from pam_actuation.bags.place import check_bag_target
 from pam_actuation.namespaces import namespace_of, node_name_of
+from pam_actuation.rigging.layouts import node_of_law
 from pam_actuation.topics.table import RECORDED_OF_JOINT
 from pam_sim.errors import InputError
 from pam_sim.files import StrPath
@@ -149,8 +150,7 @@ def make_plan(experiment: 'StrPath | Experiment', rig: 'StrPath | Rig | JointRig
         plan.plant_node, plan.controller_node = JOINT_PLANT, JOINT_CONTROLLER
         plan.drivers = tuple(f'{place}{DRIVER}' for place in model.muscles)
     elif law is not None:
-        # The node of fixed gains runs every controller without rules.
-        plan.controller_node = 'sofc_controller' if law.kind == 'sofc' else 'pid_controller'
+        plan.controller_node = node_of_law(law.kind)
     plan.parameters = _parameters(plan, bag, learning, seed, namespace, overwrite)
     if realtime:
         for parameters in plan.parameters.values():

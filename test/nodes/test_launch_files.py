@@ -97,7 +97,7 @@ def test_a_namespace_that_ros_refuses_is_one_sentence(file):
 
 
 # How a node is brought up and ends, which a launch file and pam up do in ways of their own.
-BRINGING_UP = {'autostart', 'exit_when_finished', 'start_delay_s'}
+BRINGING_UP = {'autostart', 'end_with_parent', 'exit_when_finished', 'start_delay_s'}
 CASES = {
     'a muscle': ('rig.launch.py', {'record': 'false'}, lambda: layouts.rig(
         experiment='sine_quarter_hz')),
@@ -107,6 +107,9 @@ CASES = {
     'raw signals, no controller': (
         'rig.launch.py', {'experiment': 'voltage_steps', 'output': 'bag'}, lambda: layouts.rig(
             experiment='voltage_steps', record='bag')),
+    'a law without rules': (
+        'rig.launch.py', {'controller_file': 'mpc_ppr', 'output': 'bag'}, lambda: layouts.rig(
+            controller='mpc_ppr', experiment='sine_quarter_hz', record='bag')),
     'a joint': ('knee.launch.py', {'namespace': '/leg'}, lambda: layouts.knee(
         '/leg', experiment='joint_sine')),
     'a joint, recorded': (

@@ -47,6 +47,9 @@ MISTAKES = {
         'plant_simulator', ['publish_rate_hz:=50'], 'publish_rate_hz: 50', '100 to 1000'),
     'sofc_controller preset': (
         'sofc_controller', ['controller:=nobody'], 'nobody', 'sofc_ppr'),
+    'sofc_controller law': (
+        'sofc_controller', ['controller:=mpc_ppr'], 'controller: mpc_ppr is a mpc controller',
+        'pid_controller all others'),
     'pid_controller type': (
         'pid_controller', ['valve_type:=3'], 'valve_type: 3', 'must be of type str'),
     'reference_generator experiment': (

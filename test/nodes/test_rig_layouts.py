@@ -61,6 +61,15 @@ def test_a_force_is_tracked_by_a_controller_of_forces():
     assert nodes['sofc_controller']['controller'] == 'sofc_force_ppr'
 
 
+@pytest.mark.parametrize('controller, node', [
+    ('sofc_ppr', 'sofc_controller'), ('sofc_force_ppr', 'sofc_controller'),
+    *((name, 'pid_controller') for name in ('pid', 'lqi', 'mpc_ppr', 'ilc_ppr'))])
+def test_a_law_without_rules_runs_on_the_node_for_those(controller, node):
+    nodes = {one.name: one.parameters for one in layouts.rig(controller=controller)}
+    assert [name for name in nodes if name.endswith('_controller')] == [node]
+    assert nodes[node]['controller'] == controller
+
+
 def test_both_knees_have_all_nodes_their_names_and_seeds():
     nodes = layouts.exo('/me', valve='hsv')
     left = [name for name in names(nodes) if name.startswith('/me/left_knee/')]
