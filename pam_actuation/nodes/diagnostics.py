@@ -96,6 +96,13 @@ class DiagnosticsReporter:
             (*self._values(), *self._counts()), HARDWARE_ID)))
         self._say(now_ns, level, message)
 
+    def end(self, level: int, message: str, values: Values) -> None:
+        """Send the last status of all, and before it one that was held back."""
+        if (self.level, self.message) != self._sent:
+            self.send()
+        self.level, self.message, self.values_of = level, message, lambda: values
+        self.send()
+
     def _say(self, now_ns: int, level: int, message: str) -> None:
         """Tell the terminal what is wrong, or no longer wrong; not each number that changes."""
         said, self._said = self._said, (level, DIGITS.sub('', message))

@@ -327,10 +327,7 @@ class ManagedNode(LifecycleNode):
         return ERROR if self.exit_code else OK, why, self.diagnostics.values_of()
 
     def _end_work(self, why: str) -> None:
-        diagnostics = self.diagnostics
-        diagnostics.level, diagnostics.message, values = self.last_status(why)
-        diagnostics.values_of = lambda: values
-        diagnostics.send()
+        self.diagnostics.end(*self.last_status(why))
         self.stop()
 
     def _farewell(self) -> None:

@@ -40,7 +40,7 @@ class Speaker(ManagedNode):
     def tick(self):
         self.ticks += 1
         self.diagnostics.update(OK, 'working')
-        if self.ticks == 50:
+        if self.ticks == 30:
             self.diagnostics.send()
             if self.HOW == 'tick':
                 raise KeyError('rules')
@@ -49,7 +49,7 @@ class Speaker(ManagedNode):
                 self.exit_code = 0
 
     def diagnostic_values(self):
-        if self.ticks > 50 - (self.HOW == 'tick') and self.HOW != 'done':
+        if self.ticks > 30 - (self.HOW == 'tick') and self.HOW != 'done':
             raise KeyError('rules')
         return super().diagnostic_values()
 
@@ -82,3 +82,10 @@ def test_a_node_that_fails_says_why_where_its_values_fail_too(how, tmp_path):
     assert said[-1].level == LEVEL_ERROR
     assert said[-1].message == "the loop of this node failed: 'rules'"
     assert 'published./diagnostics' in said[-1].values
+
+
+def test_a_change_just_before_the_end_is_sent(tmp_path):
+    code, said = heard_of('done', tmp_path)
+    assert code == 0
+    assert [(one.level, one.message) for one in said[-2:]] == [
+        (LEVEL_OK, 'done'), (LEVEL_OK, 'ended')]
