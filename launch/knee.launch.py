@@ -46,7 +46,7 @@ from launch_ros.parameter_descriptions import ParameterValue
 from pam_actuation.control.modes.files import joint_preset_for
 from pam_actuation.hardware.files import hardware_file
 from pam_actuation.namespaces import launch_namespace
-from pam_actuation.rigging.layouts import BY_SENSORS, BY_TOPIC, SIMULATED, TOPICS
+from pam_actuation.rigging.layouts import AWAITED_S, BY_SENSORS, BY_TOPIC, SIMULATED, TOPICS
 from pam_sim.joint import load_joint
 
 PACKAGE = 'pam_actuation'
@@ -125,7 +125,7 @@ def _node(executable, *parameters, side='', condition=None):
         parameters=[{'realtime_priority': ParameterValue(priority, value_type=int),
                      'use_sim_time': ParameterValue(
                          LaunchConfiguration('use_sim_time'), value_type=bool),
-                     'end_with_parent': True,
+                     'end_with_parent': True, 'await_timeout_s': AWAITED_S,
                      'muscle': _text(LaunchConfiguration(NAME))}, *parameters])
 
 
@@ -164,7 +164,7 @@ def generate_launch_description():
     reference = _node(
         'reference_generator', valve,
         {'experiment': _text(LaunchConfiguration('experiment')), 'await_receiver': True,
-         'start_delay_s': 3.0, 'exit_when_finished': True},
+         'await_measurement_s': AWAITED_S, 'start_delay_s': 3.0, 'exit_when_finished': True},
         condition=IfCondition(AndSubstitution(*(
             NotEqualsSubstitution(LaunchConfiguration('experiment'), no) for no in ('', 'none')))))
     recorder = _node(

@@ -42,8 +42,8 @@ from launch_ros.parameter_descriptions import ParameterValue
 from pam_actuation.hardware.files import hardware_file
 from pam_actuation.namespaces import launch_namespace
 from pam_actuation.nodes.pid_controller import PidNode
-from pam_actuation.rigging.layouts import controller_node, NO_CONTROLLER, played
-from pam_actuation.rigging.layouts import SIMULATED, TOPICS
+from pam_actuation.rigging.layouts import AWAITED_S, controller_node, NO_CONTROLLER
+from pam_actuation.rigging.layouts import played, SIMULATED, TOPICS
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 
@@ -115,6 +115,7 @@ def _node(executable, *parameters, condition=None):
     common = {
         'autostart': True, 'end_with_parent': True,
         'await_subscriber': ParameterValue(recorder, value_type=str),
+        'await_timeout_s': AWAITED_S,
         'realtime_priority': ParameterValue(priority, value_type=int),
         'use_sim_time': ParameterValue(LaunchConfiguration('use_sim_time'), value_type=bool)}
     return LifecycleNode(
@@ -155,7 +156,8 @@ def generate_launch_description():
     watchdog = _node('valve_watchdog', valve, condition=IfCondition(by_signal))
     reference = _node(
         'reference_generator', valve,
-        {'experiment': _text('experiment'), 'await_receiver': True, 'start_delay_s': 3.0,
+        {'experiment': _text('experiment'), 'await_receiver': True,
+         'await_measurement_s': AWAITED_S, 'start_delay_s': 3.0,
          'exit_when_finished': True})
     sofc = _node('sofc_controller', valve, control, learning, condition=chosen('sofc_controller'))
     pid = _node('pid_controller', valve, control, condition=chosen('pid_controller'))

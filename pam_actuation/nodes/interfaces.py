@@ -47,7 +47,10 @@ VARIANTS: dict[str, tuple[dict[str, Any], ...]] = {
     'sofc_controller': (), 'pid_controller': (),
     'reference_generator': (
         {'experiment': 'disturbance'}, {'experiment': 'pressure_identification'},
-        {'experiment': 'voltage_steps'}, {'experiment': 'joint_sine'}),
+        {'experiment': 'voltage_steps'}, {'experiment': 'joint_sine'},
+        {'await_measurement_s': 1.0},
+        *({'await_measurement_s': 1.0, 'experiment': experiment} for experiment in (
+            'pressure_identification', 'joint_sine'))),
     'experiment_recorder': ({'rig': 'joint_dmsp_5_300'},),
     'joint_simulator': ({'valve_type': 'hsv'},),
     'joint_controller': (), 'joint_trajectory_server': ()}

@@ -15,17 +15,29 @@
 """The reference on ROS: what the muscle is asked to do, now and ahead."""
 
 from collections.abc import Sequence
+import itertools
+import math
 import sys
+import time
 from typing import Any
 
 from pam_actuation.bags.ending import FINISHED
 from pam_actuation.bags.ending import PLAYING
 from pam_actuation.drivers.parameter import node_parameter
 from pam_actuation.nodes.diagnostics import OK, Values
+from pam_actuation.nodes.endpoints import PolledSubscription
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.runner import run
 from pam_sim.errors import InputError
+from pam_sim.joint.parameters import SIDES
 from pam_sim.valve import VALVES
+
+# Field of a measurement that has to be a finite number.
+MEASURED = {'contraction': 'contraction_m', 'force': 'force_n', 'pressure': 'pressure_pa',
+            'joint_state': 'angle_rad'}
+OF_DOMAIN = {'contraction': ('contraction',), 'force': ('force',),
+             'joint_angle': ('joint_state',)}
+UNTRACKED = 'pressure', 'contraction', 'force'      # of an experiment that tracks nothing
 
 
 class ReferenceGenerator(ManagedNode):
@@ -50,6 +62,11 @@ class ReferenceGenerator(ManagedNode):
             'await_receiver', False, 'Wait before the experiment starts until some node besides '
             'await_subscriber receives it.'),
         node_parameter(
+            'await_measurement_s', 0.0, 'Wait after that, at most this long, until the '
+            'experiment can be measured: what it tracks (without that any of pressure, '
+            'contraction, force), and what the drivers send to their valves. The node ends '
+            'with an error where the time is over [s]. 0: do not wait.', 0.0, 3600.0),
+        node_parameter(
             'start_delay_s', 0.0, 'Wait after that before the experiment starts [s].', 0.0, 60.0),
         node_parameter(
             'exit_when_finished', False, 'End the process when the experiment is over.'),
@@ -62,8 +79,9 @@ class ReferenceGenerator(ManagedNode):
 
     def check(self) -> None:
         """Refuse to wait in lockstep, where everybody waits for the reference."""
-        if self.participants and self.value('start_delay_s') > 0.0:
-            raise InputError('0 is needed in lockstep', 'parameter start_delay_s')
+        for name in ('start_delay_s', 'await_measurement_s'):
+            if self.participants and self.value(name) > 0.0:
+                raise InputError('0 is needed in lockstep', f'parameter {name}')
 
     def setup(self) -> None:
         """Load the experiment, create the topics of its domain."""
@@ -75,11 +93,20 @@ class ReferenceGenerator(ManagedNode):
         for topic in self.loop.topics:
             self.add_publisher(topic)
         self.main_topic = self.publishers_counted[0].topic
+        # One message of each of these groups is awaited.
+        self.awaited_inputs: list[list[PolledSubscription]] = []
+        if self.value('await_measurement_s'):
+            domain = self.experiment.domain
+            signals = [f'{side}/valve_signal' for side in SIDES] if (
+                domain == 'joint_angle') else ['valve_signal']
+            self.awaited_inputs = [[self.add_subscription(topic) for topic in group] for group in (
+                OF_DOMAIN.get(domain, UNTRACKED), *([signal] for signal in signals))]
 
     def start(self) -> None:
         """Play from the beginning."""
         self.loop.start_ns = None
         self.begin_ns = None
+        self._received_s = 0.0
         self.add_loop(1.0 / self.loop.rate_hz)
 
     def _received(self) -> bool:
@@ -89,11 +116,40 @@ class ReferenceGenerator(ManagedNode):
         expected = 1 if self.value('await_subscriber') else 0
         return self.count_subscribers(self.main_topic) > expected
 
+    def _missing(self, now_ns: int) -> str:
+        """Return the topics, '' for none, without which the experiment does not begin."""
+        from pam_actuation.control.measurement import fresh
+
+        for one in itertools.chain(*self.awaited_inputs):
+            one.take()
+
+        def heard(one: PolledSubscription) -> bool:
+            field = MEASURED.get(one.topic.rsplit('/', 1)[-1])
+            return fresh(one.newest, now_ns) and (
+                field is None or math.isfinite(getattr(one.newest, field)))
+
+        return ', '.join(' or '.join(one.topic for one in group) for group in self.awaited_inputs
+                         if not any(heard(one) for one in group))
+
+    def _may_begin(self, now_ns: int) -> bool:
+        """Tell whether all is there; fail where that takes too long."""
+        if not self._received():
+            return False
+        missing = self._missing(now_ns)
+        self._received_s = self._received_s or time.monotonic()
+        limit_s = self.value('await_measurement_s')
+        if missing and time.monotonic() - self._received_s > limit_s:
+            self.fail(f'the experiment did not begin: nothing valid came on {missing} for '
+                      f'{limit_s:g} s')
+        return not missing
+
     def tick(self) -> None:
         """Send what is due."""
         now_ns = self.now_ns()
-        if self.begin_ns is None and self._received():
+        if self.begin_ns is None and self._may_begin(now_ns):
             self.begin_ns = now_ns + round(self.value('start_delay_s') * 1e9)
+        if self.exit_code is not None:
+            return
         if self.begin_ns is None or now_ns < self.begin_ns:
             self.diagnostics.update(OK, 'waiting for the start')
             return

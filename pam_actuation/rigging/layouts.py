@@ -35,6 +35,7 @@ SIMULATED = 'sim'           # no hardware
 TOPICS = 'topics'           # sensors and valves are a program of the user's own
 BY_SIGNAL = (SIMULATED, TOPICS)     # what follows valve_signal, on which a watchdog can vent
 BY_SENSORS, BY_TOPIC = 'sensors', 'topic'       # who publishes the angle of a real joint
+AWAITED_S = 150.0           # for the first measurement: others may compile for two minutes
 KNEES = ('left_knee', 'right_knee')
 
 
@@ -222,4 +223,5 @@ def _reference(namespace: str, experiment: str,
     if not experiment:
         return []
     return [NodeSpec('reference_generator', namespace, {
-        **parameters, 'experiment': experiment, 'await_receiver': True})]
+        **parameters, 'experiment': experiment, 'await_receiver': True,
+        'await_measurement_s': AWAITED_S})]

@@ -143,13 +143,14 @@ _SIGNAL = NamedNumbers(messages.ValveSignal, 'efforts', 'effort')
 
 # Of messages at equal times those of an earlier row act first: measured, wanted, decided, acted.
 TOPICS = (
-    Topic('pressure', _PRESSURE, 'measured muscle pressure', SENSORS, (*CONTROLLERS, *DRIVER),
+    Topic('pressure', _PRESSURE, 'measured muscle pressure', SENSORS,
+          (*CONTROLLERS, *DRIVER, *REFERENCE),
           need=NEEDED, steady=True, drawn=True),
     Topic('contraction', Numbers(JOINT_STATE, messages.Contraction, _MOTION),
-          'measured contraction', SENSORS, (*LAWS, *DRIVER), need=NEEDED, steady=True,
+          'measured contraction', SENSORS, (*LAWS, *DRIVER, *REFERENCE), need=NEEDED, steady=True,
           drawn=True),
-    Topic('force', _FORCE, 'measured force', SENSORS, CONTROLLERS, need=USED, steady=True,
-          drawn=True),
+    Topic('force', _FORCE, 'measured force', SENSORS, (*CONTROLLERS, *REFERENCE), need=USED,
+          steady=True, drawn=True),
     Topic('supply_pressure', _PRESSURE, 'measured supply pressure', SENSORS, DRIVER, need=USED,
           drawn=True, valves=('hsv',)),
     Topic('external_force', _FORCE, 'disturbance on the simulated load', REFERENCE,
@@ -169,7 +170,7 @@ TOPICS = (
     Topic('valve_command', _SIGNAL, 'wanted raw valve signal', REFERENCE, DRIVER, held=True,
           missing=ALLOWED),
     Topic('valve_signal', _SIGNAL, 'what goes to the valve', (*DRIVER, 'valve_watchdog'),
-          (*PLANTS, *DRIVER, 'valve_watchdog'), held=True, need=NEEDED, steady=True,
+          (*PLANTS, *DRIVER, 'valve_watchdog', *REFERENCE), held=True, need=NEEDED, steady=True,
           missing=KEPT, drawn=True),
     Topic('followed_pressure', _PRESSURE, 'what the driver makes of the command', DRIVER,
           CONTROLLERS, held=True, drawn=True),
@@ -180,7 +181,7 @@ TOPICS = (
         Value('angle_rad', 'position'), Value('torque_n_m', 'effort'))),
           'measured angle, and torque of both tendons',
           ('joint_simulator', 'hardware_sensors'),
-          ('joint_controller', 'joint_trajectory_server'), place=JOINT),
+          ('joint_controller', 'joint_trajectory_server', *REFERENCE), place=JOINT),
     Topic('joint_reference', Numbers(JOINT_STATE, messages.AngleReference, (
         Value('angle_rad', 'position'), Value('rate_rad_per_s', 'velocity'))),
           'wanted angle, now', REFERENCE, ('joint_controller',), place=JOINT, held=True,

@@ -48,7 +48,7 @@ def test_a_watchdog_takes_the_place_of_sensors_and_simulator():
 
 def test_the_reference_waits_for_sensors_that_come_late(tmp_path):
     with Processes(tmp_path) as processes:
-        rig = processes.pam_up('--hardware', 'topics', '--seconds', '2',
+        rig = processes.pam_up('--hardware', 'topics', '--seconds', '5',
                                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         wait_for(lambda: list(processes.bag.glob('*.mcap')), 60.0, 'the recording')
         time.sleep(1.0)         # the controller comes up as well
