@@ -52,11 +52,12 @@ from pam_sim.joint import load_joint
 PACKAGE = 'pam_actuation'
 SIDES = ('flexor', 'extensor')
 RECORDER = 'experiment_recorder'
-# Noted from the arguments: the joint's name, the file of the hardware, and what the recorder is,
-# '' for none, and tells.
-NAME, HARDWARE_FILE, RECORDER_NAME, RECORDED_CONTROLLER, RECORDED_EXPERIMENT, RECORDED_SEED = (
-    'joint_name', 'hardware_file', 'recorder_name', 'recorded_controller', 'recorded_experiment',
-    'recorded_seed')
+# Noted from the arguments: the joint's name and valves, the file of the hardware, and what the
+# recorder is, '' for none, and tells.
+(NAME, VALVE, HARDWARE_FILE, RECORDER_NAME, RECORDED_CONTROLLER, RECORDED_EXPERIMENT,
+ RECORDED_SEED) = (
+    'joint_name', 'valve_of_joint', 'hardware_file', 'recorder_name', 'recorded_controller',
+    'recorded_experiment', 'recorded_seed')
 
 
 def _arguments():
@@ -131,7 +132,7 @@ def _node(executable, *parameters, side='', condition=None):
 
 def generate_launch_description():
     """Return nodes, arguments and the ways to end."""
-    kind = {'valve_type': _text(LaunchConfiguration('valve'))}
+    kind = {'valve_type': _text(LaunchConfiguration(VALVE))}
     valve = {**kind, 'await_subscriber': _text(LaunchConfiguration(RECORDER_NAME))}
     joint = {'joint': _text(LaunchConfiguration('joint'))}
     seed = {'seed': ParameterValue(LaunchConfiguration('seed'), value_type=int)}
@@ -196,7 +197,7 @@ def _note_names(context):
 
     namespace = launch_namespace(given('namespace'))
     valve = given('valve') or load_joint(given('joint')).valve
-    noted = {'namespace': namespace, 'valve': valve, NAME: namespace.rsplit('/', 1)[-1] or 'knee',
+    noted = {'namespace': namespace, VALVE: valve, NAME: namespace.rsplit('/', 1)[-1] or 'knee',
              HARDWARE_FILE: hardware_file(given('hardware')),
              # Real sensors have no seed.
              RECORDED_SEED: given('seed') if given('hardware') == SIMULATED else '-1',

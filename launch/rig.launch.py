@@ -49,9 +49,11 @@ from pam_sim.errors import InputError
 
 PACKAGE = 'pam_actuation'
 RECORDER = 'experiment_recorder'
-# Noted from the arguments.
-HARDWARE_FILE, CONTROLLER, CONTROLLER_NAME, RAW, RECORDED_SEED = (
-    'hardware_file', 'controller_node', 'controller_name', 'raw_valve_signals', 'recorded_seed')
+# Noted from the arguments; not in their place, since the next rig included would take it for its
+# own.
+VALVE, HARDWARE_FILE, CONTROLLER, CONTROLLER_NAME, RAW, RECORDED_SEED = (
+    'valve_of_rig', 'hardware_file', 'controller_node', 'controller_name', 'raw_valve_signals',
+    'recorded_seed')
 
 
 def _arguments():
@@ -126,7 +128,7 @@ def _node(executable, *parameters, condition=None):
 
 def generate_launch_description():
     """Return nodes, arguments and the two ways to end."""
-    valve = {'valve_type': _text('valve')}
+    valve = {'valve_type': _text(VALVE)}
     seed = {'seed': ParameterValue(LaunchConfiguration('seed'), value_type=int)}
     control = {
         'rig': _text('rig'), 'controller': _text(CONTROLLER_NAME), 'accept_other_rig':
@@ -187,7 +189,7 @@ def _note_what_is_needed(context):
     name, raw = played(
         given('experiment'), given('rig'), valve, file,
         PidNode.DEFAULT_CONTROLLERS if kind == 'pid' else None)
-    noted = {'valve': valve, HARDWARE_FILE: hardware_file(given('hardware')),
+    noted = {VALVE: valve, HARDWARE_FILE: hardware_file(given('hardware')),
              CONTROLLER: controller_node(name) if name else NO_CONTROLLER, CONTROLLER_NAME: name,
              RAW: str(raw).lower(), 'namespace': launch_namespace(given('namespace')),
              # Real sensors have no seed.

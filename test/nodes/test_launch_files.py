@@ -31,15 +31,21 @@ from pam_actuation.nodes.interfaces import node_class                       # no
 from pam_actuation.nodes.managed import COMMON_PARAMETERS                   # noqa: E402
 from pam_actuation.rigging import layouts                                   # noqa: E402
 from pam_actuation.rigging import model_view                                # noqa: E402
+from pam_sim import load_rig                                                # noqa: E402
 from pam_sim.errors import InputError                                       # noqa: E402
+from pam_sim.joint import load_joint                                        # noqa: E402
 
 LAUNCH = Path(__file__).resolve().parents[2] / 'launch'
 FILES = sorted(path.name for path in LAUNCH.glob('*.launch.py'))
 
 
-def described(name, **given):
-    """Return full name to parameters of the nodes that a launch file starts, none started."""
-    context = launch.LaunchContext()
+def described(name, context=None, **given):
+    """
+    Return full name to parameters of the nodes that a launch file starts, none started.
+
+    With the ``context`` of another file it is included after that one.
+    """
+    context = context or launch.LaunchContext()
     found = {}
 
     def visit(entities):
@@ -199,6 +205,20 @@ def test_the_controller_is_the_one_asked_for_or_none(controller, node):
     if controller != 'pid':
         knee = described('knee.launch.py', controller=controller)
         assert ('/knee/joint_controller' in knee) == bool(node) and len(knee) == 6 + bool(node)
+
+
+@pytest.mark.parametrize('file, model, preset, driver', [
+    ('rig.launch.py', 'rig', 'dmsp_5_300_realistic', 'valve_driver'),
+    ('knee.launch.py', 'joint', 'joint_dmsp_5_300_realistic', 'flexor/valve_driver')])
+def test_the_second_of_two_included_has_its_own_valve(file, model, preset, driver, tmp_path):
+    other = tmp_path / 'other.yaml'
+    model_in = load_rig if model == 'rig' else load_joint
+    other.write_text(model_in(preset).with_(valve='hsv').to_yaml())
+    context = launch.LaunchContext()
+    left = described(file, context, namespace='left', **{model: preset})
+    right = described(file, context, namespace='right', **{model: str(other)})
+    assert left[f'/left/{driver}']['valve_type'] == 'ppr'
+    assert right[f'/right/{driver}']['valve_type'] == 'hsv'
 
 
 def test_a_file_for_no_controller_is_a_mistake():
