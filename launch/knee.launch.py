@@ -27,14 +27,10 @@ from datetime import datetime
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
-from launch.actions import EmitEvent
 from launch.actions import OpaqueFunction
-from launch.actions import RegisterEventHandler
 from launch.actions import SetLaunchConfiguration
 from launch.conditions import IfCondition
 from launch.conditions import UnlessCondition
-from launch.event_handlers import OnProcessExit
-from launch.events import Shutdown
 from launch.substitutions import AndSubstitution
 from launch.substitutions import EqualsSubstitution
 from launch.substitutions import LaunchConfiguration
@@ -46,6 +42,7 @@ from launch_ros.parameter_descriptions import ParameterValue
 from pam_actuation.control.modes.files import joint_preset_for
 from pam_actuation.hardware.files import hardware_file
 from pam_actuation.namespaces import launch_namespace
+from pam_actuation.nodes.launched import RigEnd
 from pam_actuation.rigging.layouts import AWAITED_S, BY_SENSORS, BY_TOPIC, SIMULATED, TOPICS
 from pam_sim.joint import load_joint
 
@@ -132,6 +129,7 @@ def _node(executable, *parameters, side='', condition=None):
 
 def generate_launch_description():
     """Return nodes, arguments and the ways to end."""
+    end = RigEnd()
     kind = {'valve_type': _text(LaunchConfiguration(VALVE))}
     valve = {**kind, 'await_subscriber': _text(LaunchConfiguration(RECORDER_NAME))}
     joint = {'joint': _text(LaunchConfiguration('joint'))}
@@ -174,17 +172,16 @@ def generate_launch_description():
         {'rig': _text(LaunchConfiguration('joint')),
          'output': _text(LaunchConfiguration('output')),
          'experiment': _text(LaunchConfiguration(RECORDED_EXPERIMENT)),
-         'controller': _text(LaunchConfiguration(RECORDED_CONTROLLER))},
+         'controller': _text(LaunchConfiguration(RECORDED_CONTROLLER)),
+         'notes_folder': end.notes_folder},
         condition=IfCondition(LaunchConfiguration('record')))
-    ends = [
-        RegisterEventHandler(OnProcessExit(target_action=node, on_exit=_shut_down(reason)))
-        for node, reason in (
-            (reference, 'the experiment is over'), (plant, 'the joint ended'),
-            (controller, 'the controller ended'), (recorder, 'the recorder ended'),
-            *((driver, 'a valve driver ended') for driver in drivers),
-            (angle, 'the angle sensor ended'),
-            *((one, 'the sensors of a muscle ended') for one in sensors),
-            *((watchdog, 'a watchdog ended') for watchdog in watchdogs))]
+    ends = end.handlers((
+        (reference, 'the experiment is over'), (plant, 'the joint ended'),
+        (controller, 'the controller ended'), (recorder, 'the recorder ended'),
+        *((driver, 'a valve driver ended') for driver in drivers),
+        (angle, 'the angle sensor ended'),
+        *((one, 'the sensors of a muscle ended') for one in sensors),
+        *((watchdog, 'a watchdog ended') for watchdog in watchdogs)))
     return LaunchDescription(
         [*_arguments(), OpaqueFunction(function=_note_names), recorder, plant, angle,
          *sensors, *drivers, *watchdogs, controller, reference, *ends])
@@ -212,10 +209,3 @@ def _note_names(context):
         if given('experiment') != 'none':
             noted[RECORDED_EXPERIMENT] = given('experiment')
     return [SetLaunchConfiguration(name, value) for name, value in noted.items()]
-
-
-def _shut_down(reason):
-    """Return the handler that ends everything, once."""
-    def on_exit(event, context):
-        return [] if context.is_shutdown else [EmitEvent(event=Shutdown(reason=reason))]
-    return on_exit

@@ -25,14 +25,10 @@ from datetime import datetime
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
-from launch.actions import EmitEvent
 from launch.actions import OpaqueFunction
-from launch.actions import RegisterEventHandler
 from launch.actions import SetLaunchConfiguration
 from launch.conditions import IfCondition
 from launch.conditions import UnlessCondition
-from launch.event_handlers import OnProcessExit
-from launch.events import Shutdown
 from launch.substitutions import EqualsSubstitution
 from launch.substitutions import IfElseSubstitution
 from launch.substitutions import LaunchConfiguration
@@ -41,6 +37,7 @@ from launch_ros.actions import LifecycleNode
 from launch_ros.parameter_descriptions import ParameterValue
 from pam_actuation.hardware.files import hardware_file
 from pam_actuation.namespaces import launch_namespace
+from pam_actuation.nodes.launched import RigEnd
 from pam_actuation.nodes.pid_controller import PidNode
 from pam_actuation.rigging.layouts import AWAITED_S, controller_node, NO_CONTROLLER
 from pam_actuation.rigging.layouts import played, SIMULATED, TOPICS
@@ -127,7 +124,8 @@ def _node(executable, *parameters, condition=None):
 
 
 def generate_launch_description():
-    """Return nodes, arguments and the two ways to end."""
+    """Return nodes, arguments and the ways to end."""
+    end = RigEnd()
     valve = {'valve_type': _text(VALVE)}
     seed = {'seed': ParameterValue(LaunchConfiguration('seed'), value_type=int)}
     control = {
@@ -142,7 +140,7 @@ def generate_launch_description():
         RECORDER, valve, {'await_subscriber': ''},
         {'seed': ParameterValue(LaunchConfiguration(RECORDED_SEED), value_type=int)},
         {'output': _text('output'), 'rig': _text('rig'), 'experiment': _text('experiment'),
-         'controller': _text(CONTROLLER_NAME)},
+         'controller': _text(CONTROLLER_NAME), 'notes_folder': end.notes_folder},
         condition=IfCondition(LaunchConfiguration('record')))
     hardware = LaunchConfiguration('hardware')
     simulated = EqualsSubstitution(hardware, SIMULATED)
@@ -164,13 +162,11 @@ def generate_launch_description():
     sofc = _node('sofc_controller', valve, control, learning, condition=chosen('sofc_controller'))
     pid = _node('pid_controller', valve, control, condition=chosen('pid_controller'))
     nodes = [recorder, plant, sensors, driver, watchdog, sofc, pid, reference]
-    ends = [
-        RegisterEventHandler(OnProcessExit(target_action=node, on_exit=_shut_down(reason)))
-        for node, reason in (
-            (reference, 'the experiment is over'), (driver, 'the valve driver ended'),
-            (plant, 'the plant ended'), (sensors, 'the sensors ended'),
-            (recorder, 'the recorder ended'), (watchdog, 'the watchdog ended'),
-            (sofc, 'the controller ended'), (pid, 'the controller ended'))]
+    ends = end.handlers((
+        (reference, 'the experiment is over'), (driver, 'the valve driver ended'),
+        (plant, 'the plant ended'), (sensors, 'the sensors ended'),
+        (recorder, 'the recorder ended'), (watchdog, 'the watchdog ended'),
+        (sofc, 'the controller ended'), (pid, 'the controller ended')))
     return LaunchDescription(
         [*_arguments(), OpaqueFunction(function=_note_what_is_needed), *nodes, *ends])
 
@@ -195,10 +191,3 @@ def _note_what_is_needed(context):
              # Real sensors have no seed.
              RECORDED_SEED: given('seed') if given('hardware') == SIMULATED else '-1'}
     return [SetLaunchConfiguration(key, text) for key, text in noted.items()]
-
-
-def _shut_down(reason):
-    """Return the handler that ends everything, once."""
-    def on_exit(event, context):
-        return [] if context.is_shutdown else [EmitEvent(event=Shutdown(reason=reason))]
-    return on_exit

@@ -137,10 +137,13 @@ class EndWatch:
         if status.message.startswith((PLAYING, FINISHED)):
             self._heard_ns, self._elapsed_s = status.stamp_ns, elapsed_s
             self._over = self._finished = status.message.startswith(FINISHED)
+            self._failed = ''
         elif self._heard_ns is not None:
             self._over = True
             self._elapsed_s = elapsed_s or self._elapsed_s
             self._failed = status.message if status.level >= LEVEL_ERROR else ''
+        elif status.level >= LEVEL_ERROR:
+            self._failed = status.message       # it did not begin
 
     def _hear_driver(self, status: Status) -> None:
         if status.level < LEVEL_ERROR:
@@ -166,14 +169,15 @@ class EndWatch:
         if reached_s is not None and planned_s is not None:
             reached_s = planned_s if self._finished else min(reached_s, planned_s)
         if told is not None and told.early:
-            return Ending(planned_s, reached_s or 0.0, told.ended, told.because)
-        if self._heard_ns is None and told is None:
+            because = self._failed if told.ended == ERROR else ''
+            return Ending(planned_s, reached_s or 0.0, told.ended, because or told.because)
+        if self._heard_ns is None and told is None and not self._failed:
             return Ending(planned_s)                # nobody played an experiment
         if self._vented:
             vented_s, why = min(self._vented.values())
             return Ending(planned_s, min(vented_s, reached_s or vented_s), VENTED, why)
         if self._failed:
-            return Ending(planned_s, reached_s, ERROR, self._failed)
+            return Ending(planned_s, reached_s or 0.0, ERROR, self._failed)
         return Ending(planned_s, reached_s, COMPLETE if self._finished else INTERRUPTED)
 
 

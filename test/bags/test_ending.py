@@ -195,7 +195,11 @@ VENTED = said('valve_driver', 'vented because the reading is above the limit', 1
       said('reference_generator', 'finished sine', 18.0, elapsed_s=8.0)),
      Ending(8.0, 2.5, 'vented', 'vented')),
     ((PLAYING, said('reference_generator', 'the loop of this node failed: x', 13.0, 2)),
-     Ending(8.0, 0.5, 'error', 'the loop of this node failed: x'))])
+     Ending(8.0, 0.5, 'error', 'the loop of this node failed: x')),
+    ((said('reference_generator', 'nothing is measured', 10.0, 2),),
+     Ending(8.0, 0.0, 'error', 'nothing is measured')),
+    ((said('reference_generator', 'cannot configure', 9.0, 2), PLAYING),
+     Ending(8.0, 0.5, 'interrupted'))])
 def test_a_live_run_is_judged_by_what_its_nodes_say(heard, ending):
     assert watch(*heard).ending(8.0) == ending
 
@@ -207,3 +211,10 @@ def test_who_ended_the_run_knows_better():
     assert found.sentence == (
         'Stopped early after 0.5 s of 8.0 s planned: an error ended it '
         '(sofc_controller was ended by SIGKILL).')
+
+
+def test_a_node_that_died_is_told_with_its_own_reason_if_it_said_one():
+    told = Ending(ended='error', because='reference_generator ended with exit code 1')
+    assert watch(PLAYING).ending(8.0, told) == Ending(8.0, 0.5, 'error', told.because)
+    failed = watch(said('reference_generator', 'nothing is measured', 10.0, 2))
+    assert failed.ending(8.0, told) == Ending(8.0, 0.0, 'error', 'nothing is measured')

@@ -104,7 +104,7 @@ def test_a_namespace_that_ros_refuses_is_one_sentence(file):
 
 # How a node is brought up and ends, which a launch file and pam up do in ways of their own.
 BRINGING_UP = {'autostart', 'await_timeout_s', 'end_with_parent', 'exit_when_finished',
-               'start_delay_s'}
+               'notes_folder', 'start_delay_s'}
 CASES = {
     'a muscle': ('rig.launch.py', {'record': 'false'}, lambda: layouts.rig(
         experiment='sine_quarter_hz')),

@@ -1,0 +1,74 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""How the launch files end a rig: once, and with a word for its recorder."""
+
+import atexit
+from collections.abc import Callable, Iterable
+import json
+import os
+import shutil
+import signal
+import tempfile
+from typing import Any
+
+from launch.actions import EmitEvent, RegisterEventHandler
+from launch.event_handlers import OnProcessExit
+from launch.events import Shutdown
+from pam_actuation.bags.ending import ENDED_FILE, ERROR, INTERRUPTED, REFERENCE
+from pam_sim.files import write_text
+
+Handler = Callable[[Any, Any], list[Any]]
+
+
+class RigEnd:
+    """
+    What happens when a node of a rig ends; one for each rig of a launch.
+
+    Attributes
+    ----------
+    notes_folder : str
+        Parameter of the recorder, which reads there why the run ended early.
+
+    """
+
+    def __init__(self) -> None:
+        self.notes_folder = tempfile.mkdtemp(prefix='pam_launch_')
+        atexit.register(shutil.rmtree, self.notes_folder, ignore_errors=True)
+        self._ended = False
+
+    def handlers(self, nodes: Iterable[tuple[Any, str]]) -> list[RegisterEventHandler]:
+        """Return what ends all nodes when one does; each is given with a reason."""
+        return [RegisterEventHandler(OnProcessExit(
+            target_action=node, on_exit=self._on_exit(reason))) for node, reason in nodes]
+
+    def _on_exit(self, reason: str) -> Handler:
+        def on_exit(event: Any, context: Any) -> list[Any]:
+            if self._ended or context.is_shutdown:
+                return []
+            self._ended = True
+            self._tell_recorder(event.process_name.rpartition('-')[0], event.returncode, reason)
+            return [EmitEvent(event=Shutdown(reason=reason))]
+        return on_exit
+
+    def _tell_recorder(self, name: str, code: int, reason: str) -> None:
+        """Write down why the run ended early; not where the experiment is over."""
+        if code:
+            how = (f'was ended by {signal.Signals(-code).name}' if code < 0
+                   else f'ended with exit code {code}')
+            told = {'ended': ERROR, 'because': f'{name} {how}'}
+        elif name != REFERENCE:
+            told = {'ended': INTERRUPTED, 'because': reason}
+        else:
+            return
+        write_text(os.path.join(self.notes_folder, ENDED_FILE), json.dumps(told))
