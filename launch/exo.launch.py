@@ -43,6 +43,7 @@ HANDED_ON = {
     'experiment': ('none', 'Experiment both knees play; none: they wait for references.'),
     'record': ('false', 'Whether to record a bag of each knee: true or false.'),
     'use_sim_time': ('false', 'Whether the nodes follow /clock, which another program sends.'),
+    'shutdown_at_end': ('true', 'Whether the end of one knee ends the whole launch.'),
     'realtime_priority': ('0', 'Real-time priority of the nodes, 1 to 96; 0: none.'),
 }
 

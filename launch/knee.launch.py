@@ -104,6 +104,9 @@ def _arguments():
             'use_sim_time', default_value='false', choices=['true', 'false'],
             description='Whether the nodes follow /clock, which another program must send.'),
         DeclareLaunchArgument(
+            'shutdown_at_end', default_value='true', choices=['true', 'false'],
+            description='Whether the end of the joint ends the launch; false: its nodes alone.'),
+        DeclareLaunchArgument(
             'namespace', default_value='knee', description='Namespace of the joint.'),
     ]
 
@@ -183,15 +186,16 @@ def generate_launch_description():
         *((one, 'the sensors of a muscle ended') for one in sensors),
         *((watchdog, 'a watchdog ended') for watchdog in watchdogs)))
     return LaunchDescription(
-        [*_arguments(), OpaqueFunction(function=_note_names), recorder, plant, angle,
-         *sensors, *drivers, *watchdogs, controller, reference, *ends])
+        [*_arguments(), OpaqueFunction(function=_note_names, args=[end]), recorder, plant,
+         angle, *sensors, *drivers, *watchdogs, controller, reference, *ends])
 
 
-def _note_names(context):
+def _note_names(context, end):
     """Return the actions that note the namespace in one form, and what follows from it."""
     def given(name):
         return LaunchConfiguration(name).perform(context)
 
+    end.shuts_launch_down = given('shutdown_at_end') == 'true'
     namespace = launch_namespace(given('namespace'))
     valve = given('valve') or load_joint(given('joint')).valve
     noted = {'namespace': namespace, VALVE: valve, NAME: namespace.rsplit('/', 1)[-1] or 'knee',

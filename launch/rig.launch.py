@@ -19,6 +19,7 @@ The whole rig: plant or real sensors, driver and watchdog, controller, reference
     ros2 launch pam_actuation rig.launch.py hardware:=my_rig.yaml
 
 Ends by itself when the experiment is over, and when any of its nodes ends, whatever the reason.
+Without an experiment (experiment:=none) it waits for references.
 """
 
 from datetime import datetime
@@ -32,6 +33,7 @@ from launch.conditions import UnlessCondition
 from launch.substitutions import EqualsSubstitution
 from launch.substitutions import IfElseSubstitution
 from launch.substitutions import LaunchConfiguration
+from launch.substitutions import NotEqualsSubstitution
 from launch.substitutions import OrSubstitution
 from launch_ros.actions import LifecycleNode
 from launch_ros.parameter_descriptions import ParameterValue
@@ -45,12 +47,12 @@ from pam_sim import load_rig
 from pam_sim.errors import InputError
 
 PACKAGE = 'pam_actuation'
-RECORDER = 'experiment_recorder'
+RECORDER, NO_EXPERIMENT = 'experiment_recorder', 'none'
 # Noted from the arguments; not in their place, since the next rig included would take it for its
 # own.
-VALVE, HARDWARE_FILE, CONTROLLER, CONTROLLER_NAME, RAW, RECORDED_SEED = (
-    'valve_of_rig', 'hardware_file', 'controller_node', 'controller_name', 'raw_valve_signals',
-    'recorded_seed')
+VALVE, EXPERIMENT, HARDWARE_FILE, CONTROLLER, CONTROLLER_NAME, RAW, RECORDED_SEED = (
+    'valve_of_rig', 'experiment_of_rig', 'hardware_file', 'controller_node', 'controller_name',
+    'raw_valve_signals', 'recorded_seed')
 
 
 def _arguments():
@@ -83,7 +85,7 @@ def _arguments():
             description='Whether the rules of the controller may change.'),
         DeclareLaunchArgument(
             'experiment', default_value='sine_quarter_hz',
-            description='Experiment by name, or path of its file.'),
+            description='Experiment by name, or path of its file; none: wait for references.'),
         DeclareLaunchArgument(
             'record', default_value='true', choices=['true', 'false'],
             description='Whether to record a bag.'),
@@ -97,6 +99,9 @@ def _arguments():
         DeclareLaunchArgument(
             'use_sim_time', default_value='false', choices=['true', 'false'],
             description='Whether the nodes follow the time that the simulated plant makes.'),
+        DeclareLaunchArgument(
+            'shutdown_at_end', default_value='true', choices=['true', 'false'],
+            description='Whether the end of the rig ends the launch; false: its nodes alone.'),
         DeclareLaunchArgument(
             'namespace', default_value='muscle', description='Namespace of the rig.'),
     ]
@@ -139,7 +144,7 @@ def generate_launch_description():
     recorder = _node(
         RECORDER, valve, {'await_subscriber': ''},
         {'seed': ParameterValue(LaunchConfiguration(RECORDED_SEED), value_type=int)},
-        {'output': _text('output'), 'rig': _text('rig'), 'experiment': _text('experiment'),
+        {'output': _text('output'), 'rig': _text('rig'), 'experiment': _text(EXPERIMENT),
          'controller': _text(CONTROLLER_NAME), 'notes_folder': end.notes_folder},
         condition=IfCondition(LaunchConfiguration('record')))
     hardware = LaunchConfiguration('hardware')
@@ -156,9 +161,10 @@ def generate_launch_description():
     watchdog = _node('valve_watchdog', valve, condition=IfCondition(by_signal))
     reference = _node(
         'reference_generator', valve,
-        {'experiment': _text('experiment'), 'await_receiver': True,
+        {'experiment': _text(EXPERIMENT), 'await_receiver': True,
          'await_measurement_s': AWAITED_S, 'start_delay_s': 3.0,
-         'exit_when_finished': True})
+         'exit_when_finished': True},
+        condition=IfCondition(NotEqualsSubstitution(LaunchConfiguration(EXPERIMENT), '')))
     sofc = _node('sofc_controller', valve, control, learning, condition=chosen('sofc_controller'))
     pid = _node('pid_controller', valve, control, condition=chosen('pid_controller'))
     nodes = [recorder, plant, sensors, driver, watchdog, sofc, pid, reference]
@@ -168,24 +174,26 @@ def generate_launch_description():
         (recorder, 'the recorder ended'), (watchdog, 'the watchdog ended'),
         (sofc, 'the controller ended'), (pid, 'the controller ended')))
     return LaunchDescription(
-        [*_arguments(), OpaqueFunction(function=_note_what_is_needed), *nodes, *ends])
+        [*_arguments(), OpaqueFunction(function=_note_what_is_needed, args=[end]), *nodes, *ends])
 
 
-def _note_what_is_needed(context):
+def _note_what_is_needed(context, end):
     """Return the actions that note what the arguments lead to."""
     def given(name):
         return LaunchConfiguration(name).perform(context)
 
+    end.shuts_launch_down = given('shutdown_at_end') == 'true'
     kind, file = given('controller'), given('controller_file')
+    experiment = '' if given('experiment') == NO_EXPERIMENT else given('experiment')
     if kind == NO_CONTROLLER:
         if file:
             raise InputError('is of no use with controller:=none', 'controller_file')
         file = NO_CONTROLLER
     valve = given('valve') or load_rig(given('rig')).valve
     name, raw = played(
-        given('experiment'), given('rig'), valve, file,
+        experiment, given('rig'), valve, file,
         PidNode.DEFAULT_CONTROLLERS if kind == 'pid' else None)
-    noted = {VALVE: valve, HARDWARE_FILE: hardware_file(given('hardware')),
+    noted = {VALVE: valve, EXPERIMENT: experiment, HARDWARE_FILE: hardware_file(given('hardware')),
              CONTROLLER: controller_node(name) if name else NO_CONTROLLER, CONTROLLER_NAME: name,
              RAW: str(raw).lower(), 'namespace': launch_namespace(given('namespace')),
              # Real sensors have no seed.

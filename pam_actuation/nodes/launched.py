@@ -11,7 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""How the launch files end a rig: once, and with a word for its recorder."""
+"""How the launch files end a rig: once, with all its nodes, and with a word for its recorder."""
 
 import atexit
 from collections.abc import Callable, Iterable
@@ -24,7 +24,8 @@ from typing import Any
 
 from launch.actions import EmitEvent, RegisterEventHandler
 from launch.event_handlers import OnProcessExit
-from launch.events import Shutdown
+from launch.events import matches_action, Shutdown
+from launch.events.process import ShutdownProcess
 from pam_actuation.bags.ending import ENDED_FILE, ERROR, INTERRUPTED, REFERENCE
 from pam_sim.files import write_text
 
@@ -39,26 +40,34 @@ class RigEnd:
     ----------
     notes_folder : str
         Parameter of the recorder, which reads there why the run ended early.
+    shuts_launch_down : bool
+        Whether the whole launch ends with the rig, or the nodes of the rig alone.
 
     """
 
     def __init__(self) -> None:
         self.notes_folder = tempfile.mkdtemp(prefix='pam_launch_')
         atexit.register(shutil.rmtree, self.notes_folder, ignore_errors=True)
+        self.shuts_launch_down = True
         self._ended = False
 
     def handlers(self, nodes: Iterable[tuple[Any, str]]) -> list[RegisterEventHandler]:
         """Return what ends all nodes when one does; each is given with a reason."""
+        nodes = list(nodes)
         return [RegisterEventHandler(OnProcessExit(
-            target_action=node, on_exit=self._on_exit(reason))) for node, reason in nodes]
+            target_action=node, on_exit=self._on_exit(reason, [one for one, _ in nodes])))
+            for node, reason in nodes]
 
-    def _on_exit(self, reason: str) -> Handler:
+    def _on_exit(self, reason: str, nodes: list[Any]) -> Handler:
         def on_exit(event: Any, context: Any) -> list[Any]:
             if self._ended or context.is_shutdown:
                 return []
             self._ended = True
             self._tell_recorder(event.process_name.rpartition('-')[0], event.returncode, reason)
-            return [EmitEvent(event=Shutdown(reason=reason))]
+            if self.shuts_launch_down:
+                return [EmitEvent(event=Shutdown(reason=reason))]
+            return [EmitEvent(event=ShutdownProcess(process_matcher=matches_action(node)))
+                    for node in nodes]
         return on_exit
 
     def _tell_recorder(self, name: str, code: int, reason: str) -> None:

@@ -114,6 +114,9 @@ CASES = {
     'raw signals, no controller': (
         'rig.launch.py', {'experiment': 'voltage_steps', 'output': 'bag'}, lambda: layouts.rig(
             experiment='voltage_steps', record='bag')),
+    'a muscle that waits': (
+        'rig.launch.py', {'experiment': 'none', 'output': 'bag'}, lambda: layouts.rig(
+            record='bag')),
     'a law without rules': (
         'rig.launch.py', {'controller_file': 'mpc_ppr', 'output': 'bag'}, lambda: layouts.rig(
             controller='mpc_ppr', experiment='sine_quarter_hz', record='bag')),

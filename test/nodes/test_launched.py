@@ -23,6 +23,7 @@ launch = pytest.importorskip('launch')
 pytest.importorskip('launch_ros')
 
 from launch.actions import ExecuteProcess                                   # noqa: E402, I100
+from launch.event_handlers import OnProcessExit                             # noqa: E402
 from pam_actuation.nodes.launched import RigEnd                             # noqa: E402
 
 KILLED = 'import os; os.kill(os.getpid(), 9)'
@@ -57,3 +58,19 @@ def test_the_recorder_is_told_of_a_node_that_ended(name, text, told):
     launched(*nodes, *end.handlers([(node, 'it ended') for node in nodes]))
     file = Path(end.notes_folder) / 'ended.json'
     assert (json.loads(file.read_text()) if file.exists() else None) == told
+
+
+@pytest.mark.parametrize('whole', [True, False])
+def test_a_rig_ends_the_whole_launch_or_its_own_nodes(whole):
+    codes = {}
+    end = RigEnd()
+    end.shuts_launch_down = whole
+    own = program('reference_generator', ENDS), program('valve_driver', RUNS)
+    other = program('planner', 'import time; time.sleep(2.0)')
+    noted = [launch.actions.RegisterEventHandler(OnProcessExit(
+        target_action=one, on_exit=lambda event, _: codes.update(
+            {event.process_name.rpartition('-')[0]: event.returncode})))
+        for one in (*own, other)]
+    launched(*own, other, *noted, *end.handlers([(node, 'it ended') for node in own]))
+    assert codes['reference_generator'] == 0 and codes['valve_driver'] != 0
+    assert (codes['planner'] == 0) is not whole
