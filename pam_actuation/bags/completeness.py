@@ -48,11 +48,14 @@ def add_counts(info: 'TopicInfo', topic: TopicData, recording: Mapping[str, str]
         return count_of(recording.get(f'{topic.recorded_name}.{key}', ''))
 
     info.dropped = recorded('dropped')
-    info.missed_at_start = recorded('missed_at_start')
+    missed = recorded('missed_at_start')
+    if missed is not None:
+        info.sent_before = recorded('sent_before') or 0
+        info.missed_at_start = missed - info.sent_before
     info.published, sent_ns = reports.of(topic.recorded_name)
     info.lost = missing_messages(
         recorded('lost'), info.published, _held_by(info, topic, sent_ns),
-        (info.dropped or 0) + (info.missed_at_start or 0))
+        (info.dropped or 0) + (missed or 0))
 
 
 def _knows_send_times(topic: TopicData) -> bool:

@@ -112,7 +112,9 @@ class BagInfo:
         rig = [
             topic for topic in self.topics if short_name(topic.name) in OF_A_RUN]
         return True if rig and all(
-            topic.lost is not None and not topic.sent_before for topic in rig) else None
+            topic.lost is not None and (
+                topic.missed_at_start is not None or not topic.sent_before)
+            for topic in rig) else None
 
     @property
     def has_findings(self) -> bool:
@@ -220,8 +222,9 @@ def _notes(bag: Bag, infos: list[TopicInfo]) -> list[str]:
                      'this was accepted.')
     before = sum(topic.sent_before or 0 for topic in infos)
     if before:
-        notes.append(f'{before} messages were published before this bag begins; losses are '
-                     'counted from the first report of each node in it.')
+        notes.append(f'{before} messages were published before this bag begins' + (
+            '.' if bag.records.get(RECORDING_RECORD) else
+            '; losses are counted from the first report of each node in it.'))
     return notes
 
 

@@ -40,6 +40,7 @@ from pam_sim.errors import InputError
 Batch = deque[tuple[str, bytes, int, int]]
 RECORDING_RECORD = 'pam_recording'
 WRITE_EVERY_S = 0.1         # the writer thread takes what has come, in few large portions
+BEGIN_NS = 1_000_000_000    # a publisher heard by then was there before the bag
 WAKE_AT = 1000              # messages that wake it earlier
 
 
@@ -54,6 +55,8 @@ class TopicCounts:
     what the nodes say they have published; ``missed_at_start`` were
     published before the first one that arrived. The last two are None where the
     middleware gives no numbers or they cannot be told apart by publisher.
+    ``sent_before`` of ``missed_at_start`` are of publishers that were heard from the begin
+    of the bag on, so they were sent before it.
     """
 
     received: int = 0
@@ -61,6 +64,7 @@ class TopicCounts:
     dropped: int = 0
     lost: int | None = None
     missed_at_start: int | None = None
+    sent_before: int = 0
     publishers: int = 0
 
 
@@ -176,6 +180,7 @@ class RecorderCore:
         self._published = PublishedCounts()
         self._sent: dict[str, SentTimes] = {}
         self._closing = False
+        self._begin_ns = 0
         self._summary: RecordingSummary | None = None
         self.write_error = ''
         self._thread = threading.Thread(target=self._run, name='bag_writer', daemon=True)
@@ -231,6 +236,9 @@ class RecorderCore:
                 counts.lost = check.lost
                 counts.missed_at_start = check.missed_at_start
                 counts.publishers = check.publishers
+                self._begin_ns = self._begin_ns or receive_timestamp_ns
+                if receive_timestamp_ns - self._begin_ns <= BEGIN_NS:
+                    counts.sent_before = check.missed_at_start
             if self.write_error or self._closing or len(self._queue) >= self._max_queued:
                 counts.dropped += 1
                 return False

@@ -41,8 +41,8 @@ class TopicInfo:
     stamp intervals from their median) are None with fewer than three messages.
     ``published`` is None where no node reports it. ``lost`` is the larger of
     what the recorder missed by sequence numbers and what published counts say,
-    None where neither is known. ``sent_before`` is what nodes published before the bag of a
-    logger of one's own begins, None for bags of this package.
+    None where neither is known. ``sent_before`` is what was published before the bag begins,
+    None where that is not known.
     """
 
     name: str

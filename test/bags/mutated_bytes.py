@@ -40,7 +40,7 @@ TEXTS = (
         for i in range(12))
     + b'rosbag2_bagfile_information: {relative_file_paths: *m, message_count: *m, '
     b'custom_data: {x: *m}}\n')
-RECORDED = ('received', 'written', 'lost', 'dropped', 'missed_at_start')
+RECORDED = ('received', 'written', 'lost', 'dropped', 'missed_at_start', 'sent_before')
 
 
 def mutate_bytes(rng, data):

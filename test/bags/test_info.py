@@ -200,22 +200,28 @@ def test_recorder_and_info_count_the_same_losses(tmp_path, unknown_send_times):
         assert not summary.complete and info.complete is False
 
 
-def test_messages_before_the_recorder_are_told_from_losses(tmp_path):
+@pytest.mark.parametrize('late_s, missed', [(0.0, 0), (2.0, 6)])
+def test_messages_before_the_recorder_are_told_from_losses(late_s, missed, tmp_path):
+    # A sensor that was there before is no finding, one that comes late is: its begin is missing.
     core = RecorderCore(BagWriter(tmp_path / 'run', METADATA))
-    for short in ('valve_signal', 'diagnostics'):
+    for short in ('pressure', 'valve_signal', 'diagnostics'):
         core.add_topic(full_name(short), RECORDED[short].type_name)
+    first = codec.encode('pressure', example_messages(5)['pressure'])
+    core.receive(full_name('pressure'), first, START_NS, START_NS, 1)
     for i in range(6, 20):
         for short in ('valve_signal', 'diagnostics'):
-            received_ns = START_NS + i * STEP_NS
+            received_ns = START_NS + i * STEP_NS + round(late_s * 1e9)
             core.receive(
                 full_name(short), codec.encode(short, example_messages(i)[short]),
                 received_ns - 1000, received_ns, i + 1)
     core.close()
     info = bag_info(tmp_path / 'run')
     signal = info.topic('/muscle/valve_signal')
-    assert (signal.published, signal.count, signal.missed_at_start) == (20, 14, 6)
-    assert signal.lost == 0 and info.complete is False
-    assert said(info, '6 messages were sent before the recorder was connected')
+    assert (signal.published, signal.count, signal.missed_at_start, signal.sent_before) == (
+        20, 14, missed, 6 - missed)
+    assert signal.lost == 0 and info.missing == bool(missed)
+    assert said(info, '6 messages were sent before the recorder was connected') == bool(missed)
+    assert ('6 messages were published before this bag begins.' in info.notes) == (not missed)
 
 
 def test_reports_before_the_recorder_are_told_from_lost_ones(tmp_path):
