@@ -15,21 +15,22 @@
 """
 How far a run came and why it ended: what a bag says of it, and the sentence for people.
 
-Four texts of the ``pam_experiment`` record: ``planned_length_s`` from the start on;
-``reached_length_s``, ``ended`` and, where there is more to say, ``ended_because`` once the
-run is over. Recordings without them are told apart from those that came to their end.
+Texts of the ``pam_experiment`` record: ``planned_length_s`` from the start on;
+``reached_length_s``, ``ended`` and, where there is more to say, ``ended_because`` and
+``vented_meanwhile`` once the run is over. Recordings without them are told apart from those that
+came to their end.
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from pam_actuation.messages import LEVEL_ERROR, Status
 from pam_sim.joint.parameters import SIDES
 from pam_sim.run import Run
 
-PLANNED, REACHED, ENDED, BECAUSE = (
-    'planned_length_s', 'reached_length_s', 'ended', 'ended_because')
+PLANNED, REACHED, ENDED, BECAUSE, VENTS = (
+    'planned_length_s', 'reached_length_s', 'ended', 'ended_because', 'vented_meanwhile')
 COMPLETE, INTERRUPTED, ERROR, VENTED = 'complete', 'interrupted', 'error', 'vented'
 EARLY = {INTERRUPTED: 'interrupted', ERROR: 'an error ended it', VENTED: 'the driver had vented'}
 # How the reference generator begins its word on /diagnostics.
@@ -51,6 +52,8 @@ class Ending:
         'complete', 'interrupted', 'error', 'vented', or '' where that is not recorded.
     because : str
         What else is known of the reason.
+    vents : str
+        How often and why drivers vented in the run and followed again, '' where none did.
 
     """
 
@@ -58,6 +61,7 @@ class Ending:
     reached_s: float | None = None
     ended: str = ''
     because: str = ''
+    vents: str = ''
 
     @property
     def early(self) -> bool:
@@ -81,7 +85,8 @@ class Ending:
     def texts(self) -> dict[str, str]:
         """Return the entries of the ``pam_experiment`` record that are known."""
         found = {PLANNED: _number(self.planned_s), REACHED: _number(self.reached_s),
-                 ENDED: self.ended, BECAUSE: ' '.join(self.because.split())}
+                 ENDED: self.ended, BECAUSE: ' '.join(self.because.split()),
+                 VENTS: ' '.join(self.vents.split())}
         return {key: text for key, text in found.items() if text}
 
 
@@ -91,7 +96,8 @@ def ending_of(metadata: Mapping[str, str] | None) -> Ending:
     ended = metadata.get(ENDED, '')
     return Ending(
         _seconds(metadata.get(PLANNED)), _seconds(metadata.get(REACHED)),
-        ended if ended in EARLY or ended == COMPLETE else '', metadata.get(BECAUSE, ''))
+        ended if ended in EARLY or ended == COMPLETE else '', metadata.get(BECAUSE, ''),
+        metadata.get(VENTS, ''))
 
 
 def early_sentences(runs: Iterable[Run]) -> list[str]:
@@ -119,6 +125,8 @@ class EndWatch:
         self._heard_ns: int | None = None
         self._elapsed_s: float | None = None
         self._vented: dict[str, tuple[float, str]] = {}      # driver: when [s], and why
+        # Driver: begin and length [s] of each vent that is over, and why.
+        self._vents: dict[str, list[tuple[float, float, str]]] = {}
         self._failed = ''
         self._over = self._finished = False
 
@@ -146,12 +154,23 @@ class EndWatch:
             self._failed = status.message       # it did not begin
 
     def _hear_driver(self, status: Status) -> None:
-        if status.level < LEVEL_ERROR:
-            self._vented.pop(status.name, None)
-        elif self._heard_ns is not None and status.name not in self._vented:
-            since_s = (status.stamp_ns - self._heard_ns) * 1e-9
-            self._vented[status.name] = (
-                max((self._elapsed_s or 0.0) + since_s, 0.0), status.message)
+        if self._heard_ns is None:
+            return
+        at_s = max((self._elapsed_s or 0.0) + (status.stamp_ns - self._heard_ns) * 1e-9, 0.0)
+        if status.level >= LEVEL_ERROR:
+            self._vented.setdefault(status.name, (at_s, status.message))
+        elif status.name in self._vented:
+            since_s, why = self._vented.pop(status.name)
+            self._vents.setdefault(status.name, []).append((since_s, at_s - since_s, why))
+
+    def _vents_in_words(self) -> str:
+        found = []
+        for name, vents in sorted(self._vents.items()):
+            first_s, _, why = vents[0]
+            often = 'once' if len(vents) == 1 else f'{len(vents)} times'
+            found.append(f'{name} vented {often}, {sum(one[1] for one in vents):.1f} s in all, '
+                         f'first at {first_s:.1f} s: {why}')
+        return '; '.join(found)
 
     def ending(self, planned_s: float | None, told: Ending | None = None) -> Ending:
         """
@@ -165,6 +184,9 @@ class EndWatch:
             What whoever ended the run knows; it goes before what was heard.
 
         """
+        return replace(self._ending(planned_s, told), vents=self._vents_in_words())
+
+    def _ending(self, planned_s: float | None, told: Ending | None) -> Ending:
         reached_s = self._elapsed_s
         if reached_s is not None and planned_s is not None:
             reached_s = planned_s if self._finished else min(reached_s, planned_s)

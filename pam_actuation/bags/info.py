@@ -167,8 +167,11 @@ def bag_info(path: StrPath, recover: bool = False, namespace: str | None = None,
     muscles = namespaces(bag)
     missing, notes = plausibility.missing_topics(muscles, experiment.get('valve', ''))
     remarks += missing
-    if ending_of(experiment).early:
-        remarks.append(ending_of(experiment).sentence)
+    ending = ending_of(experiment)
+    if ending.early:
+        remarks.append(ending.sentence)
+    if ending.vents:
+        remarks.append(f'In the run {ending.vents.rstrip(".")}.')
     start_ns, end_ns = _span(bag)
     return BagInfo(
         path=str(path), storage=bag.storage, size_bytes=_size(Path(path)), start_ns=start_ns,

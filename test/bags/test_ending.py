@@ -31,6 +31,7 @@ from pam_actuation.experiments.offline import simulate_experiment
 from pam_actuation.messages import Status
 from pam_sim import load_rig
 import pytest
+from sample_bag import write_bag
 
 TRACK = """\
 name: track
@@ -187,13 +188,15 @@ VENTED = said('valve_driver', 'vented because the reading is above the limit', 1
      Ending(8.0, 2.5, 'vented', 'vented because the reading is above the limit')),
     ((PLAYING, VENTED, said('valve_driver', 'following', 12.5),
       said('reference_generator', 'finished sine', 18.0, elapsed_s=8.0)),
-     Ending(8.0, 8.0, 'complete')),
+     Ending(8.0, 8.0, 'complete', vents='/muscle/valve_driver vented once, 0.5 s in all, first '
+            'at 2.5 s: vented because the reading is above the limit')),
     # Of a joint the driver of one muscle follows again, that of the other does not.
     ((PLAYING, said('flexor/valve_driver', 'vented', 12.0, 2),
       said('extensor/valve_driver', 'stopped', 11.0, 2),
       said('extensor/valve_driver', 'following', 12.5),
       said('reference_generator', 'finished sine', 18.0, elapsed_s=8.0)),
-     Ending(8.0, 2.5, 'vented', 'vented')),
+     Ending(8.0, 2.5, 'vented', 'vented', '/muscle/extensor/valve_driver vented once, 1.5 s in '
+            'all, first at 1.5 s: stopped')),
     ((PLAYING, said('reference_generator', 'the loop of this node failed: x', 13.0, 2)),
      Ending(8.0, 0.5, 'error', 'the loop of this node failed: x')),
     ((said('reference_generator', 'nothing is measured', 10.0, 2),),
@@ -218,3 +221,15 @@ def test_a_node_that_died_is_told_with_its_own_reason_if_it_said_one():
     assert watch(PLAYING).ending(8.0, told) == Ending(8.0, 0.5, 'error', told.because)
     failed = watch(said('reference_generator', 'nothing is measured', 10.0, 2))
     assert failed.ending(8.0, told) == Ending(8.0, 0.0, 'error', 'nothing is measured')
+
+
+def test_a_vent_in_the_run_is_a_remark(tmp_path):
+    again = [said('valve_driver', 'stale', 14.0, 2), said('valve_driver', 'following', 14.2)]
+    ending = watch(PLAYING, VENTED, said('valve_driver', 'following', 12.5), *again, said(
+        'reference_generator', 'finished sine', 18.0, elapsed_s=8.0)).ending(8.0)
+    info = bag_info(write_bag(tmp_path / 'bag', 50, metadata=ending.texts()))
+    assert info.ending == ending
+    words = ('In the run /muscle/valve_driver vented 2 times, 0.7 s in all, first at 2.5 s: '
+             'vented because the reading is above the limit.')
+    assert words in info.remarks and info.has_findings
+    assert 'Ran to its end' in render_text(info)
