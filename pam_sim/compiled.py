@@ -54,6 +54,9 @@ class Compiled(Protocol[P, R_co]):
     def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R_co:
         """Call the machine code."""
 
+    def __hash__(self) -> int:
+        """Return the number of a key: a cache may keep something for a function."""
+
 
 class Compiler(Protocol):
     """A decorator that compiles and leaves the signature as it is."""

@@ -25,8 +25,9 @@ from numpy.typing import ArrayLike
 from pam_sim.annotations import BoolArray, FloatArray
 from pam_sim.compiled import Compiled
 from pam_sim.errors import InputError
+from pam_sim.muscle.over_points import over_points
 from pam_sim.parameters import check_parameters, Parameter
-from pam_sim.records import record
+from pam_sim.records import record, values_of
 
 # The chapter's rules of PAM behaviour (section 4.1, after Daerden and Lefeber).
 RULES = {
@@ -87,7 +88,7 @@ class MuscleLaw:
     """
     Static force of a muscle against gauge pressure and contraction.
 
-    A subclass states the class attributes and ``_tension_n``.
+    A subclass states the class attributes; ``tension_n`` of its file is the formula.
 
     Parameters
     ----------
@@ -109,8 +110,10 @@ class MuscleLaw:
         Which of ``RULES`` the law claims.
     PACKED : numpy.dtype
         Record ``par`` of the compiled formula; by default of the parameters, by their names.
-    COMPILED, COMPILED_DAMPER : callable or None
-        ``tension_n(gauge_pa, strain, par)`` and, for a law with a damper,
+    COMPILED : callable
+        ``tension_n(gauge_pa, strain, par)`` of the file, for arrays as for a rig.
+    COMPILED_DAMPER : callable or None
+        For a law with a damper,
         ``damper_force_n(velocity_m_per_s, gauge_pa, strain, par)`` of the file; compiled, not
         clipped, with the values of :meth:`pack` in the record ``par``.
     EXTRAPOLATES : bool
@@ -131,8 +134,8 @@ class MuscleLaw:
     PARAMETERS: tuple[Parameter, ...] = ()
     SETS: dict[str, ParameterSet] = {'default': ParameterSet()}
     CLAIMS: tuple[int, ...] = ()
-    # The same formula for the compiled rig, put here by the registry from the law's file.
-    COMPILED: Compiled[..., float] | None = None
+    # Put here by the registry from the law's file.
+    COMPILED: Compiled[..., float]
     COMPILED_DAMPER: Compiled[..., float] | None = None
     EXTRAPOLATES = True
     PACKED = record()
@@ -186,7 +189,15 @@ class MuscleLaw:
 
     def _tension_n(self, pressure: FloatArray, strain: FloatArray) -> FloatArray:
         """Return the formula's value [N], negative where the muscle would push."""
-        raise NotImplementedError(f'{type(self).__name__} states no force')
+        pressure, strain = np.broadcast_arrays(pressure, strain)
+        force = np.empty(pressure.size)
+        over_points(type(self).COMPILED, type(self).PACKED)(
+            pressure.astype(float).ravel(), strain.astype(float).ravel(), self._packed_values(),
+            force)
+        return force.reshape(pressure.shape)
+
+    def _packed_values(self) -> FloatArray:
+        return values_of(self.PACKED, self.pack())
 
     def pack(self) -> Mapping[str, Any]:
         """Return what the record ``PACKED`` holds, by name."""

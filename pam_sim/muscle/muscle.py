@@ -287,7 +287,7 @@ def checked_law(choice: LawChoice, where: str = '', bore_m: float | None = None)
     Raises
     ------
     InputError
-        Unknown law, set or parameter, or a law without a compiled formula.
+        Unknown law, set or parameter.
 
     """
     if choice.table is not None:
@@ -296,9 +296,6 @@ def checked_law(choice: LawChoice, where: str = '', bore_m: float | None = None)
         chosen = choice.set if choice.set is not None or bore_m is None else (
             get_law(choice.name, where).set_for(bore_m, where))
         law = make_law(choice.name, choice.parameters or None, chosen, where)
-    if type(law).COMPILED is None:
-        raise InputError(f'law `{choice.name}` has no compiled `tension_n` in its file, so a rig '
-                         'cannot use it', where)
     return LawChoice(choice.name, law.muscle, dict(choice.parameters or {}), choice.table)
 
 

@@ -42,8 +42,8 @@ def laws() -> dict[str, type[MuscleLaw]]:
     Raises
     ------
     InputError
-        A file without ``LAW``, a name that is taken, a formula that is not compiled or has other
-        arguments, or a set named after a size without its bore.
+        A file without ``LAW`` or ``tension_n``, a name that is taken, a formula that is not
+        compiled or has other arguments, or a set named after a size without its bore.
 
     """
     found: dict[str, type[MuscleLaw]] = {}
@@ -54,7 +54,11 @@ def laws() -> dict[str, type[MuscleLaw]]:
         if not (isinstance(law, type) and issubclass(law, MuscleLaw)):
             raise InputError('defines no LAW, a subclass of MuscleLaw', str(path))
         check_name('law', law.NAME, path, places)
-        law.COMPILED = formula(module, 'tension_n', _POINT, path)
+        compiled = formula(module, 'tension_n', _POINT, path)
+        if compiled is None:
+            raise InputError(f'defines no `tension_n`; write `def tension_n({", ".join(_POINT)})` '
+                             'with `@compiled` above it', str(path))
+        law.COMPILED = compiled
         law.COMPILED_DAMPER = formula(
             module, 'damper_force_n', ('velocity_m_per_s', *_POINT), path)
         _check_bores(law, path)

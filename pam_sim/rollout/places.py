@@ -60,10 +60,9 @@ _FAST_LAW = 'sarosi'                        # of the nominal rig: no call is lef
 
 
 def law_codes() -> dict[str, float]:
-    """Return {law name: its number in ``par.law``} of the laws a rig can use, 0 the fast one."""
-    usable = [name for name, law in laws().items() if law.COMPILED is not None]
+    """Return {law name: its number in ``par.law``}, 0 the fast one."""
     return {name: float(code) for code, name in enumerate(
-        sorted(usable, key=lambda name: (name != _FAST_LAW, name)))}
+        sorted(laws(), key=lambda name: (name != _FAST_LAW, name)))}
 
 
 def load_codes() -> dict[str, float]:

@@ -166,11 +166,13 @@ def test_an_unknown_set_is_refused_with_those_there_are():
 
 def test_a_law_in_a_folder_of_the_user_is_registered_by_being_there(tmp_path, monkeypatch):
     (tmp_path / 'constant.py').write_text(
+        'from pam_sim.compiled import compiled\n'
         'from pam_sim.muscle.law import MuscleLaw\n\n\n'
+        '@compiled\n'
+        'def tension_n(gauge_pa, strain, par):\n'
+        '    return 7.0 + 0.0 * gauge_pa * strain\n\n\n'
         'class Constant(MuscleLaw):\n'
-        "    NAME = 'constant'\n\n"
-        '    def _tension_n(self, pressure, strain):\n'
-        '        return 7.0 + 0.0 * pressure * strain\n\n\n'
+        "    NAME = 'constant'\n\n\n"
         'LAW = Constant\n')
     monkeypatch.setenv('PAM_MUSCLE_LAWS_PATH', str(tmp_path))
     registry.laws.cache_clear()

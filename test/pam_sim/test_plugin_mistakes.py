@@ -54,8 +54,6 @@ class Line(MuscleLaw):
     NAME, FORMULA, SOURCE, EQUATION = "line", "F = a p", "test", "none"
     PARAMETERS = (Parameter("area_m2", "m^2", 2e-4, 1e-6, 1.0),)
     SETS = {"one": ParameterSet({}, "nothing")}
-    def _tension_n(self, pressure, strain):
-        return self.values["area_m2"] * pressure * (1.0 - strain / 0.2)
 LAW = Line
 """
 # All that is compiled, one after the other, as a simulation that failed does it.

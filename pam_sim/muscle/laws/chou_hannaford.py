@@ -107,10 +107,6 @@ class ChouHannaford(MuscleLaw):
     def _check(self, where: str) -> None:
         check_angle(self.values, where)
 
-    def _tension_n(self, pressure: FloatArray, strain: FloatArray) -> FloatArray:
-        area, a, b = shape(self.values)
-        return pressure * area * (a * (1.0 - strain) ** 2 - b)
-
     def pack(self) -> dict[str, Any]:
         """Return force per pressure [m^2], a and b."""
         return dict(zip(CYLINDER, shape(self.values)))

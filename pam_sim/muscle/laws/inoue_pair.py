@@ -78,11 +78,6 @@ class InouePair(MuscleLaw):
             raise InputError('`a` (1 - `middle_strain`)^2 must exceed `b`, or neither muscle '
                              'pulls in the middle', where)
 
-    def _tension_n(self, pressure: FloatArray, strain: FloatArray) -> FloatArray:
-        value = self.values
-        return pressure * value['diameter_m'] ** 2 * (
-            value['a'] * (1.0 - strain) ** 2 - value['b'])
-
     def pack(self) -> dict[str, Any]:
         """Return D^2 [m^2], a and b of the single muscle; its formula is that of eq. 4.6."""
         return {'area_m2': self.values['diameter_m'] ** 2, 'a': self.values['a'],

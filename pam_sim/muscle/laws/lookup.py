@@ -22,17 +22,15 @@ of the overshoot that would make a muscle lengthen under rising pressure.
 compute one from another law.
 """
 
-from collections.abc import Callable, Mapping
-import functools
+from collections.abc import Mapping
 from pathlib import Path
-import sys
 from typing import Any, TYPE_CHECKING
 import warnings
 
 import numpy as np
 from numpy.typing import ArrayLike
 from pam_sim.annotations import FloatArray
-from pam_sim.compiled import compiled, entry_point, source_key
+from pam_sim.compiled import compiled
 from pam_sim.errors import InputError
 from pam_sim.muscle.law import ExtrapolationWarning, MuscleLaw, OUTSIDE, ParameterSet, Validity
 from pam_sim.muscle.lookup_table import LookupTable, read_table
@@ -138,23 +136,6 @@ def tension_n(gauge_pa: float, strain: float, par: np.record) -> float:
     return hermite(y0, y1, slope0, slope1, h, (pressure - low.pressure_pa) / h)
 
 
-@functools.cache
-def _entry() -> Callable[[FloatArray, FloatArray, FloatArray, FloatArray], None]:
-    """Return the loop over points as a unit of compiled code; made where a table is used."""
-    key = source_key(sys.modules[__name__])
-
-    @entry_point
-    def fill_tension(gauge_pa: FloatArray, strain: FloatArray, values: FloatArray,
-                     force_n: FloatArray) -> None:
-        """Fill in F(eps, P) [N] of each point; ``values`` are those of ``Lookup.pack``."""
-        if key < 0:         # never; makes the key part of what is stored
-            return
-        par = part(values, 0, HEAD)
-        for i in range(force_n.size):
-            force_n[i] = tension_n(gauge_pa[i], strain[i], par)
-    return fill_tension
-
-
 def _isobar(strain: FloatArray, load: FloatArray) -> tuple[FloatArray, FloatArray]:
     """
     Return (strain ascending, load) of the points on which the muscle moves at one pressure.
@@ -255,13 +236,8 @@ class Lookup(MuscleLaw):
         inside = np.clip(strain, 0.0, eps[-1])
         return np.where(strain > eps[-1], 0.0, PchipInterpolator(eps, pull[first])(inside))
 
-    def _tension_n(self, pressure: FloatArray, strain: FloatArray) -> FloatArray:
-        pressure, strain = np.broadcast_arrays(pressure, strain)
-        force = np.empty(pressure.size)
-        # A rig asks thousands of times for few points, to which SciPy's surface is slow.
-        _entry()(pressure.astype(float).ravel(), strain.astype(float).ravel(), self._values,
-                 force)
-        return force.reshape(pressure.shape)
+    def _packed_values(self) -> FloatArray:
+        return self._values
 
     @staticmethod
     def _at(surface: 'RegularGridInterpolator', first: FloatArray,

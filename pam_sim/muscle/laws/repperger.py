@@ -134,11 +134,6 @@ class Repperger(MuscleLaw):
             value['b0_n_s_per_m'] + value['b1_n_s_per_m_pa'] * pressure,
             value['c0_n_s_per_m'] + value['c1_n_s_per_m_pa'] * pressure)
 
-    def _tension_n(self, pressure: FloatArray, strain: FloatArray) -> FloatArray:
-        x = strain * self.values['length_m']
-        return (self.values['f0_n'] + self.values['f1_n_per_pa'] * pressure
-                - self.spring_n_per_m(pressure, x) * x)
-
     def moving_force_n(self, pressure_gauge_pa: ArrayLike, strain: ArrayLike,
                        velocity_m_per_s: ArrayLike, outside: str = 'warn') -> FloatArray:
         """

@@ -128,6 +128,7 @@ class Sarosi(MuscleLaw):
                              'pulls; raise `a5_n_per_pa` or `a1_n_per_pa`', where)
 
     def _tension_n(self, pressure: FloatArray, strain: FloatArray) -> FloatArray:
+        # Arrays of the nominal rig are asked for often, also where numba is not loaded.
         a1, a2, a3, a4, a5, a6 = self.values.values()
         return ((a1 * pressure + a2) * np.exp(a3 * strain)
                 + (a4 * strain + a5) * pressure + a6)

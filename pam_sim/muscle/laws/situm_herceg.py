@@ -76,11 +76,6 @@ class SitumHerceg(MuscleLaw):
                 f'`shortest_length_m` is {self.values["shortest_length_m"]:g}; it must be below '
                 f'`length_m`, {self.values["length_m"]:g} m', where)
 
-    def _tension_n(self, pressure: FloatArray, strain: FloatArray) -> FloatArray:
-        length = self.values['length_m'] * (1.0 - strain)
-        return self.values['k_p_n_per_pa_m'] * pressure * (
-            length - self.values['shortest_length_m'])
-
     def pressure_rate_pa_per_s(self, signal_v: float, pressure_gauge_pa: float) -> float:
         """Return dp/dt [Pa/s] for a valve signal [V]: (Km u - p) / Tm; arrays broadcast."""
         return (self.values['k_m_pa_per_v'] * np.asarray(signal_v, float)

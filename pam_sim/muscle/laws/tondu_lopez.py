@@ -83,12 +83,6 @@ class TonduLopez(MuscleLaw):
         return self.values['k0'] + self.values['k_rise'] * np.exp(
             -np.asarray(pressure_gauge_pa, float) / self.values['k_pressure_pa'])
 
-    def _tension_n(self, pressure: FloatArray, strain: FloatArray) -> FloatArray:
-        area, a, b = shape(self.values)
-        # Beyond k eps = 1 the square would rise again; there the muscle has long stopped pulling.
-        left = np.maximum(0.0, 1.0 - self.k(pressure) * strain)
-        return pressure * area * (a * left ** 2 - b)
-
     def pack(self) -> dict[str, Any]:
         """Return force per pressure [m^2], a, b, k0, k_rise and 1 / k_pressure [1/Pa]."""
         value = self.values
