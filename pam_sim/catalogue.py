@@ -29,9 +29,10 @@ from pam_sim.effects.registry import effects
 from pam_sim.joint import joint_preset_names, load_joint, parameters as joint
 from pam_sim.load import LOADS
 from pam_sim.model_file import load_rig, preset_names
-from pam_sim.muscle.law import MuscleLaw, RULES
+from pam_sim.muscle.law import MuscleLaw
 from pam_sim.muscle.muscle import DIMENSIONS, get_muscle, muscle_names, MUSCLE_PARAMETERS
 from pam_sim.muscle.registry import laws
+from pam_sim.muscle.rules import RULES
 from pam_sim.parameters import Parameter
 from pam_sim.plugins import pick
 from pam_sim.rig import Rig

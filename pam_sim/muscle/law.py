@@ -26,19 +26,12 @@ from pam_sim.annotations import BoolArray, FloatArray
 from pam_sim.compiled import Compiled
 from pam_sim.errors import InputError
 from pam_sim.muscle.over_points import over_points
+from pam_sim.muscle.rules import check_rules, MAX_STRAIN, MIN_STRAIN
 from pam_sim.parameters import check_parameters, Parameter
 from pam_sim.records import record, values_of
 
-# The chapter's rules of PAM behaviour (section 4.1, after Daerden and Lefeber).
-RULES = {
-    1: 'Contraction goes with an increasing volume.',
-    2: 'At constant load, more pressure means more contraction.',
-    3: 'At constant pressure, less load means more contraction.',
-    4: 'Contraction has an upper limit, where the muscle pulls with zero force.',
-}
 OUTSIDE = ('warn', 'refuse', 'allow')
 BORE_FITS = 1.5              # factor between the bores of a muscle and of a set that fits it
-MIN_STRAIN, MAX_STRAIN = -0.1, 0.9      # beyond these a length is a mistake, not a muscle
 
 
 class ExtrapolationWarning(UserWarning):
@@ -107,7 +100,7 @@ class MuscleLaw:
     SETS : dict
         Set name to ParameterSet.
     CLAIMS : tuple of int
-        Which of ``RULES`` the law claims.
+        Which of ``rules.RULES`` the law claims.
     PACKED : numpy.dtype
         Record ``par`` of the compiled formula; by default of the parameters, by their names.
     COMPILED : callable
@@ -157,7 +150,8 @@ class MuscleLaw:
         own = {} if values is None else values
         check_parameters(self.PARAMETERS, own, f'parameter of `{self.NAME}`', where)
         self.values = check_parameters(
-            self.PARAMETERS, {**self.SETS[muscle].values, **own}, where=where)
+            self.PARAMETERS, {**self.SETS[muscle].values, **own}, f'parameter of set `{muscle}`',
+            where)
         self._check(where)
 
     @classmethod
@@ -185,7 +179,8 @@ class MuscleLaw:
         return nearest
 
     def _check(self, where: str) -> None:
-        """Raise InputError where the parameters together make no muscle."""
+        """Raise InputError where the parameters together make no muscle; the rules are tried."""
+        check_rules(self, where)
 
     def _tension_n(self, pressure: FloatArray, strain: FloatArray) -> FloatArray:
         """Return the formula's value [N], negative where the muscle would push."""

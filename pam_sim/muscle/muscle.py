@@ -168,7 +168,7 @@ class Muscle:
         """Largest fall of the tension with contraction up to 600 kPa, N/m: how short to step."""
         strain = np.linspace(0.0, self.max_strain, 51)
         force = self.law.law.force_n(np.array([[200e3], [400e3], [600e3]]), strain, 'allow')
-        return float(np.max(-np.diff(force)) / (strain[1] * self.length_m))
+        return max(0.0, float(np.max(-np.diff(force)) / (strain[1] * self.length_m)))
 
     def volume_m3(self, contraction_m: Number) -> Number:
         """Return the inner volume [m^3] at a contraction [m]; scalar or array."""

@@ -20,12 +20,15 @@ from pathlib import Path
 import re
 from typing import Any
 
+import numpy as np
 from pam_sim.errors import InputError
 from pam_sim.muscle.law import MuscleLaw
+from pam_sim.muscle.rules import at, check_rules, formula_at, grid
 from pam_sim.plugins import check_name, formula, pick, plugin_files, plugin_module
 
 _OWN_FOLDER = Path(__file__).parent / 'laws'
 _POINT = 'gauge_pa', 'strain', 'par'
+_ALIKE = 1e-9               # of the largest force: what two ways to calculate differ by
 _SIZE_IN_NAME = re.compile(r'dmsp_(\d+)(?:_|$)')
 
 
@@ -43,7 +46,8 @@ def laws() -> dict[str, type[MuscleLaw]]:
     ------
     InputError
         A file without ``LAW`` or ``tension_n``, a name that is taken, a formula that is not
-        compiled or has other arguments, or a set named after a size without its bore.
+        compiled or has other arguments, a set named after a size without its bore, or one with
+        which the law breaks a rule it claims.
 
     """
     found: dict[str, type[MuscleLaw]] = {}
@@ -62,6 +66,8 @@ def laws() -> dict[str, type[MuscleLaw]]:
         law.COMPILED_DAMPER = formula(
             module, 'damper_force_n', ('velocity_m_per_s', *_POINT), path)
         _check_bores(law, path)
+        if path.parent != _OWN_FOLDER:
+            _check_sets(law, path)
         places[law.NAME] = path
         found[law.NAME] = law
     return found
@@ -76,6 +82,29 @@ def _check_bores(law: type[MuscleLaw], path: Path) -> None:
                 f'the set `{name}` is named after a muscle of {size[1]} mm and has bore_m = '
                 f'{one.bore_m:g}; write bore_m={1e-3 * int(size[1]):g} or give it another name',
                 str(path))
+
+
+def _check_sets(law: type[MuscleLaw], path: Path) -> None:
+    """Refuse a law that breaks with one of its sets; the tests do this with our own."""
+    if law.__init__ is MuscleLaw.__init__:      # a law of another making may need a table
+        for name in law.SETS:
+            one = law(None, name, str(path))
+            check_rules(one, str(path))
+            _check_array(one, path)
+
+
+def _check_array(law: MuscleLaw, path: Path) -> None:
+    """Refuse a law whose class calculates arrays in a way of its own that gives something else."""
+    if type(law)._tension_n is MuscleLaw._tension_n:
+        return
+    pressure, strain = grid(law)
+    force = formula_at(law, pressure, strain)
+    own = np.broadcast_to(law._tension_n(pressure[:, np.newaxis], strain), force.shape)
+    for i, k in np.argwhere(~(np.abs(own - force) <= _ALIKE * np.abs(force).max())):
+        raise InputError(
+            f'law `{law.NAME}` (set `{law.muscle}`) has two formulas: '
+            f'{at(pressure[i], strain[k])} `tension_n` gives {force[i, k]:g} N and `_tension_n` '
+            f'of the class {own[i, k]:g} N; leave out `_tension_n`', str(path))
 
 
 def get_law(name: str, where: str = '') -> type[MuscleLaw]:

@@ -17,9 +17,10 @@
 from hypothesis import assume, given, HealthCheck, settings, strategies as st
 import numpy as np
 from pam_sim.errors import InputError
-from pam_sim.muscle.law import RULES
+
 from pam_sim.muscle.lookup_table import table_from_law
 from pam_sim.muscle.registry import get_law, laws, make_law
+from pam_sim.muscle.rules import RULES
 from pam_sim.units import absolute_pa, GAS_CONSTANT_AIR, TEMPERATURE_K
 import pytest
 

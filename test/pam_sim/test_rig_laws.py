@@ -14,7 +14,9 @@
 
 """Every muscle law and size in a rig: the compiled formula, statics, model files, refusals."""
 
+from dataclasses import replace
 import os
+import re
 import subprocess
 import sys
 
@@ -26,6 +28,7 @@ from pam_sim.muscle.law import ExtrapolationWarning
 from pam_sim.muscle.lookup_table import table_from_law
 from pam_sim.muscle.muscle import get_muscle, LawChoice, muscle_names
 from pam_sim.muscle.registry import get_law, laws, make_law
+from pam_sim.muscle.rules import check_rules
 from pam_sim.records import fields, values_of
 from pam_sim.units import P_ATM_PA
 import pytest
@@ -276,6 +279,26 @@ def test_a_law_in_a_folder_of_the_user_moves_a_rig(tmp_path):
      'the set `dmsp_5_300` is named after a muscle of 5 mm and has bore_m = 0; write bore_m='),
     ("'one': ParameterSet({},", "'dmsp_10': ParameterSet({}, bore_m=0.02, rests_on=", 'linear',
      'of 10 mm and has bore_m = 0.02; write bore_m=0.01 or give it another name'),
+    ('CLAIMS = (2, 3, 4)', 'CLAIMS = (2, 7)', 'linear', 'claims rule 7; allowed 1, 2, 3, 4'),
+    ('CLAIMS = (2, 3, 4)', 'CLAIMS = (1,)', 'linear', 'it has no method `volume_m3'),
+    ('gauge_pa * (1.0 - strain', '(7e5 - gauge_pa) * (1.0 - strain', 'linear',
+     'claims rule 2 .* and breaks it: the force does not grow with pressure at 30000 Pa gauge '
+     'and contraction 0, 134 N, but is 105.5 N above it'),
+    ('1.0 - strain', '1.0 + strain', 'linear',
+     'claims rule 3 .* the force does not fall with contraction at 30000 Pa gauge and '
+     'contraction 0, 6 N, but is 6.9375 N at 0.03125'),
+    ('(1.0 - strain / 0.2)', '(1.0 - strain / 0.26) ** 2', 'linear',
+     'claims rule 4 .* the force returns: at 30000 Pa gauge and contraction'),
+    ('(1.0 - strain / 0.2)', '(2.0 - strain)', 'linear',
+     'claims rule 4 .* the force never ends; at 30000 Pa gauge and contraction 0.9 it is 6.6 N'),
+    ('strain / 0.2)', '(strain - 0.125) / 0.0)', 'linear',
+     'has the force inf N at 30000 Pa gauge and contraction 0; a force must be finite'),
+    ('ParameterSet({}', "ParameterSet({'area': 1.0}", 'linear',
+     'unknown parameter of set `one` `area`; allowed: a_m2'),
+    ('    CLAIMS', '    def _tension_n(self, pressure, strain):\n'
+     '        return 3e-4 * pressure * (1.0 - strain / 0.2)\n    CLAIMS', 'linear',
+     'has two formulas: at 30000 Pa gauge and contraction 0 `tension_n` gives 6 N and '
+     '`_tension_n` of the class 9 N; leave out `_tension_n`'),
     ("'linear'", "'sarosi'", 'sarosi', r'`sarosi` is taken by .*/laws/sarosi\.py; give the law'),
     ("'linear'", "'my law'", 'my law', '`my law` is no name of Python'),
     ("'linear'", "'bent'", 'linear', 'defines the law `bent`, which must be defined in a')])
@@ -292,3 +315,29 @@ def test_a_wrong_file_is_refused_in_one_sentence(
     finally:
         monkeypatch.undo()
         laws.cache_clear()
+
+
+@pytest.mark.parametrize('name, chosen', CHOICES)
+def test_our_own_laws_keep_their_rules_on_the_grid_too(name, chosen):
+    check_rules(make_law(name, muscle=chosen), name)
+
+
+def test_numbers_of_a_rig_that_break_a_rule_are_refused_with_the_line(tmp_path):
+    text = LAW.replace('SETS = {', "PARAMETERS += (Parameter('end', '-', 0.2, -1.0, 1.0),)\n"
+                       "    SETS = {").replace('strain / 0.2', 'strain / par.end')
+    (tmp_path / 'linear.py').write_text(text)
+    answer = subprocess.run(
+        [sys.executable, '-c', 'from pam_sim import load_rig\n'
+         'load_rig("rig: dmsp_5_300_hanging_mass\\n'
+         'law: {name: linear, parameters: {end: -0.5}}\\n")'],
+        capture_output=True, text=True,
+        env={**os.environ, 'PAM_MUSCLE_LAWS_PATH': str(tmp_path),
+             'PYTHONPATH': os.pathsep.join(sys.path)})
+    assert re.search(r':2: law `linear` \(set `one`\) claims rule 3 .* the force does not fall',
+                     answer.stderr), answer.stderr
+
+
+def test_a_muscle_whose_force_only_grows_has_no_stiffness(monkeypatch):
+    law = make_law('situm_herceg')
+    monkeypatch.setattr(type(law), '_tension_n', lambda self, p, e: p * e)
+    assert replace(get_muscle('dmsp_5_300'), law=LawChoice('situm_herceg')).stiffness_n_per_m == 0
