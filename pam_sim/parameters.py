@@ -19,10 +19,9 @@ from dataclasses import dataclass
 import math
 from typing import Any, SupportsFloat
 
+from pam_sim.declared import check_fields, shown
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.units import allowed_range
-
-_LONGEST_SHOWN = 60
 
 
 @dataclass(frozen=True)
@@ -49,6 +48,11 @@ class Parameter:
     choices : tuple of str
         The texts allowed; empty: any.
 
+    Raises
+    ------
+    InputError
+        A text, number or tuple that is something else, or a number out of its own range.
+
     """
 
     name: str
@@ -60,6 +64,14 @@ class Parameter:
     description: str = ''
     source: str = ''
     choices: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse what no file could state: a wrong order of the fields, a default out of range."""
+        check_fields(self, f'parameter `{self.name}`')
+        default = self.default
+        if (isinstance(default, (int, float)) and not isinstance(default, bool)
+                and not self.lower <= default <= self.upper):
+            raise InputError(f'`{self.name}` is {default:g} by default; allowed {self.allowed}')
 
     @property
     def bounded(self) -> bool:
@@ -83,7 +95,7 @@ class Parameter:
         """
         # Plain numbers first: to ask a protocol takes longer than all the rest of the check.
         if isinstance(value, bool) or not isinstance(value, (int, float, SupportsFloat)):
-            raise InputError(f'`{self.name}` must be a number, not {_shown(value)}; '
+            raise InputError(f'`{self.name}` must be a number, not {shown(value)}; '
                              f'allowed {self.allowed}', where)
         try:
             number = float(value)
@@ -141,9 +153,3 @@ def check_parameters(
     known = tuple(parameters)
     return {**{parameter.name: parameter.default for parameter in known},
             **check_given(known, values, what, where)}
-
-
-def _shown(value: object) -> str:
-    """Return a value of any size as a short piece of one sentence."""
-    text = repr(value)
-    return text if len(text) <= _LONGEST_SHOWN else f'{text[:_LONGEST_SHOWN]}...'

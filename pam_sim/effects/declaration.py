@@ -18,6 +18,7 @@ from collections.abc import Iterable, Iterator, Mapping
 import math
 from typing import TYPE_CHECKING
 
+from pam_sim.declared import check_fields
 from pam_sim.effects.fitting import (
     FreeParameter, OTHER_CHANGE, SENSOR_CHANGES, SENSOR_SIGNALS)
 from pam_sim.errors import did_you_mean, InputError
@@ -41,6 +42,7 @@ def check_declaration(effect: 'Effect') -> None:
         The sentence names the effect, what is wrong and what is allowed.
 
     """
+    check_fields(effect, f'effect `{effect.name}`')
     for problem in _problems(effect):
         raise InputError(f'effect `{effect.name}` {problem}')
 
@@ -106,10 +108,6 @@ def _problems(effect: 'Effect') -> Iterator[str]:
                    f'{", ".join(known)}')
     yield from _of_sensor(effect)
     whole = {parameter.name: parameter for parameter in effect.parameters}
-    for parameter in effect.parameters:
-        if not parameter.lower <= parameter.default <= parameter.upper:
-            yield (f'has the nominal {parameter.name} = {parameter.default:g}; allowed '
-                   f'{parameter.allowed}')
     for free in fitting.free:
         yield from _of_valves(free.valves, f' for `{free.name}`')
     for valve in effect.valves:

@@ -18,6 +18,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 import math
 
+from pam_sim.declared import check_fields
 from pam_sim.valve import VALVES
 
 # What comes this late in quick motion is not a multiple of what comes a little late.
@@ -60,6 +61,10 @@ class FreeParameter:
     starts: tuple[float, ...] = ()
     ends: tuple[str, ...] = ('lower', 'upper')
     valves: tuple[str, ...] = VALVES
+
+    def __post_init__(self) -> None:
+        """Refuse what is no text, number or tuple where one is needed."""
+        check_fields(self, f'free parameter `{self.name}`')
 
     def value(self, coordinate: float) -> float:
         """Return the value of a normalised coordinate, kept within the range."""
@@ -125,3 +130,7 @@ class Fitting:
     sensor_change: str = ''
     sensor_parameter: str = ''
     is_limit: Callable[[Mapping[str, float]], bool] | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what is no text or tuple where one is needed."""
+        check_fields(self, 'fitting')

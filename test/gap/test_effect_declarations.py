@@ -108,8 +108,10 @@ def test_a_range_that_cannot_be_fitted_is_refused(free, sentence):
 
 
 @pytest.mark.parametrize('changed, sentence', [
-    ({'parameters': (Parameter('force_n', 'N', 3.0, 0.0, 2.0),)},
-     'has the nominal force_n = 3; allowed 0 to 2 N'),
+    ({'amplitude': 'force_n'}, "has amplitude = 'force_n'; write a tuple, amplitude=('x',) or"),
+    ({'parameters': (('force_n', 'N'),)}, "has ('force_n', 'N') in parameters; write Parameter("),
+    ({'relative_of': (1,)}, "has 1 in relative_of; write a text, '...'"),
+    ({'order': 'first'}, "has order = 'first'; write a whole number"),
     ({'parameters': (Parameter('force_n', 'N', 1.0, 0.0, 2.0),) * 2},
      'has two parameters of one name'),
     ({'parameters': (Parameter('force_n', 'N', 0.0),)}, 'with the typical size inf; write'),
@@ -117,6 +119,17 @@ def test_a_range_that_cannot_be_fitted_is_refused(free, sentence):
 def test_numbers_without_a_range_and_unknown_valves_are_refused(changed, sentence):
     with pytest.raises(InputError) as caught:
         made_up(**changed)
+    assert sentence in caught.value.problem
+
+
+@pytest.mark.parametrize('one, given, sentence', [
+    (Fitting, {'limits': 'creep'}, "fitting has limits = 'creep'; write a tuple, limits=('x',)"),
+    (Fitting, {'remembers': 'no'}, "fitting has remembers = 'no'; write True or False"),
+    (FreeParameter, {'name': 'force_n', 'typical': '1', 'lower': 0.0, 'upper': 2.0},
+     "free parameter `force_n` has typical = '1'; write a number")])
+def test_what_a_fit_needs_is_of_the_kind_that_it_states(one, given, sentence):
+    with pytest.raises(InputError) as caught:
+        one(**given)
     assert sentence in caught.value.problem
 
 

@@ -1,0 +1,73 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Declarations in files of effects, laws and settings hold what their fields are for."""
+
+import dataclasses
+import functools
+import numbers
+from typing import Any, get_args, get_origin
+
+from pam_sim.errors import InputError
+
+_LONGEST_SHOWN = 60
+_KINDS: dict[Any, tuple[Any, str]] = {
+    str: (str, "a text, '...'"), float: (numbers.Real, 'a number'),
+    int: (numbers.Integral, 'a whole number'), bool: (bool, 'True or False'),
+    tuple: (tuple, "a tuple, {0}=('x',) or {0}=()")}
+
+
+def check_fields(one: Any, called: str) -> None:
+    """
+    Refuse a dataclass whose texts, numbers or tuples are something else.
+
+    Parameters
+    ----------
+    one : dataclass
+        A declaration.
+    called : str
+        What it is, for the message: ``parameter `mass_kg```.
+
+    Raises
+    ------
+    InputError
+        The sentence names the field, what stands there and what is needed.
+
+    """
+    for name, kind, told, inner in _wanted(one.__class__):
+        value: Any = getattr(one, name)
+        if not isinstance(value, kind):
+            raise InputError(f'{called} has {name} = {shown(value)}; write {told}')
+        for element in value if kind is tuple else ():
+            if not isinstance(element, inner):
+                form = _KINDS[inner][1] if inner in _KINDS else f'{inner.__name__}(...)'
+                raise InputError(f'{called} has {shown(element)} in {name}; write {form}')
+
+
+@functools.cache
+def _wanted(cls: Any) -> list[tuple[str, Any, str, Any]]:
+    """Return (field, what its value is, how that is written, what is in a tuple)."""
+    found = []
+    for item in dataclasses.fields(cls):
+        kind, told = _KINDS.get(get_origin(item.type) or item.type, (object, ''))
+        inner = next(iter(get_args(item.type)), object) if kind is tuple else object
+        if kind is not object:
+            found.append((item.name, kind, told.format(item.name), inner))
+    return found
+
+
+def shown(value: object) -> str:
+    """Return a value of any size as a short piece of one sentence."""
+    text = repr(value)
+    return text if len(text) <= _LONGEST_SHOWN else f'{text[:_LONGEST_SHOWN]}...'
