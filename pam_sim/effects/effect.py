@@ -22,6 +22,7 @@ import numpy as np
 from pam_sim.annotations import FloatArray
 from pam_sim.effects.declaration import check_declaration
 from pam_sim.effects.fitting import Fitting, FreeParameter
+from pam_sim.errors import InputError
 from pam_sim.parameters import check_parameters, Parameter
 from pam_sim.records import put, put_some, record
 from pam_sim.valve import VALVES
@@ -95,6 +96,17 @@ def _size_of(parameter: Parameter) -> float:
     """Return a size from which a fit begins, within the range."""
     size: float = abs(parameter.default) or 1e-3 * max(abs(parameter.lower), abs(parameter.upper))
     return size if size <= parameter.upper else -size
+
+
+def _check_start(effect: 'Effect') -> None:
+    """Refuse a state that is a pressure and would begin in a vacuum."""
+    names = () if effect.states is None else effect.states.names or ()
+    for name in names if effect.initial is _at_zero else ():
+        if name.endswith('_pa'):
+            raise InputError(
+                f'effect `{effect.name}` has the state `{name}` and no `initial`, so it would '
+                f'begin at 0 Pa, in a vacuum; write initial=lambda values, numbers: '
+                f"{{'{name}': numbers.pressure_pa}}, or what else it is at the start")
 
 
 _BY_PARAMETERS = np.dtype([])     # stands for the record of the parameters
@@ -172,11 +184,13 @@ class Effect:
         Raises
         ------
         InputError
-            A name that numpy uses, or what :mod:`pam_sim.effects.declaration` refuses: unknown
-            words, no amplitude, what is no parameter, a range that cannot be fitted.
+            A name that numpy uses, a pressure that would begin in a vacuum, or what
+            :mod:`pam_sim.effects.declaration` refuses: unknown words, no amplitude, what is no
+            parameter, a range that cannot be fitted.
 
         """
         check_declaration(self)
+        _check_start(self)
         record(self.name)       # all effects stand in one record
         if self.packed is _BY_PARAMETERS:
             object.__setattr__(self, 'packed', record(*(p.name for p in self.parameters)))

@@ -24,6 +24,7 @@ from pam_sim.effects.registry import effects
 from pam_sim.errors import InputError
 import pam_sim.gap
 from pam_sim.parameters import Parameter
+from pam_sim.records import record
 import pytest
 
 FOLDER = Path(pam_sim.gap.__file__).parent
@@ -131,6 +132,17 @@ def test_what_a_fit_needs_is_of_the_kind_that_it_states(one, given, sentence):
     with pytest.raises(InputError) as caught:
         one(**given)
     assert sentence in caught.value.problem
+
+
+def test_a_state_that_is_a_pressure_says_where_it_begins():
+    with pytest.raises(InputError) as caught:
+        made_up(states=record('count', 'pilot_pa'))
+    assert caught.value.problem.startswith(
+        'effect `made_up` has the state `pilot_pa` and no `initial`, so it would begin at 0 Pa, '
+        "in a vacuum; write initial=lambda values, numbers: {'pilot_pa': numbers.pressure_pa}")
+    assert made_up(states=record('pilot_pa'),
+                   initial=lambda values, numbers: {'pilot_pa': numbers.pressure_pa})
+    assert made_up(states=record('bending_m'))
 
 
 @pytest.mark.parametrize('default, typical', [(1.0, 1.0), (-1.0, 1.0), (-4.0, -4.0), (0.0, 5e-3)])
