@@ -44,7 +44,7 @@ from pam_sim.rig import Rig
 NOT_GRADUAL = ('flow_limit', 'supply_droop')
 SEEN_FLOORS2 = 1.5           # mean squared error from which on something is missing
 LASTING = SHORT_S * RATE_HZ  # samples that errors stay alike, from which on the same
-MATTERS_FLOORS2 = 0.1        # what an effect moves from which on its formulations are tried
+MATTERS_FLOORS2 = 0.1        # the same of what lasts, and of what an effect moves to be tried
 TRIED = 3                    # effects of which they are
 SHAPE_SD = 1.0               # of the logarithm of a shape
 SMALL = 0.3                  # start of a size that the other formulation does not have
@@ -57,10 +57,12 @@ def is_incomplete(weighted: Weighted, x: FloatArray) -> bool:
     Tell whether a fitted model leaves more than noise in some signal.
 
     An effect smaller than the noise shows by its memory. What is left then stays alike for many
-    samples. Noise of the averaged pressure does not last that long.
+    samples. Noise of the averaged pressure does not last that long. What a recording without noise
+    leaves stays alike too; far below the noise it says nothing.
     """
-    return any(square > SEEN_FLOORS2 for _, _, square in weighted.mean_squares(x)) or any(
-        memory > LASTING for memory in weighted.memories(x))
+    squares = [square for _, _, square in weighted.mean_squares(x)]
+    return any(square > SEEN_FLOORS2 or square > MATTERS_FLOORS2 and memory > LASTING
+               for square, memory in zip(squares, weighted.memories(x)))
 
 
 def possible_effects(rig: Rig, problems: Sequence[SubsystemProblem], numbers: Sequence[Number]

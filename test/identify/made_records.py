@@ -25,7 +25,7 @@ RIG = load_rig('dmsp_5_300_hanging_mass')
 
 
 def record(rig, gauge_pa=STAIRS_PA, hold_s=0.8, keep=('pressure', 'contraction', 'force'),
-           command=True, zero_pa=0.0, seed=1, voltage=None):
+           command=True, zero_pa=0.0, seed=1, voltage=None, noise=1.0):
     """Return what the sensors of a rig behind a regulator record at 200 Hz."""
     if voltage is None:
         voltage = np.repeat(np.array(gauge_pa) / RIG.parameters['K_m'], int(1000 * hold_s))
@@ -37,7 +37,7 @@ def record(rig, gauge_pa=STAIRS_PA, hold_s=0.8, keep=('pressure', 'contraction',
         key, sd, unit = NOISE[name]
         clean = np.array(getattr(response, key))[::5]
         clean += zero_pa if name == 'pressure' else 0.0
-        topics[name] = Series(stamp, {key: clean + sd * random.standard_normal(clean.size)},
+        topics[name] = Series(stamp, {key: clean + noise * sd * random.standard_normal(clean.size)},
                               {key: unit})
     if command:
         topics['valve_signal'] = Series(

@@ -146,6 +146,11 @@ def test_a_missing_effect_widens_the_intervals_and_is_said():
     assert inside(found['mass_kg'], 3.3)
 
 
+def test_nothing_is_missing_where_far_less_than_the_noise_is_left():
+    found = identify(record(RIG, hold_s=2.0, noise=0.0), RIG, ['mass_kg'])
+    assert not found.incomplete and inside(found['mass_kg'], 5.0)
+
+
 def test_a_stiffness_of_the_muscle_counts_as_spring_where_no_force_is_measured():
     rig = RIG.with_(effects=[spring(400.0), {'name': 'valve_dead_time'}])
     found = identify(record(rig, hold_s=0.5, keep=('pressure', 'contraction')), RIG,
