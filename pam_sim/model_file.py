@@ -68,6 +68,7 @@ EFFECT_KEYS = (
         otherwise='none'),
 )
 _PRESETS = NamedFiles('presets')
+_EFFECTS_FORM = 'write `effects: [{name: NAME, parameters: {NUMBER: VALUE}}]`'
 
 
 def preset_names() -> list[str]:
@@ -183,12 +184,16 @@ def _check_made_of(data: Located) -> None:
 def _effects(data: Located, base: Rig) -> list[EffectSetting]:
     """Return the base's effects with those of the file added; the file wins on equal names."""
     settings = {item.name: item for item in base.effects}
-    listed: LocatedList = data.get('effects', list) or LocatedList()
+    given = data.get('effects')
+    if given is not None and not isinstance(given, LocatedList):
+        raise data.error(f'`effects` must be a list; {_EFFECTS_FORM}', 'effects')
+    listed: LocatedList = given or LocatedList()
     stated: set[str] = set()
     for index, item in enumerate(listed):
         if not isinstance(item, Located):
-            raise InputError('an effect is a mapping with `name` and `parameters`',
-                             listed.where(index))
+            raise InputError(f'an effect is a mapping; {_EFFECTS_FORM}', listed.where(index))
+        if len(item) == 1 and next(iter(item)) in all_effects():
+            raise item.error(f'an effect states its name under `name`; {_EFFECTS_FORM}')
         item.check_keys(names_of(EFFECT_KEYS))
         name = item.require('name', str)
         beside = Path(data.name).parent / f'{name}.py'
@@ -200,9 +205,9 @@ def _effects(data: Located, base: Rig) -> list[EffectSetting]:
         if name in stated:
             raise item.error(f'effect `{name}` is listed twice', 'name')
         stated.add(name)
-        given = item.get('parameters', dict) if item.get('parameters') is not None else {}
+        values = item.get('parameters', dict) if item.get('parameters') is not None else {}
         origin = item.get('source')
         origin = origin.plain() if isinstance(origin, Located) else (
             {} if origin is None else {'note': origin})
-        settings[name] = EffectSetting(name, effect.values(given), origin)
+        settings[name] = EffectSetting(name, effect.values(values), origin)
     return list(settings.values())

@@ -19,9 +19,13 @@ A folder of this package and the folders an environment variable names are searc
 a module is a plug-in by being there.
 """
 
-from collections.abc import Mapping
+import builtins
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+import dis
 import importlib
 import importlib.util
+from itertools import pairwise
 import keyword
 import os
 from pathlib import Path
@@ -30,7 +34,9 @@ import traceback
 from types import ModuleType
 from typing import Any, TypeVar
 
-from pam_sim.compiled import Compiled, is_compiled, named_arguments
+import numpy as np
+from pam_sim.compiled import Compiled, interpreted, is_compiled, named_arguments
+from pam_sim.declared import shown
 from pam_sim.errors import did_you_mean, InputError
 
 T = TypeVar('T')
@@ -85,19 +91,44 @@ def plugin_module(path: Path, own_folder: Path, package: str, prefix: str) -> Mo
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     try:
-        spec.loader.exec_module(module)
-    except Exception as error:      # whatever the code of somebody else raises
+        with told_with_place(path, 'cannot be loaded'):
+            spec.loader.exec_module(module)
+    except InputError:
         del sys.modules[name]
+        raise
+    return module
+
+
+@contextmanager
+def told_with_place(path: str | Path, problem: str) -> Iterator[None]:
+    """
+    Tell what code of a plug-in raises in one sentence with file and line.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file of the plug-in.
+    problem : str
+        What failed, such as ``cannot be loaded``.
+
+    Raises
+    ------
+    InputError
+        For any error.
+
+    """
+    try:
+        yield
+    except Exception as error:      # whatever the code of somebody else raises
+        lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__)
+                 if frame.filename == os.path.abspath(path)]
+        place = ':'.join(map(str, [path, *lines[-1:]]))
         if isinstance(error, InputError):
-            raise InputError(error.problem, error.where or path) from error
+            raise InputError(error.problem, error.where or place) from error
         if isinstance(error, SyntaxError):
             raise InputError(f'is not valid Python: {error.msg}',
                              f'{error.filename}:{error.lineno}') from error
-        lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__)
-                 if frame.filename == os.path.abspath(path)]
-        raise InputError(f'cannot be loaded: {type(error).__name__}: {error}',
-                         ':'.join(map(str, [path, *lines[-1:]]))) from error
-    return module
+        raise InputError(f'{problem}: {type(error).__name__}: {error}', place) from error
 
 
 def check_name(what: str, name: str, path: Path, taken: Mapping[str, Path]) -> None:
@@ -132,8 +163,92 @@ def check_name(what: str, name: str, path: Path, taken: Mapping[str, Path]) -> N
                          'file another name', str(path))
 
 
+def check_stated(holder: object, kinds: Mapping[str, tuple[type, str]], path: Path) -> None:
+    """
+    Refuse a module or class that states something else than what is needed.
+
+    Parameters
+    ----------
+    holder : module or class
+        With the names.
+    kinds : mapping
+        Name to its type and how it is written.
+    path : Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        The sentence says what stands there.
+
+    """
+    for name, (kind, form) in kinds.items():
+        value = getattr(holder, name)
+        if not isinstance(value, kind):
+            raise InputError(f'states {name} = {shown(value)}; write {form}', str(path))
+
+
+def check_function(what: str, function: Callable[..., Any], returns: tuple[str, ...],
+                   records: Mapping[str, np.dtype[Any]], path: str | Path) -> None:
+    """
+    Refuse a compiled function with a mistake that can be seen without the compiler.
+
+    Parameters
+    ----------
+    what : str
+        What it is, for the message.
+    function : callable
+        One that is compiled.
+    returns : tuple of str
+        What it returns; empty where that is nothing.
+    records : mapping
+        Record of each argument that is one.
+    path : Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        It uses a name that nothing defines, reads a number that a record has not, or returns
+        nothing on some way through it.
+
+    """
+    python = interpreted(function)
+    known = {*python.__globals__, *vars(builtins)}
+    steps = list(dis.get_instructions(python))
+    for before, one in pairwise([steps[0], *steps]):
+        name, problem = one.argval, ''
+        if one.opname == 'LOAD_GLOBAL' and name not in known:
+            problem = (f'cannot be compiled: NameError: name `{name}` is not defined; import it, '
+                       'or define it above')
+        elif (one.opname in ('LOAD_ATTR', 'STORE_ATTR') and before.opname == 'LOAD_FAST'
+              and before.argval in records):
+            names = records[before.argval].names or ()
+            if name not in names:
+                problem = (f'cannot be compiled: there is no number `{name}`'
+                           f'{did_you_mean(name, names)}; allowed: {", ".join(names)}')
+        elif returns and _gives_nothing(before, one):
+            problem = (f'returns nothing; write `return {", ".join(returns)}` on every way '
+                       'through it')
+        if problem:
+            raise InputError(f'{what} {problem}', f'{path}:{_line(one, python)}')
+
+
+def _gives_nothing(before: dis.Instruction, one: dis.Instruction) -> bool:
+    """Return whether a function ends here with None, as Python 3.12 says it or 3.11."""
+    given = one if one.opname == 'RETURN_CONST' else before
+    return (one.opname in ('RETURN_CONST', 'RETURN_VALUE') and given.argval is None
+            and given.opname in ('RETURN_CONST', 'LOAD_CONST'))
+
+
+def _line(one: dis.Instruction, function: Callable[..., Any]) -> int:
+    """Return the line of an instruction; that of the function where it has none."""
+    found = one.positions.lineno if one.positions else None
+    return found or function.__code__.co_firstlineno
+
+
 def formula(module: ModuleType, name: str, arguments: tuple[str, ...],
-            path: Path) -> Compiled[..., Any] | None:
+            path: Path, packed: np.dtype[Any]) -> Compiled[..., Any] | None:
     """
     Return a compiled function of a plug-in, None where it has none of this name.
 
@@ -147,11 +262,14 @@ def formula(module: ModuleType, name: str, arguments: tuple[str, ...],
         Names of its arguments, in the order in which a simulation gives them.
     path : Path
         The file.
+    packed : numpy.dtype
+        Record of the argument ``par``.
 
     Raises
     ------
     InputError
-        It is not compiled, or has other arguments, or these in another order.
+        It is not compiled, or has other arguments, or these in another order, or what
+        ``check_function`` refuses.
 
     """
     function = getattr(module, name, None)
@@ -164,6 +282,7 @@ def formula(module: ModuleType, name: str, arguments: tuple[str, ...],
     given = named_arguments(function)
     if given != arguments:
         raise InputError(f'`{name}` takes ({", ".join(given)}); {form}', str(path))
+    check_function(f'`{name}`', function, ('force_n',), {'par': packed}, path)
     return function
 
 

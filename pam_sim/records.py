@@ -76,7 +76,7 @@ def record(*declared: Declared) -> np.dtype[Any]:
     Raises
     ------
     InputError
-        A name that records of numpy have for something else.
+        A name that records of numpy have for something else, or a name twice.
 
     """
     parts: list[tuple[Any, ...]] = []
@@ -86,6 +86,8 @@ def record(*declared: Declared) -> np.dtype[Any]:
             raise InputError(
                 f'`{name}` cannot name a number of a record, as numpy uses this name itself; '
                 f'allowed are other names, such as `{name}_value`')
+        if any(name == part[0] for part in parts):
+            raise InputError(f'`{name}` names two numbers; give one of them another name')
         if isinstance(one, str):
             parts.append((one, np.float64))
         elif isinstance(one[1], int):

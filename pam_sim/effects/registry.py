@@ -109,7 +109,7 @@ def _with_hooks(effect: Effect, module: ModuleType, path: Path) -> Effect:
         raise InputError(f'effect `{effect.name}` has no hook, so it does nothing; write one of '
                          f'{", ".join(HOOKS)}', str(path))
     for hook, function in effect.hooks.items():
-        check_hook(hook, function, effect.states is not None, path)
+        check_hook(hook, function, effect.packed, effect.states, path)
     return effect
 
 

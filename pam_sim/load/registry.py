@@ -27,13 +27,17 @@ import numpy as np
 from pam_sim.annotations import Number
 from pam_sim.compiled import interpreted
 from pam_sim.errors import InputError
-from pam_sim.plugins import check_name, formula, plugin_files, plugin_module
+from pam_sim.plugins import (
+    check_name, check_stated, formula, plugin_files, plugin_module, told_with_place)
 from pam_sim.records import fields, record, values_of
 
 HANGING_MASS = 'hanging_mass'
 _OWN_FOLDER = Path(__file__).parent
-_STATED = ('NAME', 'SENTENCE', 'EQUATION', 'SOURCE', 'MOVES_FREELY', 'NEEDS_CONTRACTION',
-           'PARAMETERS')
+_TEXT, _TRUTH = (str, "a text, '...'"), (bool, 'True or False')
+_STATED: dict[str, tuple[type, str]] = {
+    'NAME': _TEXT, 'SENTENCE': _TEXT, 'EQUATION': _TEXT, 'SOURCE': _TEXT,
+    'MOVES_FREELY': _TRUTH, 'NEEDS_CONTRACTION': _TRUTH,
+    'PARAMETERS': (tuple, 'a tuple, (Parameter(...),)')}
 _ARGUMENTS = 'contraction_m', 'velocity_m_per_s', 'par'
 _POINTS = 257               # of the stroke, where the stiffness is looked for
 _SLOW_M_PER_S = 1e-3
@@ -56,9 +60,11 @@ def find_loads() -> dict[str, ModuleType]:
         if missing:
             raise InputError(f'defines no {missing[0]}; a load states {", ".join(_STATED)}',
                              str(path))
+        check_stated(module, _STATED, path)
         check_name('load', module.NAME, path, {
             name: Path(str(other.__file__)) for name, other in found.items()})
-        _check_force(module, path)
+        with told_with_place(path, 'cannot be used'):
+            _check_force(module, path)
         found[module.NAME] = module
     return dict(sorted(found.items(), key=lambda item: (
         not item[1].MOVES_FREELY, item[1].NEEDS_CONTRACTION, item[0])))
@@ -68,7 +74,11 @@ def _check_force(module: ModuleType, path: Path) -> None:
     """Refuse a load whose force cannot be calculated."""
     if module.NAME == HANGING_MASS:
         return
-    function = formula(module, 'load_force_n', _ARGUMENTS, path)
+    if module.MOVES_FREELY and not any(
+            p.name == 'mass_kg' and p.lower > 0.0 for p in module.PARAMETERS):
+        raise InputError('moves freely: state the parameter `mass_kg`, above 0, its inertia as '
+                         'the muscle feels it', str(path))
+    function = formula(module, 'load_force_n', _ARGUMENTS, path, packed_of(module))
     if not module.MOVES_FREELY:
         if function is not None:
             raise InputError('has a `load_force_n`, which a load that is held does not feel; '
@@ -78,9 +88,6 @@ def _check_force(module: ModuleType, path: Path) -> None:
         raise InputError(
             f'moves freely: write `def load_force_n({", ".join(_ARGUMENTS)})` with `@compiled` '
             'above it, and read the numbers by name, `par.mass_kg`', str(path))
-    if not any(p.name == 'mass_kg' and p.lower > 0.0 for p in module.PARAMETERS):
-        raise InputError('moves freely: state the parameter `mass_kg`, above 0, its inertia as '
-                         'the muscle feels it', str(path))
 
 
 def packed_of(load: ModuleType) -> np.dtype[np.void]:
@@ -112,7 +119,8 @@ def load_force_n(load: ModuleType, values: Mapping[str, float], contraction_m: N
     par = fields(values_of(packed, {name: values[name] for name in packed.names or ()}), packed)
     formula = interpreted(load.load_force_n)
     force = np.vectorize(lambda x, v: formula(x, v, par), otypes=[float])
-    found: Number = force(contraction_m, velocity_m_per_s)[()]
+    with told_with_place(str(load.__file__), '`load_force_n` fails'), np.errstate(all='ignore'):
+        found: Number = force(contraction_m, velocity_m_per_s)[()]
     return found
 
 
@@ -122,5 +130,9 @@ def steepest(load: ModuleType, values: Mapping[str, float],
     x_m = np.linspace(0.0, stroke_m, _POINTS)
     still = load_force_n(load, values, x_m, 0.0 * x_m)
     moving = load_force_n(load, values, x_m, 0.0 * x_m + _SLOW_M_PER_S)
+    for x, force in zip(x_m, still + moving):
+        if not np.isfinite(force):
+            raise InputError(f'`load_force_n` gives no finite force at contraction {x:g} m; it '
+                             f'must from 0 to {stroke_m:g} m', str(load.__file__))
     return (float(np.abs(np.diff(still)).max()) * (_POINTS - 1) / stroke_m,
             float(np.abs(moving - still).max()) / _SLOW_M_PER_S)

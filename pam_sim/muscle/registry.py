@@ -24,7 +24,7 @@ import numpy as np
 from pam_sim.errors import InputError
 from pam_sim.muscle.law import MuscleLaw
 from pam_sim.muscle.rules import at, check_rules, formula_at, grid
-from pam_sim.plugins import check_name, formula, pick, plugin_files, plugin_module
+from pam_sim.plugins import check_name, formula, pick, plugin_files, plugin_module, told_with_place
 
 _OWN_FOLDER = Path(__file__).parent / 'laws'
 _POINT = 'gauge_pa', 'strain', 'par'
@@ -58,13 +58,13 @@ def laws() -> dict[str, type[MuscleLaw]]:
         if not (isinstance(law, type) and issubclass(law, MuscleLaw)):
             raise InputError('defines no LAW, a subclass of MuscleLaw', str(path))
         check_name('law', law.NAME, path, places)
-        compiled = formula(module, 'tension_n', _POINT, path)
+        compiled = formula(module, 'tension_n', _POINT, path, law.PACKED)
         if compiled is None:
             raise InputError(f'defines no `tension_n`; write `def tension_n({", ".join(_POINT)})` '
                              'with `@compiled` above it', str(path))
         law.COMPILED = compiled
         law.COMPILED_DAMPER = formula(
-            module, 'damper_force_n', ('velocity_m_per_s', *_POINT), path)
+            module, 'damper_force_n', ('velocity_m_per_s', *_POINT), path, law.PACKED)
         _check_bores(law, path)
         if path.parent != _OWN_FOLDER:
             _check_sets(law, path)
@@ -88,9 +88,10 @@ def _check_sets(law: type[MuscleLaw], path: Path) -> None:
     """Refuse a law that breaks with one of its sets; the tests do this with our own."""
     if law.__init__ is MuscleLaw.__init__:      # a law of another making may need a table
         for name in law.SETS:
-            one = law(None, name, str(path))
-            check_rules(one, str(path))
-            _check_array(one, path)
+            with told_with_place(path, f'law `{law.NAME}` (set `{name}`) cannot be used'):
+                one = law(None, name, str(path))
+                check_rules(one, str(path))
+                _check_array(one, path)
 
 
 def _check_array(law: MuscleLaw, path: Path) -> None:

@@ -33,8 +33,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pam_sim.compiled import is_compiled, named_arguments
 from pam_sim.errors import InputError
+from pam_sim.plugins import check_function
 
 
 @dataclass(frozen=True)
@@ -129,10 +131,10 @@ HOOKS = {
 }
 
 
-def check_hook(name: str, function: Callable[..., Any], has_states: bool,
-               path: str | Path) -> None:
+def check_hook(name: str, function: Callable[..., Any], packed: np.dtype[Any],
+               states: np.dtype[Any] | None, path: str | Path) -> None:
     """
-    Refuse a function that is not compiled, or names arguments its hook has not.
+    Refuse a function that is not compiled, names arguments its hook has not, or has a mistake.
 
     Raises
     ------
@@ -143,10 +145,17 @@ def check_hook(name: str, function: Callable[..., Any], has_states: bool,
     if not is_compiled(function):
         raise InputError(f'hook `{name}` is not compiled; write `@compiled` above `def {name}`, '
                          'from pam_sim.compiled', str(path))
-    allowed = (*HOOKS[name].arguments, *(own for own in OWN if own != 'state' or has_states))
+    allowed = (*HOOKS[name].arguments, *(
+        own for own in OWN if own != 'state' or states is not None))
     unknown = [one for one in named_arguments(function) if one not in allowed]
+    if unknown and unknown[0] == 'state':
+        raise InputError(f'hook `{name}` names `state`, which this effect has not; write '
+                         "states=record('travel_m'), from pam_sim.records, into Effect(...), with "
+                         'the names of what it remembers', str(path))
     if unknown:
         raise InputError(
             f'hook `{name}` names `{unknown[0]}`; write `def {name}({", ".join(allowed)})` with '
             'those of them it needs, and read the numbers by name, `par.'
             'stiffness_n_per_m`', str(path))
+    check_function(f'hook `{name}`', function, HOOKS[name].returns, {
+        'par': packed, **({} if states is None else {'state': states})}, path)

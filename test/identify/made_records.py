@@ -37,8 +37,8 @@ def record(rig, gauge_pa=STAIRS_PA, hold_s=0.8, keep=('pressure', 'contraction',
         key, sd, unit = NOISE[name]
         clean = np.array(getattr(response, key))[::5]
         clean += zero_pa if name == 'pressure' else 0.0
-        topics[name] = Series(stamp, {key: clean + noise * sd * random.standard_normal(clean.size)},
-                              {key: unit})
+        read = clean + noise * sd * random.standard_normal(clean.size)
+        topics[name] = Series(stamp, {key: read}, {key: unit})
     if command:
         topics['valve_signal'] = Series(
             stamp[:-1], {'ppr_voltage': voltage[::5][:stamp.size - 1]}, {'ppr_voltage': 'V'})

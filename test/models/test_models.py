@@ -91,8 +91,12 @@ def load_force(force_n, contraction_m, par):
     return force_n + par.force_n * math.sin(contraction_m / 0.0006)
 """
 LAW_FILE = """'Force proportional to pressure.'
+from pam_sim.compiled import compiled
 from pam_sim.muscle.law import MuscleLaw
 from pam_sim.parameters import Parameter
+@compiled
+def tension_n(gauge_pa, strain, par):
+    return par.g * gauge_pa
 class Proportional(MuscleLaw):
     NAME, FORMULA, SOURCE = 'proportional', 'F = g p', 'made up for a test'
     PARAMETERS = (Parameter('g', 'N/Pa', 1e-4, 0.0, 1.0, description='Gain.'),)

