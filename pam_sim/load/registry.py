@@ -114,6 +114,11 @@ def load_force_n(load: ModuleType, values: Mapping[str, float], contraction_m: N
     contraction_m, velocity_m_per_s : float or ndarray
         Motion of the end of the muscle; arrays broadcast.
 
+    Raises
+    ------
+    InputError
+        The force cannot be calculated, or is not finite where the motion is.
+
     """
     packed = packed_of(load)
     par = fields(values_of(packed, {name: values[name] for name in packed.names or ()}), packed)
@@ -121,6 +126,12 @@ def load_force_n(load: ModuleType, values: Mapping[str, float], contraction_m: N
     force = np.vectorize(lambda x, v: formula(x, v, par), otypes=[float])
     with told_with_place(str(load.__file__), '`load_force_n` fails'), np.errstate(all='ignore'):
         found: Number = force(contraction_m, velocity_m_per_s)[()]
+    moved = np.isfinite(contraction_m) & np.isfinite(velocity_m_per_s)
+    wrong = moved & ~np.isfinite(found)
+    if np.any(wrong):
+        x_m = np.broadcast_to(contraction_m, np.shape(found))[wrong][0]
+        raise InputError(f'`load_force_n` gives no finite force at contraction {x_m:g} m; it must '
+                         'from 0 to the stroke of the muscle', str(load.__file__))
     return found
 
 
@@ -130,9 +141,5 @@ def steepest(load: ModuleType, values: Mapping[str, float],
     x_m = np.linspace(0.0, stroke_m, _POINTS)
     still = load_force_n(load, values, x_m, 0.0 * x_m)
     moving = load_force_n(load, values, x_m, 0.0 * x_m + _SLOW_M_PER_S)
-    for x, force in zip(x_m, still + moving):
-        if not np.isfinite(force):
-            raise InputError(f'`load_force_n` gives no finite force at contraction {x:g} m; it '
-                             f'must from 0 to {stroke_m:g} m', str(load.__file__))
     return (float(np.abs(np.diff(still)).max()) * (_POINTS - 1) / stroke_m,
             float(np.abs(moving - still).max()) / _SLOW_M_PER_S)

@@ -17,11 +17,12 @@
 from pathlib import Path
 import re
 
+import numpy as np
 from pam_actuation.experiments.primitives import make
 from pam_sim import load_rig
 from pam_sim.effects.registry import effects
 from pam_sim.errors import InputError
-from pam_sim.load.registry import find_loads, steepest
+from pam_sim.load.registry import find_loads, load_force_n, steepest
 from pam_sim.muscle.registry import laws
 import pytest
 
@@ -142,7 +143,7 @@ def test_a_line_is_told_where_there_is_one(folder, monkeypatch):
 
 @pytest.mark.parametrize('new, sentence', [
     ('par.pendulum_n / contraction_m', '`load_force_n` gives no finite force at contraction 0 m; '
-     'it must from 0 to 0.075 m'),
+     'it must from 0 to the stroke of the muscle'),
     ('[par.pendulum_n][1]', '`load_force_n` fails: IndexError: list index out of range')])
 def test_a_load_whose_force_cannot_be_calculated_is_told_with_its_file(
         folder, monkeypatch, new, sentence):
@@ -153,6 +154,13 @@ def test_a_load_whose_force_cannot_be_calculated_is_told_with_its_file(
         steepest(load, {p.name: p.default for p in load.PARAMETERS}, 0.075)
     assert caught.value.problem == sentence
     assert caught.value.where.split(':')[0] == str(folder / 'pendulum.py')
+
+
+def test_a_hole_in_a_motion_is_no_mistake_of_the_load(folder, monkeypatch):
+    load = read(folder, monkeypatch, 'pendulum', FILES['pendulum'])['pendulum']
+    values = {p.name: p.default for p in load.PARAMETERS}
+    found = load_force_n(load, values, np.array([0.0, np.nan]), np.array([0.1, 0.1]))
+    assert found[0] == 2.0 and np.isnan(found[1])
 
 
 @pytest.mark.parametrize('new, sentence', [
