@@ -78,6 +78,8 @@ def check_names(effect: 'Effect', found: Mapping[str, 'Effect'], of_rig: Iterabl
             ('same_as', (fitting.same_as,), of_rig),
             ('same_without_force', (fitting.same_without_force,), of_rig)):
         for name in filter(None, names):
+            if name == effect.name:
+                raise InputError(f'effect `{name}` names itself in `{key}`; leave it out', where)
             if name not in known:
                 raise InputError(
                     f'effect `{effect.name}` names `{name}` in `{key}`'

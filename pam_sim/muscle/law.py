@@ -180,7 +180,8 @@ class MuscleLaw:
 
     def _check(self, where: str) -> None:
         """Raise InputError where the parameters together make no muscle; the rules are tried."""
-        check_rules(self, where)
+        if hasattr(type(self), 'COMPILED'):     # not before its file is read
+            check_rules(self, where)
 
     def _tension_n(self, pressure: FloatArray, strain: FloatArray) -> FloatArray:
         """Return the formula's value [N], negative where the muscle would push."""
