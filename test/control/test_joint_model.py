@@ -18,6 +18,7 @@ import math
 
 import numpy as np
 from pam_actuation.control.config import load_controller
+from pam_actuation.drivers.asked import asked_by
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.experiments import load_experiment
 from pam_actuation.resources import find_config
@@ -106,9 +107,9 @@ def test_drivers_get_what_the_controller_of_their_joint_asks_for():
     drivers = [[node.parameters for node in knee(
         valve='hsv', joint=nominal.name, controller=name) if node.name == 'valve_driver']
         for name in ('sofc_model_knee_hsv', 'sofc_knee_hsv', '')]
-    assert [parameters.get('controller') for parameters in drivers[0]] == [
-        'sofc_model_knee_hsv'] * 2
-    assert all('controller' not in parameters for pair in drivers[1:] for parameters in pair)
+    assert [[parameters['controller'] for parameters in pair] for pair in drivers] == [
+        ['sofc_model_knee_hsv'] * 2, ['sofc_knee_hsv'] * 2, [''] * 2]
+    assert asked_by('sofc_model_knee_hsv') and not asked_by('sofc_knee_hsv')
 
 
 def test_ages_of_angle_and_pressures_count():
