@@ -42,7 +42,7 @@ def test_the_end_of_any_node_ends_the_launch(name):
              if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name)}
     started = {variable for variable, value in given.items() if makes_nodes(value)}
     assert len(started) >= 5
-    assert started <= names_in(given['ends']) and 'OnProcessExit' in names_in(given['ends'])
+    assert started <= names_in(given['ends']) and 'end' in names_in(given['ends'])
     # Every node is one of these, none is made on the way.
     assert sum(makes_nodes(statement) for statement in described.body) == len(started)
 
@@ -75,4 +75,5 @@ def test_the_valve_is_that_of_the_file_where_none_is_given(name, given, valve, t
         if isinstance(entity, (DeclareLaunchArgument, OpaqueFunction)):
             for follows in entity.visit(context) or ():
                 follows.visit(context)
-    assert context.launch_configurations['valve'] == valve
+    noted = {'rig': 'valve_of_rig', 'knee': 'valve_of_joint'}[name]
+    assert context.launch_configurations[noted] == valve

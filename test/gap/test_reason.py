@@ -223,7 +223,7 @@ def test_an_answer_ends_with_0_and_what_is_wrong_with_the_data_with_1(
         monkeypatch, tmp_path, capsys, verdict, implausible, code):
     run = SimpleNamespace(implausible=implausible, unusable=())
     monkeypatch.setattr('pam_actuation.report.joint_gap.load_run',
-                        lambda path, namespace=None: run)
+                        lambda path, namespace=None, topics=None: run)
     monkeypatch.setattr('pam_actuation.report.origin.origin', lambda *given: '')
     monkeypatch.setattr('pam_actuation.report.gap.write_gap',
                         lambda *given, **more: GapResult(verdict, 'Because.'))
