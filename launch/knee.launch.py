@@ -42,7 +42,9 @@ from launch_ros.parameter_descriptions import ParameterValue
 from pam_actuation.control.modes.files import joint_preset_for
 from pam_actuation.hardware.files import hardware_file
 from pam_actuation.namespaces import launch_namespace
-from pam_actuation.nodes.launched import RigEnd
+from pam_actuation.nodes.hardware_check import check_hardware
+from pam_actuation.nodes.launched import full_namespace, RigEnd
+from pam_actuation.rigging import layouts
 from pam_actuation.rigging.layouts import AWAITED_S, BY_SENSORS, BY_TOPIC, SIMULATED, TOPICS
 from pam_sim.joint import load_joint
 
@@ -198,15 +200,16 @@ def _note_names(context, end):
     end.shuts_launch_down = given('shutdown_at_end') == 'true'
     namespace = launch_namespace(given('namespace'))
     valve = given('valve') or load_joint(given('joint')).valve
+    check_hardware(layouts.knee(
+        full_namespace(context, namespace), given('joint'), valve, layouts.NO_CONTROLLER,
+        hardware=given('hardware'), angle=given('angle')))
     noted = {'namespace': namespace, VALVE: valve, NAME: namespace.rsplit('/', 1)[-1] or 'knee',
              HARDWARE_FILE: hardware_file(given('hardware')),
              # Real sensors have no seed.
              RECORDED_SEED: given('seed') if given('hardware') == SIMULATED else '-1',
              RECORDER_NAME: '', RECORDED_CONTROLLER: '', RECORDED_EXPERIMENT: ''}
     if given('record') == 'true':
-        above = '' if namespace.startswith('/') else context.launch_configurations.get(
-            'ros_namespace', '').rstrip('/') + '/'
-        noted[RECORDER_NAME] = f'{above}{namespace}/{RECORDER}'
+        noted[RECORDER_NAME] = f'{full_namespace(context, namespace)}/{RECORDER}'
         if given('controller') != 'none':
             noted[RECORDED_CONTROLLER] = given('controller_file') or joint_preset_for(
                 load_joint(given('joint')), valve)

@@ -39,8 +39,10 @@ from launch_ros.actions import LifecycleNode
 from launch_ros.parameter_descriptions import ParameterValue
 from pam_actuation.hardware.files import hardware_file
 from pam_actuation.namespaces import launch_namespace
-from pam_actuation.nodes.launched import RigEnd
+from pam_actuation.nodes.hardware_check import check_hardware
+from pam_actuation.nodes.launched import full_namespace, RigEnd
 from pam_actuation.nodes.pid_controller import PidNode
+from pam_actuation.rigging import layouts
 from pam_actuation.rigging.layouts import AWAITED_S, controller_node, NO_CONTROLLER
 from pam_actuation.rigging.layouts import played, SIMULATED, TOPICS
 from pam_sim import load_rig
@@ -190,12 +192,16 @@ def _note_what_is_needed(context, end):
             raise InputError('is of no use with controller:=none', 'controller_file')
         file = NO_CONTROLLER
     valve = given('valve') or load_rig(given('rig')).valve
+    namespace = launch_namespace(given('namespace'))
+    check_hardware(layouts.rig(
+        full_namespace(context, namespace), given('rig'), valve, given('hardware'),
+        layouts.NO_CONTROLLER))
     name, raw = played(
         experiment, given('rig'), valve, file,
         PidNode.DEFAULT_CONTROLLERS if kind == 'pid' else None)
     noted = {VALVE: valve, EXPERIMENT: experiment, HARDWARE_FILE: hardware_file(given('hardware')),
              CONTROLLER: controller_node(name) if name else NO_CONTROLLER, CONTROLLER_NAME: name,
-             RAW: str(raw).lower(), 'namespace': launch_namespace(given('namespace')),
+             RAW: str(raw).lower(), 'namespace': namespace,
              # Real sensors have no seed.
              RECORDED_SEED: given('seed') if given('hardware') == SIMULATED else '-1'}
     return [SetLaunchConfiguration(key, text) for key, text in noted.items()]

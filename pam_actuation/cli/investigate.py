@@ -154,6 +154,10 @@ def _recorder(args: argparse.Namespace, truth: 'Rig | None', model: 'Rig',
     if not args.yes and not sys.stdin.isatty():
         raise InputError('nobody can be asked here before the muscle moves; give --yes where '
                          'every motion is allowed', 'standard input')
+    if args.hardware:
+        from pam_actuation.nodes.hardware_check import check_hardware
+        from pam_actuation.rigging import layouts
+        check_hardware(layouts.rig(valve=model.valve, hardware=args.hardware))
 
     def ask(motion: 'Motion') -> bool:
         bar.clear()

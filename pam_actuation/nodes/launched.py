@@ -81,3 +81,10 @@ class RigEnd:
         else:
             return
         write_text(os.path.join(self.notes_folder, ENDED_FILE), json.dumps(told))
+
+
+def full_namespace(context: Any, namespace: str) -> str:
+    """Return a namespace below that of the group in which a launch file is included."""
+    above = '' if namespace.startswith('/') else context.launch_configurations.get(
+        'ros_namespace', '').rstrip('/') + '/'
+    return f'{above}{namespace}'

@@ -159,6 +159,7 @@ def test_mistakes_are_told_before_anything_moves(lab, tmp_path, capsys, monkeypa
             (['--hardware', 'dummy', '--live'], 'is live already'),
             (['--hardware', 'dumy', '--yes'], '`dummy`'),
             (['--hardware', 'dummy'], 'nobody can be asked'),
+            (['--hardware', str(lab / 'dac.yaml'), '--yes'], 'did you mean `backend`'),
             ([*rig, '--domain-id', '7'], 'goes with --live or --hardware'),
             ([*rig, '--namespace', '/muscle'], 'goes with bags'),
             ([*rig, '--effects', 'leak'], '`leakage`'),
@@ -167,6 +168,8 @@ def test_mistakes_are_told_before_anything_moves(lab, tmp_path, capsys, monkeypa
             ([*rig, '--rounds', '0'], '1 to 50'),
             ([*rig, '--model', str(lab / 'hsv.yaml')], 'has valve hsv, the rig has ppr'),
             ([*rig, str(tmp_path / 'no_bag')], 'no_bag')):
+        (lab / 'dac.yaml').write_text(
+            '/**/valve_driver:\n  ros__parameters: {backnd: dummy}\n')
         (lab / 'hsv.yaml').write_text(f'rig: {MODEL}\nvalve: hsv\n')
         assert main(['investigate', *words, '--out', str(out)]) == 2, words
         said = capsys.readouterr().err

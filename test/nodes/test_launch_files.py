@@ -102,6 +102,16 @@ def test_a_namespace_that_ros_refuses_is_one_sentence(file):
         described(file, namespace='le-g')
 
 
+@pytest.mark.parametrize('file', ['rig.launch.py', 'knee.launch.py'])
+def test_a_limit_with_a_wrong_name_is_refused_before_a_node_starts(file, tmp_path):
+    hardware = tmp_path / 'dac.yaml'
+    hardware.write_text('/**/valve_driver:\n  ros__parameters:\n    backend: dummy\n'
+                        '    max_pressure_gauge: 100000.0\n', encoding='utf-8')
+    with pytest.raises(InputError, match='did you mean `max_pressure_gauge_pa`') as caught:
+        described(file, hardware=str(hardware))
+    assert caught.value.where == f'{hardware}:4'
+
+
 # How a node is brought up and ends, which a launch file and pam up do in ways of their own.
 BRINGING_UP = {'autostart', 'await_timeout_s', 'end_with_parent', 'exit_when_finished',
                'notes_folder', 'start_delay_s'}
