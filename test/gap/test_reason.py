@@ -58,6 +58,7 @@ def said(verdict, signals, named=(), share=None, effects=(), parameters=(), **mo
 
 @pytest.mark.parametrize('name, words', [
     ('loop_half_width_at_400kpa_n', 'loop half width at 400 kPa'),
+    ('force_at_50mm_per_s_n', 'force at 50 mm/s'), ('conductance_m3_per_s_pa', 'conductance'),
     ('loss_n_per_m2', 'loss'), ('damping_n_s_per_m', 'damping'), ('speed_m_per_s', 'speed'),
     ('gain_percent', 'gain percent'), ('force_at_500kpa_10mm', 'force at 500 kPa and 10 mm')])
 def test_a_quantity_in_words_has_no_unit(name, words):

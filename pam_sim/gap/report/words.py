@@ -16,9 +16,10 @@
 
 import re
 
-# The ending that says the unit; the value stands with its unit beside the words.
+# The ending that says the unit; the value stands with its unit beside the words. In
+# ``at_50mm_per_s_n`` that is ``n`` alone.
 _UNIT = '(?:m3|m2|m|n|pa|kg|s|j|w|v)'
-_ENDING = re.compile(f'_{_UNIT}(?:_{_UNIT})*(?:_per_{_UNIT}(?:_{_UNIT})*)?$')
+_ENDING = re.compile(f'(?<!_per)_{_UNIT}(?:_{_UNIT})*(?:_per_{_UNIT}(?:_{_UNIT})*)?$')
 CONDITIONS = {'400kpa': '400 kPa', '500kpa': '500 kPa', '10mm': '10 mm',
               '20mm_per_s': '20 mm/s', '50mm_per_s': '50 mm/s'}
 
