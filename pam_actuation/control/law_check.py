@@ -15,11 +15,12 @@
 """Whether what a control law estimated and commanded in its last tick is possible at all."""
 
 from collections.abc import Sequence
-import math
+import sys
 
 ESTIMATES_M = -0.1, 0.2         # far beyond what a muscle does: no error of a model
 RESUME_NS = 2_000_000_000
 _ESTIMATE, _COMMAND = 'estimated_contraction_m', 'command_pa'
+_FINITE = -sys.float_info.max, sys.float_info.max
 
 
 class LawCheck:
@@ -36,18 +37,16 @@ class LawCheck:
     def __init__(self, names: Sequence[str]) -> None:
         self._looks_at = [
             (names.index(name), limits) for name, limits in (
-                (_ESTIMATE, ESTIMATES_M), (_COMMAND, (-math.inf, math.inf))) if name in names]
+                (_ESTIMATE, ESTIMATES_M), (_COMMAND, _FINITE)) if name in names]
         self.forget()
 
     def forget(self) -> None:
         """Begin anew."""
-        self._until_ns: int | None = None
+        self._until_ns = 0
 
     def failed(self, now_ns: int, values: Sequence[float]) -> bool:
         """Return whether the law failed in the tick of these values, or within 2 s before."""
-        if not all(math.isfinite(values[at]) and lowest <= values[at] <= highest
-                   for at, (lowest, highest) in self._looks_at):
-            self._until_ns = now_ns + RESUME_NS
-        if self._until_ns is not None and now_ns >= self._until_ns:
-            self._until_ns = None
-        return self._until_ns is not None
+        for at, (lowest, highest) in self._looks_at:
+            if not lowest <= values[at] <= highest:      # so NaN
+                self._until_ns = now_ns + RESUME_NS
+        return now_ns < self._until_ns

@@ -272,7 +272,8 @@ class ControllerLoop:
         self._commands_pa = commands_pa if self.valid else None
         self.reason = codes.REASONS[inputs.reason]
         if self.valid:
-            self.reason = '; '.join(filter(None, (self.reason, *self._remarks)))
+            for remark in filter(None, self._remarks):
+                self.reason += f'; {remark}'
         elif inputs.reason == codes.TWO_SENSORS:
             self.reason = f'{self.reason}: {self.two_sensors}'
         self.state = ControllerState(now_ns, self._core.names, values)

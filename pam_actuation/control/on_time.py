@@ -66,7 +66,6 @@ class OnTime:
         self._share, self._worst_ns = 1.0, 0     # of ticks on time; age of the oldest reading
         self._reading_ns: int | None = None
         self._intervals_ns: deque[int] = deque(maxlen=_INTERVALS)
-        self._oldest_ns = self.late_ns
 
     def judge(self, now_ns: int, gap_ns: int, reading_ns: int, silent_ns: int) -> bool:
         """
@@ -85,7 +84,8 @@ class OnTime:
         self._measure(reading_ns)
         age_ns = now_ns - reading_ns
         late_ns = max(gap_ns, age_ns, silent_ns)
-        old = age_ns > self._oldest_ns
+        # Asked for where it counts alone: at most sensors no reading is ever that old.
+        old = age_ns > self.late_ns and age_ns > self._oldest_ns()
         if old or max(gap_ns, silent_ns) > self.late_ns:
             self._from_ns = now_ns + late_ns + AFTER_LATE_NS
         on_time = now_ns >= self._from_ns
@@ -101,14 +101,17 @@ class OnTime:
         elif self._worst_ns and not self.says:
             self.says = (f'learning mostly stands still: {self._topic} is up to '
                          f'{1e-6 * self._worst_ns:.0f} ms old, at most '
-                         f'{1e-6 * self._oldest_ns:.0f} ms count as on time')
+                         f'{1e-6 * self._oldest_ns():.0f} ms count as on time')
 
     def _measure(self, reading_ns: int) -> None:
-        """Take the stamp of the newest reading; set how old one may be."""
+        """Take the stamp of the newest reading."""
         before_ns, self._reading_ns = self._reading_ns, reading_ns
-        if before_ns is None or reading_ns <= before_ns:
-            return
-        self._intervals_ns.append(reading_ns - before_ns)
-        if len(self._intervals_ns) >= _AT_LEAST:
-            wanted_ns = _AGES * median_low(self._intervals_ns) + self._period_ns
-            self._oldest_ns = max(self.late_ns, min(wanted_ns, LATEST_NS))
+        if before_ns is not None and reading_ns > before_ns:
+            self._intervals_ns.append(reading_ns - before_ns)
+
+    def _oldest_ns(self) -> int:
+        """Return how old a reading may be."""
+        if len(self._intervals_ns) < _AT_LEAST:
+            return self.late_ns
+        wanted_ns = _AGES * median_low(self._intervals_ns) + self._period_ns
+        return max(self.late_ns, min(wanted_ns, LATEST_NS))
