@@ -125,16 +125,20 @@ def declared(folder: str, variable: str, mark: str) -> list[str]:
     import pam_sim
     own = str(Path(pam_sim.__file__).parent / folder)
     further = filter(None, os.environ.get(variable, '').split(os.pathsep))
-    return sorted({path.stem for place in (own, *further) for path in Path(place).glob('*.py')
-                   if f'\n{mark} = ' in path.read_text(encoding='utf-8')})
+    return _files_with(f'\n{mark} = ', own, *further)
 
 
 def nodes() -> list[str]:
     """Return the names of the nodes, each a module with a main function."""
     from pathlib import Path
-    folder = Path(__file__).resolve().parent.parent / 'nodes'
-    return sorted(path.stem for path in folder.glob('*.py')
-                  if '\ndef main(' in path.read_text(encoding='utf-8'))
+    return _files_with('\ndef main(', str(Path(__file__).resolve().parent.parent / 'nodes'))
+
+
+def _files_with(text: str, *folders: str) -> list[str]:
+    """Return the names of the Python files in folders that hold a text, sorted."""
+    from pathlib import Path
+    return sorted({path.stem for folder in folders for path in Path(folder).glob('*.py')
+                   if text in path.read_text(encoding='utf-8')})
 
 
 OF_RIG: dict[str, Names] = {
