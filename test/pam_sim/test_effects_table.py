@@ -28,6 +28,7 @@ valve transport valve_dead_time delay_s
 valve transport valve_dead_time_by_direction delay_s fill_delay_s vent_delay_s
 valve transport tube_lag time_constant_s
 valve transport tube_lag_two_stage time_constant_s
+valve transport regulator_overshoot inner_lag_s
 valve valve_nonlinearity valve_dead_zone half_width_pa open_time_s close_time_s
 valve valve_nonlinearity valve_dead_zone_gradual half_width_pa open_time_s close_time_s
 valve valve_nonlinearity valve_dead_zone_two_ramps open_time_s close_time_s
@@ -91,7 +92,7 @@ def test_named_as_results_name_it(line):
         assert parameter.unit and parameter.description
         assert parameter.lower <= parameter.default <= parameter.upper
     hsv_only = ('supply_droop', 'dead_volume', 'thermal', 'valve_dead_zone_two_ramps')
-    ppr_only = ('valve_hysteresis', 'flow_limit', 'vent_bleed',
+    ppr_only = ('valve_hysteresis', 'flow_limit', 'vent_bleed', 'regulator_overshoot',
                 'vent_bleed_fill_creep', 'valve_dead_time_by_direction')
     expected = ('hsv',) if name in hsv_only else ('ppr',) if name in ppr_only else ('ppr', 'hsv')
     assert effect.valves == expected

@@ -20,8 +20,9 @@ from pam_sim.effects.registry import effects
 from pam_sim.effects.valve_dead_zone_gradual import mean_opening_with_lift
 from pam_sim.errors import InputError
 from pam_sim.units import GAS_CONSTANT_AIR, P_ATM_PA, TEMPERATURE_K
-from profiles import duties
+from profiles import duties, profile
 import pytest
+from scipy.integrate import solve_ivp
 
 RT = GAS_CONSTANT_AIR * TEMPERATURE_K
 HELD_M = 0.010
@@ -378,9 +379,45 @@ def test_a_bleed_quicker_than_the_lag_is_the_lag():
     assert np.max(np.abs(down[0] - down[1])) < 1e-3
 
 
+@pytest.mark.parametrize('lag_s', [0.002, 0.015, 0.15])
+@pytest.mark.parametrize('time_constant_s, tolerance_pa', [(0.010, 250.0), (0.060, 10.0)])
+def test_a_regulator_that_overshoots_is_a_lag_of_second_order(
+        lag_s, time_constant_s, tolerance_pa):
+    """The independent solution is scipy's; overdamped, critically damped and swinging."""
+    rig = held('ppr', ('regulator_overshoot', {'inner_lag_s': lag_s}), T_m=time_constant_s)
+    response = rig.simulate(np.full(600, 4.0), initial_pressure_pa=P_ATM_PA + 200e3)
+    solved = solve_ivp(
+        lambda t, y: [y[1], ((400e3 - y[0]) / time_constant_s - y[1]) / lag_s], (0.0, 0.7),
+        [200e3, 0.0], dense_output=True, rtol=1e-9, atol=1e-3)
+    expected = P_ATM_PA + solved.sol(response.time_s)[0]
+    assert np.max(np.abs(response.pressure_pa - expected)) < tolerance_pa
+    overshoots = lag_s > time_constant_s / 4.0
+    assert (np.max(expected) > P_ATM_PA + 400.01e3) == overshoots
+
+
+def test_a_valve_without_a_lag_is_the_regulator_of_first_order():
+    rigs = held('ppr', ('regulator_overshoot', {'inner_lag_s': 0.0})), held('ppr')
+    signal = profile('step', 1000) / 100.0
+    ours, plain = (rig.simulate(signal).pressure_pa for rig in rigs)
+    assert np.max(np.abs(ours - plain)) < 1e-6
+
+
+def test_the_valve_of_a_regulator_is_never_asked_for_more_than_flows():
+    """So a long way up ends with no more overshoot than the limit of the rate allows."""
+    limit = {'fill_rate_at_400kpa_pa_per_s': 5e5, 'vent_rate_at_400kpa_pa_per_s': 5e5}
+    rig = held('ppr', ('regulator_overshoot', {'inner_lag_s': 0.04}), ('flow_limit', limit),
+               T_m=0.02)
+    p = rig.simulate(np.full(3000, 5.0), initial_pressure_pa=P_ATM_PA + 100e3).pressure_pa
+    rates = np.diff(p) / 1e-3
+    fastest = np.max(np.diff(held('ppr', ('flow_limit', limit), T_m=0.02).simulate(
+        np.full(3000, 5.0), initial_pressure_pa=P_ATM_PA + 100e3).pressure_pa)) / 1e-3
+    assert np.max(rates) <= fastest
+    assert 1e3 < np.max(p) - P_ATM_PA - 500e3 < 0.04 * fastest
+
+
 @pytest.mark.parametrize('name', [
     'flow_limit', 'valve_hysteresis', 'vent_bleed', 'vent_bleed_fill_creep',
-    'valve_dead_time_by_direction'])
+    'valve_dead_time_by_direction', 'regulator_overshoot'])
 def test_effects_of_the_regulator_leave_the_switching_valves_alone(name):
     signal = duties('random', 300)
     ours = held('hsv', (name, {})).simulate(signal)
