@@ -57,7 +57,7 @@ the loop itself stood still                    waits up to 20 ms for a measureme
 the loop itself stood still over 0.25 s        starts bumplessly
 =============================================  ==========================================
 
-After every vent the commands rise slowly.
+After every vent the commands rise slowly, also after one by the node (``forget``).
 """
 
 from collections.abc import Callable
@@ -155,6 +155,7 @@ class ControllerLoop:
         self.two_sensors = ''
         self._remarks: tuple[str, ...] = ()
         self._last_tick_ns: int | None = None
+        self._forgot = False        # since the last tick
         self._on_time = OnTime(controller.rate_hz, self.measurement.sensor.topic)
         self._late_ns = self._on_time.late_ns
         self._tick_rate = TickRate(controller.rate_hz)
@@ -232,7 +233,13 @@ class ControllerLoop:
         self._takes[topic](message)
 
     def forget(self) -> None:
-        """Forget all inputs, as before the first ones; what was learned stays."""
+        """
+        Forget all inputs, as before the first ones; what was learned stays.
+
+        The next tick vents, whatever arrived until then: so may have whoever calls this.
+        """
+        self._forgot = True
+        self._last_tick_ns = self._patience_ns = None
         self._newest.clear()
         self.setpoint.forget()
         self.measurement.forget()
@@ -299,6 +306,8 @@ class ControllerLoop:
         self._last_tick_ns = now_ns
         measurement, setpoint, muscles = self.measurement, self.setpoint, self.muscles
         reason = measurement.reason(now_ns)
+        if self._forgot:
+            self._forgot, reason = False, measurement.sensor.none
         setpoint.begin(now_ns, measurement.value)
         for muscle in muscles:
             muscle.look(self._newest, now_ns)

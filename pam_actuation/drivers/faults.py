@@ -133,8 +133,8 @@ FAULT_TABLE = (
           'supply pressure was measured and is now older than 0.5 s, or invalid', IGNORE, False,
           'warning: the nominal supply is assumed'),
     Fault('driver_paused', 'Driver stopped and continued',
-          'more than 0.3 s between two ticks of the driver', VENT, False,
-          'first command and reading stamped after the pause, ' + _RAMP),
+          'more than 0.3 s between two ticks of the driver, or deactivated in between', VENT,
+          False, 'first command and reading stamped after the pause, ' + _RAMP),
     Fault('clock_ahead', 'Clock set ahead',
           'more than 0.3 s between two ticks by the clock of the stamps, but not by the steady '
           'clock of the computer', VENT, False,

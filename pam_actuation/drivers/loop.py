@@ -167,6 +167,11 @@ class DriverLoop:
         """Tell that another node, such as the watchdog, sent the signal that vents."""
         self.safety.vented_elsewhere(now_ns)
 
+    def stop(self) -> None:
+        """Tell that the safe signal was sent and ``act`` is not called for a while."""
+        self.safety.stop()
+        self._efforts = self._safe_efforts()
+
     def emergency_stop(self, why: str = 'requested') -> tuple[bool, str]:
         """Latch the emergency stop; return (True, sentence). Vents from the next tick on."""
         self.safety.emergency_stop(why)

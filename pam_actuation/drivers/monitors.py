@@ -62,14 +62,18 @@ class ClockMonitor:
         self._stood_ns = None if self._steady_ns is None else steady_ns - self._steady_ns
         self._steady_ns = steady_ns
 
-    def fault(self, gap_ns: int) -> tuple[str, str] | None:
-        """Return what is wrong with the time [ns] between two ticks, None if nothing."""
+    def fault(self, gap_ns: int, stopped: bool = False) -> tuple[str, str] | None:
+        """
+        Return what is wrong with the time [ns] between two ticks, None if nothing.
+
+        ``stopped``: the driver is known to have been stopped, for however short a time.
+        """
         if gap_ns < 0:
             return 'clock_back', (
                 f'the clock was set back by {-gap_ns * 1e-6:.0f} ms, waiting for new messages')
-        if gap_ns <= self._pause_ns:
+        if gap_ns <= self._pause_ns and not stopped:
             return None
-        if self._stood_ns is not None and self._stood_ns <= self._pause_ns:
+        if self._stood_ns is not None and self._stood_ns <= self._pause_ns and not stopped:
             return 'clock_ahead', (
                 f'the clock was set ahead by {(gap_ns - self._stood_ns) * 1e-6:.0f} ms, waiting '
                 'for new messages')

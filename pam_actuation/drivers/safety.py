@@ -142,6 +142,7 @@ class SafetySupervisor:
                               nearly_pa=lim.resume_nearly_pa)
         self._relapses = Relapses(5, 30.0)
         self._now_ns: int | None = None
+        self._stopped = False           # since the last tick
         self._first_tick_ns = 0
         self._grace_until_ns = 0
         self._grace_ns = 0
@@ -176,6 +177,10 @@ class SafetySupervisor:
         self._rise.begin()
         self._warn('watchdog_vented', 'the watchdog vented, since this driver fell silent for a '
                    'moment (busy machine?)', now_ns)
+
+    def stop(self) -> None:
+        """Tell that the driver vented and ticks no more: once it does it begins with a vent."""
+        self._stopped = self._now_ns is not None
 
     def on_device(self, problem: str) -> None:
         """Tell how the device took the last signal: a problem latches, '' is all right."""
@@ -237,7 +242,8 @@ class SafetySupervisor:
             self._first_tick_ns = now_ns
             return None
         gap_ns = now_ns - last
-        fault = self.clock.fault(gap_ns)
+        fault = self.clock.fault(gap_ns, self._stopped)
+        self._stopped = False
         if fault is not None:
             self._forget()
             self._standing = fault

@@ -66,6 +66,7 @@ class ControllerNode(ManagedNode):
     learning = False
     loop: 'ControllerLoop | None' = None
     controller: Any
+    _vented = False         # at the end of a former run
     _last_ns: int | None = None
 
     def load_rig(self) -> 'Rig | JointRig':
@@ -141,6 +142,7 @@ class ControllerNode(ManagedNode):
         self._last_ns = None
         if not self.participants:           # in lockstep what waits is of the first tick
             self.discard_arrived()
+        if self._vented:
             assert self.loop is not None
             self.loop.forget()
         self.add_loop(1.0 / self.controller.rate_hz)
@@ -182,6 +184,7 @@ class ControllerNode(ManagedNode):
 
     def safe_stop(self, why: str) -> None:
         """Command atmospheric pressure: the drivers vent."""
+        self._vented = True
         if self.loop is not None and self.publishers_counted:
             for topic in self.loop.command_topics:
                 self.send(topic, Pressure(self.now_ns(), P_ATM_PA))

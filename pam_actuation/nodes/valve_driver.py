@@ -271,6 +271,7 @@ class ValveDriver(ManagedNode):
         """Send the signal that vents, again if the device refuses it."""
         if self.loop is None:
             return
+        self.loop.stop()
         problem = self._not_vented = self._refusal = self.output.vent(TRIES)
         self.send('valve_signal', self.loop.safe_signal(self.now_ns()))
         if problem:
