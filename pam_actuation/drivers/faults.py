@@ -151,8 +151,8 @@ FAULT_TABLE = (
           'silence; behind a hardware back end another one vents the device after 0.1 s; with '
           'the computer lost only hardware can'),
     Fault('watchdog_vented', 'Driver silent for a moment, watchdog vented',
-          'the safe signal of another node, valve_watchdog as a rule, heard by the driver: a busy '
-          'machine kept it from sending', IGNORE, False,
+          'the safe signal of another node, valve_watchdog as a rule, heard by the driver, or a '
+          'vent by the watchdog of its device: a busy machine kept it from sending', IGNORE, False,
           'warning; the driver goes on with a slow rise from atmospheric pressure'),
     Fault('reference_lost', 'Reference lost',
           'noticed by the controller, which then commands atmospheric pressure', IGNORE, False,

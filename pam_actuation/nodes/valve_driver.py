@@ -95,6 +95,7 @@ class ValveDriver(ManagedNode):
     output: Any = None          # what the valve hangs on
     contractions: PolledSubscription | None = None      # where the law uses them
     _not_vented = ''        # why not, at the end
+    _device_vents = 0       # by its watchdog, up to the last tick
     _refusal = ''           # of the last signal by the device
     _stopped: Any = None    # what a latched stop is carried over from
     _safety_services: Sequence[Any] = ()
@@ -247,7 +248,9 @@ class ValveDriver(ManagedNode):
             self.loop.on_contraction(message)
         self.ear.listen()
         now_ns = self.now_ns()
-        if self.ear.vented:
+        vents, before = self.output.watchdog_vents, self._device_vents
+        self._device_vents = vents or 0
+        if self.ear.vented or self._device_vents > before:
             self.loop.vented_elsewhere(now_ns)
         fault = self.ear.fault(now_ns)
         self.loop.set_sender_fault(fault)

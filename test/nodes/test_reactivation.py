@@ -140,6 +140,37 @@ def test_a_driver_that_vented_begins_at_atmosphere(context, valve, period_s, ven
         run.end()
 
 
+class DeviceWatchdog:
+    """It says that it vented while the driver was silent."""
+
+    vents = 0
+
+    def tell(self, in_use):
+        pass
+
+    close = tell
+
+
+@pytest.mark.parametrize('valve, period_s', [('ppr', 0.005), ('hsv', 0.02)])
+def test_a_driver_whose_device_was_vented_begins_at_atmosphere(context, valve, period_s):
+    def arrives(loop, now_ns):
+        loop.on_pressure(Pressure(now_ns, FULL_PA + now_ns % 7))
+        loop.on_command(Pressure(now_ns, FULL_PA))
+
+    run = Run(context, 'valve_driver', period_s, valve_type=valve)
+    run.node.output._watchdog = watchdog = DeviceWatchdog()
+    try:
+        assert run.go_on(3.0, arrives)['followed_pressure'][-1].pressure_pa == FULL_PA
+        watchdog.vents, run.sent = 1, {}
+        run.now_ns += 150_000_000           # silent for so long, its watchdog for 0.1 s
+        followed_pa = [message.pressure_pa
+                       for message in run.go_on(0.2, arrives)['followed_pressure']]
+        assert rises_slowly(followed_pa, period_s) and followed_pa[-1] > P_ATM_PA + 50e3
+    finally:
+        run.node.output._watchdog = None
+        run.end()
+
+
 def of_muscle(contraction_m, muscle_pa):
     def arrives(loop, now_ns):
         loop.take('contraction', Contraction(now_ns, contraction_m + now_ns % 7 * 1e-9))
