@@ -137,7 +137,12 @@ class ExperimentRecorder(ManagedNode):
         self.metadata = self._metadata()
         self.sources: dict[str, PolledSubscription] = {}
         self.types: dict[str, str] = {}
-        for topic in list(filter(None, self.value('topics'))) or self.topics:
+        recorded = list(filter(None, self.value('topics'))) or self.topics
+        for topic in filter(None, self.value('await_topics')):
+            if topic not in recorded:
+                raise InputError(f'{topic!r} is not recorded, so it cannot be awaited; recorded '
+                                 f'are {", ".join(recorded)}', 'parameter await_topics')
+        for topic in recorded:
             row = KNOWN[topic]
             name = row.full_name('') if row.place == ROOT else topic
             self._record(topic, name, row.type_name, row.service.recorder)
@@ -192,9 +197,9 @@ class ExperimentRecorder(ManagedNode):
             overwrite=self.value('overwrite'),
             max_file_bytes=self.value('max_bagfile_size_bytes'),
             max_file_s=self.value('max_bagfile_duration_s'))
-        self.core = RecorderCore(writer)
         self.watch = EndWatch(self.get_namespace().rstrip('/'))
         self.known: set[str] = set()
+        self.core = RecorderCore(writer)
         if self._recorded or not self.value('autostart'):
             for source in self.sources.values():
                 source.take()           # what came before belongs to no recording
@@ -205,6 +210,11 @@ class ExperimentRecorder(ManagedNode):
             self.get_logger().warning(f'nobody publishes {", ".join(missing)} yet')
         self.get_logger().info(f'ready, recording to {self.value("output")}')
         self.add_loop(TAKE_PERIOD_S)
+
+    def teardown(self) -> None:
+        """Finish the bag of an activation that failed."""
+        if self.core is not None:
+            self._close()
 
     def _wait_for_publishers(self) -> list[str]:
         deadline = time.monotonic() + READY_TIMEOUT_S

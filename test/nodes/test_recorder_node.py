@@ -119,6 +119,46 @@ def test_a_bag_of_its_own_is_written_each_time_the_node_is_activated(tmp_path):
         assert (tmp_path / name / 'metadata.yaml').is_file()
 
 
+@pytest.fixture
+def made(tmp_path):
+    """Return a function that makes a recorder in this process."""
+    lock, nodes = DomainLock(), []
+    context = local_context(lock.domain_id)
+
+    def make(**parameters):
+        nodes.append(ExperimentRecorder(
+            context=context, namespace='/muscle', enable_rosout=False, parameter_overrides=[
+                Parameter(name, value=value) for name, value in {
+                    'output': str(tmp_path / 'bag'), **parameters}.items()]))
+        return nodes[-1]
+    yield make
+    for node in nodes:
+        node.destroy_node()
+    rclpy.try_shutdown(context=context)
+    lock.release()
+
+
+def test_it_does_not_await_what_it_does_not_record(made, tmp_path):
+    recorder = made(topics=['pressure'], await_topics=['pressure', 'force'])
+    recorder.trigger_configure()
+    assert str(recorder.input_error) == (
+        "parameter await_topics: 'force' is not recorded, so it cannot be awaited; recorded are "
+        'pressure')
+    assert not recorder.subscriptions_polled and not (tmp_path / 'bag').exists()
+
+
+def test_a_bag_is_finished_where_the_activation_fails_after_it_was_opened(made, tmp_path):
+    recorder = made()
+
+    def broken():
+        raise RuntimeError('broken on purpose')
+    recorder._wait_for_publishers = broken
+    recorder.trigger_configure()
+    recorder.trigger_activate()
+    assert recorder.core is None
+    assert (tmp_path / 'bag' / 'metadata.yaml').is_file()
+
+
 def test_the_bag_of_a_remapped_rig_says_which_topic_is_which(tmp_path):
     lock = DomainLock()
     context = local_context(lock.domain_id)
