@@ -14,6 +14,7 @@
 
 """What the controller nodes share: measurements and reference in, pressure command out."""
 
+from collections.abc import Sequence
 from typing import Any, TYPE_CHECKING
 
 from pam_actuation.control.tick import REASONS
@@ -66,6 +67,7 @@ class ControllerNode(ManagedNode):
     learning = False
     loop: 'ControllerLoop | None' = None
     controller: Any
+    _own_services: Sequence[Any] = ()
     _vented = False         # at the end of a former run
     _last_ns: int | None = None
 
@@ -109,6 +111,12 @@ class ControllerNode(ManagedNode):
                        for topic, take in loop.takes().items()}
         self._ears = {topic: TopicEar(self, subscription)
                       for topic, (subscription, _) in self.inputs.items() if topic in judged}
+
+    def teardown(self) -> None:
+        """Take the services back, as far as they were made."""
+        for service in self._own_services:
+            self.destroy_service(service)
+        self._own_services, self.loop = (), None
 
     def inputs_of_a_tick(self) -> list[TickInput]:
         """Return the measurements and, of a reference that takes part, what it asks for."""

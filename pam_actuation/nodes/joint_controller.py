@@ -16,7 +16,7 @@
 
 from collections.abc import Sequence
 import sys
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 from pam_actuation.drivers.parameter import node_parameter
 from pam_actuation.nodes import qos
@@ -56,6 +56,8 @@ class JointNode(LearningSwitch, ControllerNode):
         node_parameter('learning', True, 'Whether the rules change while running.'),
     )
 
+    _description: Any = None        # publisher
+
     def load_rig(self) -> 'JointRig':
         """Return the joint that the controller is made for."""
         from pam_sim.joint import load_joint
@@ -74,13 +76,14 @@ class JointNode(LearningSwitch, ControllerNode):
         self._description = self.create_publisher(String, 'robot_description', qos.LATCHED)
         self._description.publish(String(data=joint_urdf(joint, self.value('muscle'))))
         self.create_topics()
-        self._freeze_service = self.create_freeze_service()
+        self._own_services = (self.create_freeze_service(),)
 
     def teardown(self) -> None:
         """Take service and description back."""
-        self.destroy_service(self._freeze_service)
-        self.destroy_publisher(self._description)
-        self.loop = None
+        super().teardown()
+        if self._description is not None:
+            self.destroy_publisher(self._description)
+        self._description = None
 
     def diagnostic_values(self) -> Values:
         """Add whether the rules change."""

@@ -63,17 +63,12 @@ class SofcNode(LearningSwitch, ControllerNode):
         super().setup()
         if self.value('rules_file') and os.path.exists(self._path()):
             self._load()
-        self._rule_services = [
+        self._own_services = [
             self.create_freeze_service(),
             self.create_service(Trigger, '~/save_rules', self._answered(self._save)),
             self.create_service(Trigger, '~/load_rules', self._answered(self._load)),
             self.create_service(Trigger, '~/reset_rules', self._answered(self._reset)),
         ]
-
-    def teardown(self) -> None:
-        """Take the services back."""
-        for service in self._rule_services:
-            self.destroy_service(service)
 
     def diagnostic_values(self) -> Values:
         """Add whether the rules change, and how often learning took changes back."""

@@ -180,6 +180,7 @@ class ValveDriver(ManagedNode):
         """Take the services back."""
         for service in self._safety_services:
             self.destroy_service(service)
+        self._safety_services = ()
         if self.output is not None:
             self.output.close()
         if self.loop is not None:

@@ -140,6 +140,27 @@ def test_a_driver_that_vented_begins_at_atmosphere(context, valve, period_s, ven
         run.end()
 
 
+@pytest.mark.parametrize('name, fails', [
+    ('sofc_controller', 'build'), ('sofc_controller', 'create_topics'),
+    ('joint_controller', 'build'), ('joint_controller', 'create_topics')])
+def test_a_configuration_that_fails_is_taken_back(context, name, fails):
+    node = node_class(name)(context=context, namespace='/muscle', enable_rosout=False)
+
+    def broken(*arguments):
+        raise OSError('disk full')
+    try:
+        topics = len(list(node.publishers))
+        setattr(node, fails, broken)
+        node.trigger_configure()
+        assert node._state_machine.current_state[1] == 'unconfigured'
+        assert len(list(node.publishers)) == topics
+        delattr(node, fails)
+        node.trigger_configure()
+        assert node._state_machine.current_state[1] == 'inactive'
+    finally:
+        node.destroy_node()
+
+
 class DeviceWatchdog:
     """It says that it vented while the driver was silent."""
 
