@@ -38,7 +38,7 @@ from pam_actuation.nodes import qos
 from pam_actuation.nodes.diagnostics import DiagnosticsReporter, ERROR, OK, Values
 from pam_actuation.nodes.endpoints import CountedPublisher, PolledSubscription, wait_until_matched
 from pam_actuation.nodes.lockstep import TickInput, TickInputs
-from pam_actuation.nodes.loops import LoopSet, SteadyTime
+from pam_actuation.nodes.loops import Loop, LoopSet, LoopTime, SteadyTime
 from pam_actuation.nodes.parameters import declare, unused_qos
 from pam_actuation.nodes.realtime import run_in_realtime
 from pam_actuation.nodes.ros_messages import class_of
@@ -268,6 +268,11 @@ class ManagedNode(LifecycleNode):
         else:
             self.loops.add(poll_s, self._polled_tick)
 
+    def add_extra_loop(self, period_s: float, callback: Callable[[], object],
+                       clock: LoopTime | None = None) -> Loop:
+        """Run something else than ``tick`` every ``period_s`` while active; return the loop."""
+        return self.loops.add(period_s, lambda: self._guarded(callback), clock)
+
     def _polled_tick(self) -> None:
         assert self.timing is not None
         since_last_s = self.timing.since_last_s(time.monotonic_ns())
@@ -422,8 +427,7 @@ class ManagedNode(LifecycleNode):
         self.diagnostics.silent = False
         # Also while a simulated time stands still.
         steady = None if self.simulated_time is None else SteadyTime()
-        self.loops.add(self.value('diagnostics_period_s'),
-                       lambda: self._guarded(self._report), steady)
+        self.add_extra_loop(self.value('diagnostics_period_s'), self._report, steady)
         self.diagnostics.update(OK, ACTIVE)
         self.get_logger().info('active')
 

@@ -210,9 +210,9 @@ class ValveDriver(ManagedNode):
             self.add_loop(self.loop.period_s)
         else:
             self.add_loop(self.loop.period_s, poll_s=COMMAND_POLL_S)
-        self.loops.add(GRAPH_PERIOD_S, self._look_at_graph)
+        self.add_extra_loop(GRAPH_PERIOD_S, self._look_at_graph)
         self.ear.begin()
-        self._answering = self.loops.add(IDLE_PERIOD_S, self._answer)
+        self._answering = self.add_extra_loop(IDLE_PERIOD_S, self._answer)
 
     def due(self, since_last_s: float) -> bool:
         """Tell whether a command or the clock asks for a tick (PPR, polled)."""

@@ -67,7 +67,7 @@ class ValveWatchdog(ManagedNode):
     def start(self) -> None:
         """Look at a steady rate."""
         self.add_loop(PERIOD_S)
-        self._answering = self.loops.add(IDLE_PERIOD_S, self._answer)
+        self._answering = self.add_extra_loop(IDLE_PERIOD_S, self._answer)
 
     def _listen(self) -> tuple[int, bool]:
         """Take what was said; return the time after and whether a second sender opens."""

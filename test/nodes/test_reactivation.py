@@ -14,12 +14,15 @@
 
 """Test that a node which vented and goes on at once takes the pressure up slowly."""
 
+import time
+
 import pytest
 
 pytest.importorskip('rclpy')
 
 from pam_actuation.messages import AngleReference, Contraction, JointAngle  # noqa: E402, I100
 from pam_actuation.messages import Pressure, Reference, START_NS            # noqa: E402
+from pam_actuation.nodes.diagnostics import ERROR                           # noqa: E402
 from pam_actuation.nodes.interfaces import node_class                       # noqa: E402
 from pam_actuation.rigging.client import local_context                      # noqa: E402
 from pam_actuation.rigging.domain import DomainLock                         # noqa: E402
@@ -157,6 +160,29 @@ def test_a_configuration_that_fails_is_taken_back(context, name, fails):
         delattr(node, fails)
         node.trigger_configure()
         assert node._state_machine.current_state[1] == 'inactive'
+    finally:
+        node.destroy_node()
+
+
+@pytest.mark.parametrize('name, part', [
+    ('valve_driver', '_look_at_graph'), ('valve_driver', '_answer'), ('valve_driver', 'tick'),
+    ('valve_watchdog', '_answer'), ('valve_watchdog', 'tick')])
+def test_an_exception_in_any_loop_ends_the_node_in_order(context, name, part):
+    node = node_class(name)(context=context, namespace='/muscle', enable_rosout=False)
+
+    def broken():
+        raise RuntimeError('broken on purpose')
+    try:
+        setattr(node, part, broken)
+        node.trigger_configure()
+        node.trigger_activate()
+        deadline_s = time.monotonic() + 5.0
+        while node.exit_code is None and time.monotonic() < deadline_s:
+            node.loops.run_once()
+        assert node.exit_code == 1 and not node.loops
+        node.finish('ended')
+        level, _, _ = node.last_status('ended')
+        assert level == ERROR
     finally:
         node.destroy_node()
 
