@@ -123,6 +123,6 @@ class LoopSet:
         with self.lock:
             for loop in self._loops:
                 now_ns = loop.clock.now_ns()
-                if loop.next_ns <= now_ns:
+                if loop.next_ns <= now_ns and self._loops:      # one before may have ended all
                     loop.advance(now_ns)
                     loop.callback()

@@ -80,10 +80,12 @@ def test_on_the_clock_of_the_computer_no_tick_comes_early():
 
 
 def test_a_loop_may_end_all_loops():
-    loops = LoopSet()
+    loops, calls = LoopSet(), []
     loops.add(0.001, loops.clear)
+    loops.add(0.001, lambda: calls.append('after the end'))
+    time.sleep(0.003)       # both are due
     loops.run_once()
-    assert not loops
+    assert not loops and not calls
 
 
 def test_loops_run_on_the_time_they_are_given():
