@@ -395,6 +395,9 @@ class ManagedNode(LifecycleNode):
             self.diagnostics.update(ERROR, f'cannot {word}: {error}')
             if action == self._configure:
                 self._undo_setup()
+            elif self.loops:
+                self._end_loops()
+                self._make_safe(f'cannot {word}: {error}')
             return TransitionCallbackReturn.FAILURE
         except Exception as error:
             self.get_logger().error(f'cannot {word}:\n{traceback.format_exc()}')

@@ -27,6 +27,7 @@ from pam_actuation.nodes.interfaces import node_class                       # no
 from pam_actuation.rigging.client import local_context                      # noqa: E402
 from pam_actuation.rigging.domain import DomainLock                         # noqa: E402
 from pam_actuation.slow_rise import LONGEST_STEP_S, RISE_PA_PER_S                           # noqa: E402
+from pam_sim.errors import InputError                                       # noqa: E402
 from pam_sim.units import P_ATM_PA                                          # noqa: E402
 import rclpy                                                                # noqa: E402
 from rclpy.parameter import Parameter                                       # noqa: E402
@@ -185,6 +186,24 @@ def test_an_exception_in_any_loop_ends_the_node_in_order(context, name, part):
         assert level == ERROR
     finally:
         node.destroy_node()
+
+
+def test_an_activation_refused_at_its_end_leaves_no_loop_behind(context):
+    run = Run(context, 'valve_driver', 0.005)
+    start = run.node.start
+
+    def refused():
+        start()
+        raise InputError('is wrong', 'a file')
+    try:
+        run.node.trigger_deactivate()
+        run.node.start, run.sent = refused, {}
+        run.node.trigger_activate()
+        assert run.node._state_machine.current_state[1] == 'inactive'
+        assert not run.node.loops
+        assert run.sent['valve_signal'][-1].efforts == SAFE['ppr']
+    finally:
+        run.end()
 
 
 class DeviceWatchdog:
