@@ -113,6 +113,15 @@ def open_sensors(name: str, values: dict[str, Any]) -> SensorInput:
     return _tell(lambda: back_end(values), back_end, values)
 
 
+def close_sensors(sensors: SensorInput) -> str:
+    """Close the sensors of a back end; return what is wrong, '' if nothing."""
+    try:
+        sensors.close()
+    except Exception as error:      # of a back end of somebody else
+        return str(device_error(error, type(sensors), sensors.values))
+    return ''
+
+
 def _tell(action: Callable[[], Told], back_end: BackEnd, values: Mapping[str, Any]) -> Told:
     """Return what an action returns; a device that is not usable is a mistake of the user."""
     try:

@@ -40,7 +40,8 @@ class SensorInput:
     """
     The sensors of one muscle, or the angle sensor of one joint.
 
-    Derived classes set ``PARAMETERS`` and ``topics``, and override ``read``.
+    Derived classes set ``PARAMETERS`` and ``topics``, and override ``read``. One that holds a
+    port or a thread overrides ``close`` too.
 
     Parameters
     ----------
@@ -78,6 +79,9 @@ class SensorInput:
         ``joint_state``: the angle [rad], flexion positive.
         """
         raise NotImplementedError
+
+    def close(self) -> None:
+        """Let others have the devices: the node is cleaned up, and may open them anew."""
 
 
 class NewReadings:

@@ -19,6 +19,7 @@ import sys
 from typing import Any
 
 from pam_actuation.drivers.parameter import node_parameter
+from pam_actuation.hardware.back_ends import close_sensors
 from pam_actuation.hardware.back_ends import open_sensors
 from pam_actuation.hardware.back_ends import parameters_of
 from pam_actuation.hardware.back_ends import SENSOR_INPUTS
@@ -72,7 +73,10 @@ class HardwareSensors(ManagedNode):
 
     def teardown(self) -> None:
         """Let go of the sensors."""
-        self.sensors = None
+        sensors, self.sensors = self.sensors, None
+        problem = sensors and close_sensors(sensors)
+        if problem:
+            self.get_logger().warning(f'the sensors were not closed: {problem}')
 
     def start(self) -> None:
         """Read at a steady rate."""

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Test that a node which vented and goes on at once takes the pressure up slowly."""
+"""Test how nodes go on after a vent, which is slowly, after a failure and a clean-up."""
 
 import time
 
@@ -20,7 +20,9 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from pam_actuation.messages import AngleReference, Contraction, JointAngle  # noqa: E402, I100
+from pam_actuation.hardware.back_ends import SENSOR_INPUTS                  # noqa: E402, I100
+from pam_actuation.hardware.dummy import DummySensors                       # noqa: E402
+from pam_actuation.messages import AngleReference, Contraction, JointAngle  # noqa: E402
 from pam_actuation.messages import Pressure, Reference, START_NS            # noqa: E402
 from pam_actuation.nodes.diagnostics import ERROR                           # noqa: E402
 from pam_actuation.nodes.interfaces import node_class                       # noqa: E402
@@ -204,6 +206,39 @@ def test_an_activation_refused_at_its_end_leaves_no_loop_behind(context):
         assert run.sent['valve_signal'][-1].efforts == SAFE['ppr']
     finally:
         run.end()
+
+
+class SerialPort(DummySensors):
+    """Sensors on a port that one process at a time may have; it complains when it is closed."""
+
+    is_open = False
+
+    def __init__(self, values):
+        super().__init__(values)
+        if SerialPort.is_open:
+            raise OSError('port is busy')
+        SerialPort.is_open = True
+
+    def close(self):
+        SerialPort.is_open = False
+        raise OSError('port is gone')
+
+
+def test_sensors_that_were_cleaned_up_can_be_opened_again(context, monkeypatch, capfd):
+    monkeypatch.setitem(SENSOR_INPUTS, 'dummy', SerialPort)
+    node = node_class('hardware_sensors')(
+        context=context, namespace='/muscle', enable_rosout=False,
+        parameter_overrides=[Parameter('backend', value='dummy')])
+    try:
+        for _ in range(2):
+            node.trigger_configure()
+            assert node.input_error is None and SerialPort.is_open
+            node.trigger_cleanup()
+            assert not SerialPort.is_open
+            assert node._state_machine.current_state[1] == 'unconfigured'
+    finally:
+        node.destroy_node()
+    assert 'back end SerialPort: OSError: port is gone' in capfd.readouterr().err
 
 
 class DeviceWatchdog:
