@@ -89,9 +89,9 @@ def _usable_torque_n_m(message: 'NamedEfforts', joint: str, now_ns: int,
     if not math.isfinite(torque_n_m):
         raise InputError('is not a finite number', WHERE)
     if now_ns - message.stamp_ns > MAX_AGE_NS:
-        raise InputError('is older than 0.1 s', WHERE)
+        raise InputError(f'is older than {MAX_AGE_NS * 1e-9:g} s', WHERE)
     if message.stamp_ns - now_ns > MAX_AHEAD_NS:
-        raise InputError('is stamped more than 0.02 s ahead', WHERE)
+        raise InputError(f'is stamped more than {MAX_AHEAD_NS * 1e-9:g} s ahead', WHERE)
     if angle_wanted:
         raise InputError('is not followed while an angle is wanted', WHERE)
     return torque_n_m

@@ -25,7 +25,9 @@ from dataclasses import dataclass
 import math
 from typing import Any, NamedTuple, Protocol
 
+from pam_actuation.control.inputs import MAX_AGE_S
 from pam_actuation.control.modes.tracked import JOINT, Tracked, tracked_by
+from pam_actuation.control.reference_buffer import MAX_AHEAD_NS
 from pam_actuation.control.slack_muscle import PROOF_PA
 from pam_actuation.slow_rise import NEARLY_PA, SlowRise
 from pam_sim.joint.parameters import SIDES
@@ -37,24 +39,26 @@ from pam_sim.units import P_ATM_PA
  ANGLE_NOT_FINITE, ANGLE_IMPLAUSIBLE, EFFORT_LOST, CONTRACTION_FROZEN,
  FORCE_FROZEN, ANGLE_FROZEN, MUSCLE_SLACK, TWO_SENSORS, LAW_FAILED) = range(26)
 NOT_MEASURED = 'measured yet'        # how the reasons of missing sensors end
+_OLD = f'is older than {MAX_AGE_S:g} s'
+_AHEAD = f'is stamped more than {MAX_AHEAD_NS * 1e-9:g} s ahead'
 REASONS = (
     'ok',
     'no contraction measured yet',
-    'contraction is older than 0.1 s',
-    'contraction is stamped more than 0.02 s ahead',
+    f'contraction {_OLD}',
+    f'contraction {_AHEAD}',
     'contraction is not a finite number',
     'contraction is outside what the muscle can do',
     'no reference yet',
     'reference lost, muscle vented',
     'reference lost, holding its last position',
     'no force measured yet',
-    'force is older than 0.1 s',
-    'force is stamped more than 0.02 s ahead',
+    f'force {_OLD}',
+    f'force {_AHEAD}',
     'force is not a finite number',
     'force is outside what the muscle can do',
     'no joint angle measured yet',
-    'joint angle is older than 0.1 s',
-    'joint angle is stamped more than 0.02 s ahead',
+    f'joint angle {_OLD}',
+    f'joint angle {_AHEAD}',
     'joint angle is not a finite number',
     'joint angle is outside what the joint can do',
     'wanted torque lost, muscles vented',

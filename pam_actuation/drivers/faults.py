@@ -21,6 +21,11 @@ documentation prints them (``fault_table_markdown``).
 
 from dataclasses import dataclass
 
+from pam_actuation.drivers import limits, monitors
+from pam_actuation.drivers.monitors import AirMonitor, MOST_RELAPSES, RELAPSES_WITHIN_S
+from pam_actuation.drivers.senders import CLEAR_S
+from pam_sim.units import P_ATM_PA
+
 VENT = 'vent'
 HOLD = 'hold'
 IGNORE = 'ignore'
@@ -45,13 +50,17 @@ class Fault:
     resume: str
 
 
+_LIMITS = limits.SafetyLimits()
+_HEARD_TWICE = f'a publisher (by its GID) is heard again after another one within {CLEAR_S:g} s'
+_HELD = f'warning ends {monitors.WARNING_HOLD_S:g} s after the last such command'
 _RAMP = 'then a slow rise from atmospheric pressure'
 
 FAULT_TABLE = (
     Fault('emergency_stop', 'Emergency stop',
           'service ~/emergency_stop called', VENT, True, 'service ~/reset, ' + _RAMP),
     Fault('over_pressure', 'Over-pressure',
-          'one valid reading above 1.05 times the pressure limit plus 10 kPa', VENT, True,
+          f'one valid reading above {limits.TRIP_SHARE:g} times the pressure limit plus '
+          f'{limits.TRIP_MARGIN_PA * 1e-3:g} kPa', VENT, True,
           'service ~/reset, refused while the reading is above the limit; ' + _RAMP),
     Fault('device_refuses', 'Valve device refuses its signal',
           'writing to the analog output or the PWM failed (hardware back ends)', VENT, True,
@@ -61,21 +70,20 @@ FAULT_TABLE = (
           'no valid pressure_command since start or reset', VENT, False,
           'first valid command, ' + _RAMP),
     Fault('command_timeout', 'Command lost',
-          'newest valid pressure_command older than 0.1 s (controller killed, stopped, '
-          'cut off, or sending only invalid values)', VENT, False,
+          f'newest valid pressure_command older than {_LIMITS.command_timeout_s:g} s (controller '
+          'killed, stopped, cut off, or sending only invalid values)', VENT, False,
           'next valid command, ' + _RAMP),
     Fault('two_publishers', 'Two publishers on pressure_command',
-          'a publisher (by its GID) is heard again after another one within 1 s; or two or more '
-          'commands in 0.5 s with a stamp or publisher sequence number that goes '
-          'backwards, or with equal stamps and different values', VENT, False,
-          'no such command for 1 s, ' + _RAMP),
+          f'{_HEARD_TWICE}; or two or more commands in {_LIMITS.two_publishers_window_s:g} s '
+          'with a stamp or publisher sequence number that goes backwards, or with equal stamps '
+          'and different values', VENT, False,
+          f'no such command for {_LIMITS.two_publishers_clear_s:g} s, ' + _RAMP),
     Fault('second_driver', 'Second sender of valve_signal',
           'a message on valve_signal from a writer (by its GID) that is neither the driver nor, '
           'where it is the safe signal, its valve_watchdog; the watchdog looks for one as well',
-          VENT, False, 'no such message for 1 s, ' + _RAMP),
+          VENT, False, f'no such message for {CLEAR_S:g} s, ' + _RAMP),
     Fault('two_sensors', 'Two publishers on pressure',
-          'a publisher (by its GID) is heard again after another one within 1 s', VENT, False,
-          'no such message for 1 s, ' + _RAMP),
+          _HEARD_TWICE, VENT, False, f'no such message for {CLEAR_S:g} s, ' + _RAMP),
     Fault('second_publisher_seen', 'Second publisher on the graph',
           'beside the publisher of pressure_command that sends, the graph shows one that was '
           'never heard (one that was heard before has ended)', IGNORE, False,
@@ -87,14 +95,13 @@ FAULT_TABLE = (
           'value is not a finite number', IGNORE, False,
           'message dropped; the former command goes on until its time-out'),
     Fault('command_stamp', 'Command too old or from the future',
-          'stamp older than 0.1 s or more than 0.02 s ahead on arrival', IGNORE, False,
+          f'stamp older than {_LIMITS.command_timeout_s:g} s or more than '
+          f'{_LIMITS.stamp_ahead_s:g} s ahead on arrival', IGNORE, False,
           'message dropped; the former command goes on until its time-out'),
     Fault('command_above_limit', 'Command above the pressure limit',
-          'command above max_pressure_gauge_pa', CLAMP, False,
-          'warning ends 1 s after the last such command'),
+          'command above max_pressure_gauge_pa', CLAMP, False, _HELD),
     Fault('command_below_atmosphere', 'Command below the atmosphere',
-          'command below 101.325 kPa absolute', CLAMP, False,
-          'warning ends 1 s after the last such command'),
+          f'command below {P_ATM_PA * 1e-3:g} kPa absolute', CLAMP, False, _HELD),
     Fault('valve_command_at_limit', 'Valve command fills above the pressure limit (HSV)',
           'filling duty commanded and a valid reading at or above max_pressure_gauge_pa', CLAMP,
           False, 'the filling valve stays shut until the reading is below the limit'),
@@ -102,42 +109,52 @@ FAULT_TABLE = (
           'any fault of this table that vents, while another valve_command than venting is '
           'followed', VENT, True, 'service ~/reset, then the next command'),
     Fault('no_pressure', 'No measured pressure yet',
-          'no valid pressure since start: HSV; PPR in its first 2 s (first_pressure_wait_s)',
+          'no valid pressure since start: HSV; PPR in its first '
+          f'{_LIMITS.first_pressure_wait_s:g} s (first_pressure_wait_s)',
           VENT, False, 'first valid reading, ' + _RAMP),
     Fault('no_pressure_ppr', 'No measured pressure at all',
-          'no valid pressure in the first 2 s: PPR', IGNORE, False,
-          'warning, over-pressure is not supervised; ends with the first valid reading'),
+          f'no valid pressure in the first {_LIMITS.first_pressure_wait_s:g} s: PPR', IGNORE,
+          False, 'warning, over-pressure is not supervised; ends with the first valid reading'),
     Fault('pressure_timeout', 'Measured pressure lost',
-          'newest valid pressure older than 0.1 s (sensor lost; or only readings that are '
-          'NaN, below -20 kPa gauge, above 1500 kPa absolute, or stamped more than 0.02 s '
-          'ahead)', VENT, False, 'next valid reading, ' + _RAMP),
+          f'newest valid pressure older than {_LIMITS.measurement_timeout_s:g} s (sensor lost; or '
+          f'only readings that are NaN, below {_LIMITS.lowest_plausible_gauge_pa * 1e-3:g} kPa '
+          f'gauge, above {_LIMITS.highest_plausible_pa * 1e-3:g} kPa absolute, or stamped more '
+          f'than {_LIMITS.stamp_ahead_s:g} s ahead)', VENT, False, 'next valid reading, ' + _RAMP),
     Fault('pressure_relapses', 'Measured pressure lost again and again',
-          'the fifth vent within 30 s for readings that are NaN or not believable, as of a sensor '
-          'with the wrong sign', VENT, True, 'service ~/reset, ' + _RAMP),
+          f'{MOST_RELAPSES} vents within {RELAPSES_WITHIN_S:g} s for readings that are NaN or not '
+          'believable, as of a sensor with the wrong sign', VENT, True,
+          'service ~/reset, ' + _RAMP),
     Fault('pressure_frozen', 'Measured pressure frozen (HSV)',
-          'reading unchanged to the last bit for 0.2 s or longer while the valve flow should have '
-          'moved it by 100 kPa; where filling comes near the pressure limit less is enough, '
-          'down to 0.06 s and 10 kPa', VENT, False, 'first reading that differs, ' + _RAMP),
+          f'reading unchanged to the last bit for {_LIMITS.frozen_after_s:g} s or longer while '
+          f'the valve flow should have moved it by {_LIMITS.frozen_change_pa * 1e-3:g} kPa; '
+          'where filling comes near the pressure limit less is enough, down to '
+          f'{monitors.SHORTEST * _LIMITS.frozen_after_s:g} s and '
+          f'{monitors.LEAST_CHANGE * _LIMITS.frozen_change_pa * 1e-3:g} kPa', VENT, False,
+          'first reading that differs, ' + _RAMP),
     Fault('pressure_frozen_ppr', 'Measured pressure frozen (PPR)',
           'as above, from the lag of the regulator', IGNORE, False,
           'warning: the regulator closes its own loop; ends with a reading that differs'),
     Fault('air_missing', 'No air at the regulator (PPR)',
-          'measured pressure more than 50 kPa below all that was commanded within lag and dead '
-          'time, and falling for 0.03 s, or below 20 kPa gauge for 0.2 s', IGNORE, False,
+          f'measured pressure more than {AirMonitor.MISSING_PA * 1e-3:g} kPa below all that was '
+          f'commanded within lag and dead time, and falling for {AirMonitor.FALLS_S:g} s, or '
+          f'below {AirMonitor.EMPTY_GAUGE_PA * 1e-3:g} kPa gauge for {AirMonitor.EMPTY_S:g} s',
+          IGNORE, False,
           'warning; the pressure rises slowly from atmospheric pressure as the air returns'),
     Fault('supply_low', 'Supply loss',
-          'measured supply pressure less than 20 kPa above the command', IGNORE, False,
+          f'measured supply pressure less than {_LIMITS.supply_margin_pa * 1e-3:g} kPa above the '
+          'command', IGNORE, False,
           'warning: the muscle keeps what it has and gets what there is; ends when the supply '
           'returns, then a slow rise from what is there'),
     Fault('supply_stale', 'Supply reading lost',
-          'supply pressure was measured and is now older than 0.5 s, or invalid', IGNORE, False,
+          f'supply pressure was measured and is now older than {_LIMITS.supply_timeout_s:g} s, or '
+          'invalid', IGNORE, False,
           'warning: the nominal supply is assumed'),
     Fault('driver_paused', 'Driver stopped and continued',
-          'more than 0.3 s between two ticks of the driver, or deactivated in between', VENT,
-          False, 'first command and reading stamped after the pause, ' + _RAMP),
+          f'more than {_LIMITS.pause_s:g} s between two ticks of the driver, or deactivated in '
+          'between', VENT, False, 'first command and reading stamped after the pause, ' + _RAMP),
     Fault('clock_ahead', 'Clock set ahead',
-          'more than 0.3 s between two ticks by the clock of the stamps, but not by the steady '
-          'clock of the computer', VENT, False,
+          f'more than {_LIMITS.pause_s:g} s between two ticks by the clock of the stamps, but not '
+          'by the steady clock of the computer', VENT, False,
           'first command and reading on the new clock, ' + _RAMP),
     Fault('clock_back', 'Clock set back',
           'time of a tick before that of the former one', VENT, False,
@@ -147,9 +164,10 @@ FAULT_TABLE = (
           'start the driver again'),
     Fault('driver_killed', 'Driver killed, stopped or its computer lost',
           'not detectable by the driver: the valve holds its last signal', HOLD, False,
-          'valve_watchdog, a process of its own, sends the safe valve_signal after 0.05 s of '
-          'silence; behind a hardware back end another one vents the device after 0.1 s; with '
-          'the computer lost only hardware can'),
+          'valve_watchdog, a process of its own, sends the safe valve_signal after '
+          f'{limits.WATCHDOG_S:g} s of silence; behind a hardware back end another one vents the '
+          f'device after {limits.DEVICE_WATCHDOG_S:g} s; with the computer lost only hardware '
+          'can'),
     Fault('watchdog_vented', 'Driver silent for a moment, watchdog vented',
           'the safe signal of another node, valve_watchdog as a rule, heard by the driver, or a '
           'vent by the watchdog of its device: a busy machine kept it from sending', IGNORE, False,

@@ -19,6 +19,9 @@ from dataclasses import dataclass
 from pam_actuation.drivers.parameter import number
 from pam_actuation.slow_rise import NEARLY_PA, RISE_PA_PER_S, UNTIL_FOLLOWED_S
 
+TRIP_SHARE, TRIP_MARGIN_PA = 1.05, 10_000.0     # of the pressure limit, and above that
+WATCHDOG_S, DEVICE_WATCHDOG_S = 0.05, 0.1       # silence of a driver from which they vent
+
 
 @dataclass(frozen=True)
 class SafetyLimits:
@@ -64,4 +67,4 @@ class SafetyLimits:
     @property
     def trip_gauge_pa(self) -> float:
         """Return the measured gauge pressure [Pa] above which the driver trips."""
-        return 1.05 * self.max_pressure_gauge_pa + 10_000.0
+        return TRIP_SHARE * self.max_pressure_gauge_pa + TRIP_MARGIN_PA

@@ -29,7 +29,9 @@ _NO_SEQUENCE = 2 ** 63     # middleware without sequence numbers gives 0 or all 
 # A frozen reading near the pressure limit: full times and changes count with 1.5 times the change
 # of room or more, and never less than these parts of them.
 _SAFE_ROOM = 1.5
-_LEAST_CHANGE, _SHORTEST = 0.1, 0.3
+LEAST_CHANGE, SHORTEST = 0.1, 0.3
+MOST_RELAPSES, RELAPSES_WITHIN_S = 5, 30.0
+WARNING_HOLD_S = 1.0        # a warning stays in the message after its last cause
 
 
 def stamp_problem(stamp_ns: int, now_ns: int, oldest_s: float, ahead_s: float) -> str:
@@ -210,8 +212,8 @@ class FrozenMonitor:
         if self.expected_pa > 0.0:
             part = min(room_pa / (_SAFE_ROOM * self.change_pa), 1.0)
         if self._value_pa is not None and (
-                abs(self.expected_pa) > max(part, _LEAST_CHANGE) * self.change_pa):
-            if stamp_ns - self._since_ns >= max(part, _SHORTEST) * self.after_s * 1e9:
+                abs(self.expected_pa) > max(part, LEAST_CHANGE) * self.change_pa):
+            if stamp_ns - self._since_ns >= max(part, SHORTEST) * self.after_s * 1e9:
                 self.frozen = True
         return self.frozen
 
@@ -286,7 +288,7 @@ class AirMonitor:
 
     """
 
-    MISSING_PA, EMPTY_PA = 50_000.0, P_ATM_PA + 20_000.0
+    MISSING_PA, EMPTY_GAUGE_PA = 50_000.0, 20_000.0
     FALLS_S, EMPTY_S = 0.03, 0.2
     _FALL_PA = 1_000.0
 
@@ -329,6 +331,6 @@ class AirMonitor:
             return False
         if measured_pa < self._readings[0][1] - self._FALL_PA:
             self._falls_s += elapsed_s
-        if measured_pa < self.EMPTY_PA:
+        if measured_pa < P_ATM_PA + self.EMPTY_GAUGE_PA:
             self._empty_s += elapsed_s
         return self._falls_s >= self.FALLS_S or self._empty_s >= self.EMPTY_S

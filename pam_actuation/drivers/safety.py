@@ -30,7 +30,8 @@ import re
 from pam_actuation.drivers.faults import FAULTS
 from pam_actuation.drivers.limits import SafetyLimits
 from pam_actuation.drivers.monitors import (
-    AirMonitor, Channel, ClockMonitor, CommandOrder, FrozenMonitor, Relapses, stamp_problem)
+    AirMonitor, Channel, ClockMonitor, CommandOrder, FrozenMonitor, MOST_RELAPSES, Relapses,
+    RELAPSES_WITHIN_S, stamp_problem, WARNING_HOLD_S)
 from pam_actuation.drivers.steady_age import SteadyAge
 from pam_actuation.messages import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN
 from pam_actuation.slow_rise import SlowRise, WAITS_LONG_S
@@ -42,7 +43,7 @@ VENTED = 'vented'
 EMERGENCY_STOP = 'emergency_stop'
 
 _NS = 1_000_000_000
-_WARNING_HOLD_NS = _NS       # a warning stays in the message for 1 s after its last cause
+_WARNING_HOLD_NS = WARNING_HOLD_S * _NS
 _LATE_TICK_NS = 50_000_000   # after a tick this late, queued messages get one chance to arrive
 _GRACE_NS = 20_000_000
 _QUEUE = 256
@@ -140,7 +141,7 @@ class SafetySupervisor:
         self._rise = SlowRise(lim.resume_rate_pa_per_s, lim.resume_until_followed_s,
                               lag_s=lag_s, dead_time_s=dead_time_s,
                               nearly_pa=lim.resume_nearly_pa)
-        self._relapses = Relapses(5, 30.0)
+        self._relapses = Relapses(MOST_RELAPSES, RELAPSES_WITHIN_S)
         self._now_ns: int | None = None
         self._stopped = False           # since the last tick
         self._first_tick_ns = 0

@@ -20,6 +20,7 @@ import time
 from typing import Any
 
 from pam_actuation.drivers.config import DRIVER_PARAMETERS, DriverConfig
+from pam_actuation.drivers.limits import DEVICE_WATCHDOG_S
 from pam_actuation.drivers.parameter import node_parameter
 from pam_actuation.hardware.back_ends import NO_DEVICE
 from pam_actuation.hardware.back_ends import open_valve
@@ -82,8 +83,9 @@ class ValveDriver(ManagedNode):
             'backend', 'sim', 'What the valve hangs on: the plant that listens to valve_signal, '
             'nothing, an analog output, two PWM channels.', choices=tuple(VALVE_OUTPUTS)),
         node_parameter(
-            'device_watchdog_s', 0.1, 'Silence of the driver, killed or stopped, from which a '
-            'process of its own vents the device of the back end [s]; 0: none does.', 0.0, 1.0),
+            'device_watchdog_s', DEVICE_WATCHDOG_S, 'Silence of the driver, killed or stopped, '
+            'from which a process of its own vents the device of the back end [s]; 0: none does.',
+            0.0, 1.0),
         node_parameter(
             'watchdog', WATCHDOG, 'Name of the node whose safe signals do not count as those of a '
             'second sender. Without a slash: in the namespace of this node.'),

@@ -18,6 +18,7 @@ from collections.abc import Sequence
 import sys
 from typing import Any
 
+from pam_actuation.drivers.limits import WATCHDOG_S
 from pam_actuation.drivers.parameter import node_parameter
 from pam_actuation.drivers.watchdog import (
     CONTESTED, machine_load, SignalWatchdog, VENTS, WAITING)
@@ -49,7 +50,8 @@ class ValveWatchdog(ManagedNode):
             'valve_type', 'ppr', 'Valve of the rig, until a driver is heard: then that of its '
             'signals.', choices=VALVES),
         node_parameter(
-            'timeout_s', 0.05, 'Silence of valve_signal from which it vents [s].', 0.02, 1.0),
+            'timeout_s', WATCHDOG_S, 'Silence of valve_signal from which it vents [s].',
+            0.02, 1.0),
     )
 
     watchdog: Any = None        # a SignalWatchdog, once configured
