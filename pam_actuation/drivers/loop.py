@@ -24,9 +24,10 @@ import math
 from typing import Any
 
 from pam_actuation.drivers.config import check_valve_type, DriverConfig
+from pam_actuation.drivers.decision import Decision
 from pam_actuation.drivers.hsv import HsvLaw
 from pam_actuation.drivers.ppr import PprLaw
-from pam_actuation.drivers.safety import Decision, SafetySupervisor
+from pam_actuation.drivers.safety import SafetySupervisor
 from pam_actuation.messages import (
     Contraction, Pressure, SAFE_EFFORTS, Status, VALVE_NAMES, ValveSignal)
 from pam_sim.units import gauge_kpa, P_ATM_PA

@@ -27,6 +27,7 @@ from dataclasses import dataclass, field
 import math
 import re
 
+from pam_actuation.drivers.decision import Decision, EMERGENCY_STOP, OK, VENTED, WAITING
 from pam_actuation.drivers.faults import FAULTS
 from pam_actuation.drivers.limits import SafetyLimits
 from pam_actuation.drivers.monitors import (
@@ -37,11 +38,6 @@ from pam_actuation.messages import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN
 from pam_actuation.slow_rise import SlowRise, WAITS_LONG_S
 from pam_sim.units import gauge_kpa, P_ATM_PA
 
-WAITING = 'waiting'
-OK = 'ok'
-VENTED = 'vented'
-EMERGENCY_STOP = 'emergency_stop'
-
 _NS = 1_000_000_000
 _WARNING_HOLD_NS = WARNING_HOLD_S * _NS
 _LATE_TICK_NS = 50_000_000   # after a tick this late, queued messages get one chance to arrive
@@ -50,26 +46,6 @@ _QUEUE = 256
 _TO_GO_ON = '; call the service reset to go on'      # said of what is latched
 
 Fault = tuple[str, str]      # key in ``FAULTS``, sentence
-
-
-@dataclass(frozen=True)
-class Decision:
-    """
-    The outcome of one tick.
-
-    ``pressure_pa`` is the absolute pressure to follow, None = vent; ``duty`` is the
-    opening to send as it is (-1 vents, 0 shuts, 1 fills), None = the law decides;
-    ``fault`` is the key in ``FAULTS`` of the reason ('' if none), ``level`` that of a
-    diagnostic status.
-    """
-
-    state: str
-    pressure_pa: float | None
-    level: int
-    message: str
-    fault: str = ''
-    warnings: tuple[str, ...] = ()
-    duty: float | None = None
 
 
 def _without_figures(fault: Fault) -> tuple[str, str]:

@@ -20,7 +20,7 @@ import os
 import time
 from typing import Self, TYPE_CHECKING
 
-from pam_actuation.drivers.safety import EMERGENCY_STOP
+from pam_actuation.drivers.decision import EMERGENCY_STOP
 from pam_actuation.messages import LEVEL_ERROR
 from pam_actuation.namespaces import node_name_of
 from pam_actuation.rigging.node_group import NodeGroup

@@ -16,8 +16,8 @@
 
 from collections.abc import Mapping
 
+from pam_actuation.drivers.decision import OK
 from pam_actuation.drivers.faults import BY_HAND
-from pam_actuation.drivers.safety import OK
 from pam_actuation.drivers.watchdog import RESTS, VENTS
 from pam_actuation.hardware.device_watchdog import GONE
 from pam_actuation.messages import DEACTIVATED

@@ -19,9 +19,9 @@ import math
 from pathlib import Path
 
 from pam_actuation.drivers import safety
+from pam_actuation.drivers.decision import EMERGENCY_STOP, OK, VENTED, WAITING
 from pam_actuation.drivers.faults import FAULT_TABLE, fault_table_markdown, FAULTS
-from pam_actuation.drivers.safety import (
-    EMERGENCY_STOP, OK, SafetyLimits, SafetySupervisor, VENTED, WAITING)
+from pam_actuation.drivers.safety import SafetyLimits, SafetySupervisor
 from pam_sim.units import P_ATM_PA
 import pytest
 
