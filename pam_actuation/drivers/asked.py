@@ -59,7 +59,8 @@ def asked_by(controller: str | os.PathLike[str]) -> dict[str, float]:
     """
     text = os.fspath(controller)
     if '\n' in text:
-        return asked_in(load_yaml(text, name='controller text')) if f'\n{_KEY}:' in text else {}
+        # Read only where the word is there: a file of rules takes 0.1 s.
+        return asked_in(load_yaml(text, name='controller text')) if _KEY in text else {}
     from pam_actuation.resources import find_config
     return asked_in(load_yaml(find_config('controllers', text)))
 

@@ -49,6 +49,9 @@ def rig():
 def test_asked_numbers(rig, tmp_path):
     """They are read from text and file, written again, and reach the node of the driver."""
     assert asked_by(TEXT) == ASKED
+    for text in ('driver: {hsv.gain: 0.4}\ncontroller: pid\n',
+                 'controller: pid\n"driver": {hsv.gain: 0.4}\n'):
+        assert asked_by(text) == load_controller(text, rig).driver == {'hsv.gain': 0.4}
     assert asked_by('pid_hsv') == {}
     controller = load_controller(TEXT, rig)
     assert controller.driver == ASKED
