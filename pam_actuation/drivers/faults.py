@@ -171,7 +171,8 @@ FAULT_TABLE = (
     Fault('watchdog_vented', 'Driver silent for a moment, watchdog vented',
           'the safe signal of another node, valve_watchdog as a rule, heard by the driver, or a '
           'vent by the watchdog of its device: a busy machine kept it from sending', IGNORE, False,
-          'warning; the driver goes on with a slow rise from atmospheric pressure'),
+          'warning; the driver goes on with a slow rise from atmospheric pressure, and not with a '
+          'valve_command (HSV), which is interrupted'),
     Fault('reference_lost', 'Reference lost',
           'noticed by the controller, which then commands atmospheric pressure', IGNORE, False,
           'the driver follows the controller'),

@@ -150,10 +150,11 @@ class SafetySupervisor:
             self._latch('emergency_stop', f'emergency stop: {why}')
 
     def vented_elsewhere(self, now_ns: int) -> None:
-        """Tell that another node sent the signal that vents: the pressure rises slowly again."""
+        """Tell that somebody else vented: the pressure rises slowly again, an opening latches."""
+        why = 'the watchdog vented, since this driver fell silent for a moment (busy machine?)'
         self._rise.begin()
-        self._warn('watchdog_vented', 'the watchdog vented, since this driver fell silent for a '
-                   'moment (busy machine?)', now_ns)
+        self._latched_if_raw(('watchdog_vented', why))
+        self._warn('watchdog_vented', why, now_ns)
 
     def stop(self) -> None:
         """Tell that the driver vented and ticks no more: once it does it begins with a vent."""

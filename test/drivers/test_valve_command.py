@@ -81,7 +81,7 @@ def test_vents_when_the_sender_stops(valve, wanted, safe):
     assert efforts == safe and status.level == 2
 
 
-@pytest.mark.parametrize('fault', ['sender', 'sensor', 'nan'])
+@pytest.mark.parametrize('fault', ['sender', 'sensor', 'nan', 'watchdog', 'stopped'])
 def test_an_interrupted_sequence_of_duties_latches(fault):
     bench = Bench()
     bench.efforts = (0.1, 0.0)
@@ -90,6 +90,10 @@ def test_an_interrupted_sequence_of_duties_latches(fault):
         bench.efforts = None
     elif fault == 'sensor':
         bench.kpa = None
+    elif fault == 'watchdog':
+        bench.loop.vented_elsewhere(bench.now)
+    elif fault == 'stopped':
+        bench.loop.stop()
     else:
         bench.efforts = (math.nan, 0.0)
     assert bench.run(200)[0] == SAFE
