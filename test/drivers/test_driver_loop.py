@@ -210,6 +210,21 @@ def test_missed_ticks_keep_the_model_right():
     assert int(dict(chain.statuses[-1].values)['late_ticks']) >= 3
 
 
+def test_a_driver_that_was_stopped_knows_that_the_valves_vented_meanwhile():
+    loop = DriverLoop('hsv')
+
+    def tick(now):
+        loop.on_pressure(Pressure(now, 2e5 + now % 7))
+        loop.on_command(Pressure(now, 4e5))
+        return loop.act(now).efforts
+
+    filling, _ = [tick(START + k * 20 * MS) for k in range(40)][-1]
+    assert filling > 0.0
+    loop.stop()
+    assert tick(START + 980 * MS) == SAFE['hsv']        # nine periods were missed
+    assert loop.safety.frozen.expected_pa < 0.0
+
+
 def test_safe_signal():
     """PPR 0 V; HSV fill 0, vent 1."""
     for valve, efforts in SAFE.items():
