@@ -201,6 +201,7 @@ class CompiledController:
     def pause(self) -> None:
         """Forget the motion, keep the rules: the next tick starts bumplessly."""
         self._state[:] = 0.0
+        self._inputs[:] = 0.0
         self._outputs[:] = 0.0
 
     def to_yaml(self) -> str:

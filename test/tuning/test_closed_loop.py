@@ -92,6 +92,16 @@ def test_disturbance_of_one_kilogram_is_recovered(loop):
     assert rmse[-1] < 0.5e-3
 
 
+@pytest.mark.parametrize('name', ['pid', 'lqi', 'sofc_{}'])
+def test_a_tick_before_the_run_changes_nothing(loop, name):
+    """Neither what held the driver back then, nor the ages of its readings."""
+    fresh, used = (
+        load_controller(name.format(loop.rig.valve), loop.rig) for _ in range(2))
+    used.step(0.0, 0.0, 0.0, 0.0, 0.0, learn=False, held_back=1.0, age_s=0.05,
+              pressure_age_s=0.05)
+    assert loop.cost(used) == loop.cost(fresh)
+
+
 def test_what_cannot_be_run_is_refused(loop):
     with pytest.raises(InputError, match='Hz'):
         loop.run(load_controller('controller: sofc\nsettings: {rate_hz: 100}\n', loop.rig))
