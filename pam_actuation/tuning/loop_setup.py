@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from pam_actuation.drivers import hsv_kernel, ppr
+from pam_actuation.drivers.config import DriverConfig
 from pam_actuation.drivers.hsv import initial_state
 from pam_actuation.tuning.loop_parts import READINGS
 from pam_sim.annotations import FloatArray
@@ -29,7 +30,6 @@ from pam_sim.records import zeros
 if TYPE_CHECKING:
     from pam_actuation.control.compiled_controller import CompiledController
     from pam_actuation.control.modes.wrapped import WrappedLaw
-    from pam_actuation.drivers.config import DriverConfig
     from pam_actuation.experiments.experiment import Experiment
     from pam_sim.rig import Rig
 
@@ -100,20 +100,18 @@ class DriverLaw:
     Attributes: ``hsv`` tells which law it is, ``every`` the ticks per step of it.
     """
 
-    def __init__(self, rig: 'Rig', config: 'DriverConfig', rate_hz: float) -> None:
+    def __init__(self, rig: 'Rig', config: DriverConfig, rate_hz: float) -> None:
         """Take the valve of ``rig`` and what the driver knows, a ``DriverConfig``."""
         self.hsv = rig.valve == 'hsv'
-        self._hsv_config = config.hsv
-        self._ppr_config = replace(config.ppr, period_s=1.0 / rate_hz)
-        period_s = config.hsv.period_s if self.hsv else 1.0 / rate_hz
-        self.every = max(1, round(period_s * rate_hz))
+        self._config = config
+        self._tick_s = 1.0 / rate_hz
+        self.every = max(1, round(config.hsv.period_s * rate_hz)) if self.hsv else 1
 
     def fresh(self, asked: Mapping[str, float] | None = None
               ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return new state, par, out; ``asked``: what a controller asks for, by name."""
+        config = DriverConfig.from_parameters(asked, self._config) if asked else self._config
         if self.hsv:
-            changes = {name.removeprefix('hsv.'): value for name, value in (asked or {}).items()
-                       if name.startswith('hsv.')}
-            config = replace(self._hsv_config, **changes)
-            return initial_state(), config.par(), zeros(hsv_kernel.OUTPUT)
-        return zeros(ppr.STATE), self._ppr_config.par(), zeros(ppr.OUTPUT)
+            return initial_state(), config.hsv.par(), zeros(hsv_kernel.OUTPUT)
+        law = replace(config.ppr, period_s=self._tick_s)
+        return zeros(ppr.STATE), law.par(), zeros(ppr.OUTPUT)

@@ -13,6 +13,7 @@
 # limitations under the License.
 """What a controller file asks of its driver: read, passed on, recorded and replayed."""
 
+import numpy as np
 from pam_actuation.bags.load import load_run
 from pam_actuation.control.config import load_controller
 from pam_actuation.drivers.asked import asked_by
@@ -21,6 +22,8 @@ from pam_actuation.experiments.offline import simulate_experiment
 from pam_actuation.replay.driver import replay_driver
 from pam_actuation.rigging.layouts import rig as layout
 from pam_actuation.rigging.plan import make_plan
+from pam_actuation.tuning.closed_loop import ClosedLoop
+from pam_actuation.tuning.force_loop import ForceLoop
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 import pytest
@@ -37,6 +40,21 @@ name: short
 segments:
   - rest: {duration_s: 0.5}
   - sine: {center_m: 0.008, amplitude_m: 0.003, frequency_hz: 1.0, cycles: 2}
+"""
+
+JUMP = """
+name: jump
+segments:
+  - rest: {duration_s: 0.2}
+  - ramp: {to_m: 0.012, duration_s: 0.1}
+  - hold: {duration_s: 0.5}
+"""
+FORCE = """
+name: force
+domain: force
+segments:
+  - ramp: {to_n: 40.0, duration_s: 0.2}
+  - hold: {duration_s: 0.5}
 """
 
 
@@ -76,6 +94,29 @@ def test_what_cannot_be_asked(line, what):
     with pytest.raises(InputError, match=what) as found:
         asked_by(f'\ncontroller: pid\ndriver:\n  {line}\n')
     assert ':4' in str(found.value) or 'line 4' in str(found.value)
+
+
+@pytest.mark.parametrize('asked, largest_v', [
+    ('', None), ('driver: {ppr.slew_v_per_s: 5.0}', 5.0)])
+def test_a_rollout_drives_a_regulator_as_asked(asked, largest_v):
+    """The volts change no faster than the controller asks for; without it they jump."""
+    rig = load_rig('dmsp_5_300_realistic')
+    run = ClosedLoop(rig, load_experiment(JUMP)).run(
+        load_controller(f'controller: pid\n{asked}\n', rig))
+    fastest = np.abs(np.diff(run.signal[:, 0])).max() * 200.0
+    assert fastest > 10.0 if largest_v is None else fastest == pytest.approx(largest_v)
+
+
+@pytest.mark.parametrize('valve, asked', [
+    ('ppr', {'ppr.slew_v_per_s': 2.0}), ('hsv', {'hsv.gain': 0.1})])
+def test_a_rollout_of_a_force_drives_as_asked(valve, asked):
+    """The pressures are not those behind the usual driver."""
+    rig = load_rig('dmsp_5_300_isometric_realistic', valve=valve)
+    loop, controller = ForceLoop(rig, load_experiment(FORCE)), load_controller(
+        f'sofc_force_{valve}', rig)
+    usual, controller.driver = loop.run(controller, learn=False), asked
+    other = loop.run(controller, learn=False)
+    assert np.abs(other.signals['pressure_pa'] - usual.signals['pressure_pa']).max() > 1e3
 
 
 def differing(run):
