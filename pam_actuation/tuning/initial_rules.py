@@ -68,10 +68,21 @@ def initial_rules(workers: 'Workers', problem: Problem,
 
 
 def mean_rules(several: 'list[RuleBase]') -> 'RuleBase':
-    """Return a rule base whose every rule is the mean of those of several."""
+    """
+    Return a rule base whose every rule and number of the model is the mean of several.
+
+    How well the numbers are known covers their scatter. Rules without a model found count not.
+    """
     mean = several[0].copy()
     for name in mean.NAMES:
         getattr(mean, name)[...] = np.mean([getattr(one, name) for one in several], axis=0)
+    found = [one for one in several if np.any(one.covariance)]
+    if found:
+        numbers = np.array([one.numbers for one in found])
+        mean.numbers[...] = np.mean(numbers, axis=0)
+        away = numbers - mean.numbers
+        mean.covariance[...] = (
+            np.mean([one.covariance for one in found], axis=0) + away.T @ away / len(found))
     return mean
 
 

@@ -70,6 +70,19 @@ def test_mean_and_initial_rules_change_nothing_they_are_given(problem):
     assert mean.feedforward_initial[1, 4] == 0.0
 
 
+def test_the_mean_of_models_covers_their_scatter(rig):
+    """Path rules belong to the numbers beside them: both are means; a rig without counts not."""
+    one, two, none = (load_controller('sofc_model_ppr', rig).rules.copy() for _ in range(3))
+    for rules, value in ((one, 1e3), (two, 5e3)):
+        rules.path[...], rules.numbers[...] = value, value
+        rules.covariance[...] = value * np.eye(len(rules.numbers))
+    none.covariance[...] = 0.0
+    mean = mean_rules([one, two])
+    assert np.all(mean.path == 3e3) and np.all(mean.numbers == 3e3)
+    assert np.array_equal(mean.covariance, 3e3 * np.eye(len(mean.numbers)) + 2e3 ** 2)
+    assert np.array_equal(mean_rules([one, two, none]).numbers, mean.numbers)
+
+
 def test_what_a_rig_cannot_reach_is_left_out_and_said(rig):
     experiment = load_experiment('tuning_half_hz')
     controller = load_controller('pid', rig)
