@@ -291,10 +291,11 @@ def _compared(run: 'Run', states: dict[str, FloatArray], stamp_ns: IntArray,
     worst = int(np.argmax(away)) % len(stamp_ns)
     limited = (states['saturated_low'] > 0.5) | (states['saturated_high'] > 0.5)
     before = run.require('controller_state').values
-    recorded = sum(np.asarray(before[name]) > 0.5 for name in (
-        'saturated_low', 'saturated_high') if name in before)
+    order = np.argsort(before['tick'], kind='stable')       # that of the replay
+    recorded = sum((before[name][order] > 0.5 for name in (
+        'saturated_low', 'saturated_high') if name in before), np.zeros(len(order)))
     return Counterfactual(
         int(used.sum()), float(np.sqrt(np.mean(away[..., used] ** 2))),
         float(away.max()), (int(stamp_ns[worst]) - run.start_ns) * 1e-9,
-        float(np.mean(limited[used])), float(np.mean(np.asarray(recorded) > 0)),
+        float(np.mean(limited[used])), float(np.mean(recorded[used] > 0)),
         (stamp_ns - run.start_ns) * 1e-9, recorded_pa, replayed_pa)

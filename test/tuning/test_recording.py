@@ -14,14 +14,17 @@
 
 """What recordings say about a tuning: the model judged, the commands compared."""
 
+from dataclasses import replace
 import json
 
+import numpy as np
 from pam_actuation.bags.load import load_run
 from pam_actuation.control.config import load_controller
+from pam_actuation.control.tick import RUNNING
 from pam_actuation.experiments.experiment import load_experiment
 from pam_actuation.experiments.offline import simulate_experiment
 from pam_actuation.report.tuning_page import tuning_report
-from pam_actuation.tuning.recording import check_recordings
+from pam_actuation.tuning.recording import check_recordings, counterfactual
 from pam_actuation.tuning.tune import tune
 from pam_sim import load_rig
 from pam_sim.run import Run
@@ -61,6 +64,22 @@ def test_another_model_is_not_trusted_and_another_controller_differs(run, rig):
     assert found.counterfactual.rms_pa > 1e3
     assert found.counterfactual.largest_pa >= found.counterfactual.rms_pa
     assert json.dumps(found.to_dict())
+
+
+def test_both_shares_at_a_limit_are_of_the_ticks_with_usable_inputs(run, rig):
+    """The ticks at the start, without a reference, count in neither; nor does the order."""
+    states = run.topics['controller_state']
+    used = np.isin(states.values['input_reason'], RUNNING)
+    assert not used.all()
+    limited = used & (states.values['tick'] >= 600)
+    changed = states.values | {'saturated_high': limited.astype(float)}
+    backwards = replace(states, stamp_ns=states.stamp_ns[::-1], values={
+        name: column[::-1] for name, column in changed.items()})
+    found = counterfactual(
+        Run({**run.topics, 'controller_state': backwards}, run.metadata, '/muscle', 'changed'),
+        load_controller('sofc_ppr', rig))
+    assert found.ticks == used.sum()
+    assert found.recorded_saturated == pytest.approx(limited.sum() / used.sum())
 
 
 def test_what_a_recording_cannot_tell_is_a_note(run, rig):
