@@ -15,6 +15,7 @@
 """``pam experiments``: those that can be named, and one that follows a column of a table."""
 
 import argparse
+import shlex
 import shutil
 from typing import Any, TYPE_CHECKING
 
@@ -51,10 +52,11 @@ def run(args: argparse.Namespace) -> int | None:
     if args.samples is not None:
         out, made = make(args)
         name, told = made.experiment.name, made.told
+        following = f'pam simulate {shlex.quote(str(out))}{NEEDS.get(made.experiment.domain, "")}'
         emit(args, {'experiment': out, **_summary(name, made.experiment), 'remarks': told},
              '\n'.join([f'{name}: {told[0]}', *(f'  {text}' for text in told[1:]),
                         f'experiment: {out}',
-                        f'next: pam simulate {out}{NEEDS.get(made.experiment.domain, "")}']))
+                        f'next: {following}']))
         return EXIT_DONE
     refuse_without_samples(args)
     from pam_actuation.experiments import load_experiment

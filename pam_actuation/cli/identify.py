@@ -16,6 +16,7 @@
 
 import argparse
 from pathlib import Path
+import shlex
 
 from pam_actuation.cli.common import (
     add_overwrite_option, add_seed_option, add_topic_option, emit, EXIT_DONE, note_implausible,
@@ -76,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
                 runs, Path(args.out) / 'next_experiment.yaml', model,
                 found.next_experiment['name']))
         else:
-            lines.append(f'next: pam gap {" ".join(args.run)} --model '
-                         f'{model} --out gap')
+            lines.append('next: ' + shlex.join(
+                ['pam', 'gap', *args.run, '--model', str(model), '--out', 'gap']))
     emit(args, found.to_dict(), '\n'.join(lines))
     return EXIT_DONE

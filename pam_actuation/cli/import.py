@@ -216,16 +216,18 @@ def _show(args: argparse.Namespace, tables: 'list[Table]', found: 'Guess') -> in
 def _following(recording: 'Recording', out: str, rig: str | None, model: Any) -> str:
     """Return the command that comes next: what a model of the rig makes of the recording."""
     import os
+    import shlex
     known = recording.signals.keys()
+    there = bool(rig) or os.path.isfile(RIG_FILE)
+    out, file = shlex.quote(out), shlex.quote(rig or RIG_FILE)
     if recording.is_of_joint:
-        return f'pam gap {out} --model {rig} --out gap' if rig else f'pam report {out}'
+        return f'pam gap {out} --model {file} --out gap' if rig else f'pam report {out}'
     if 'pressure' not in known or not {'contraction', 'force'} & known:
         return f'pam report {out}'
-    file = rig or RIG_FILE
     ways = [f'pam identify {out} --rig {file}', f'pam gap {out} --model {file} --out gap']
     if model is not None and not getattr(model, 'unknown', ()):     # nothing to be identified
         del ways[0]
-    first = '' if rig or os.path.isfile(file) else f'pam rig new, which writes {file}; then '
+    first = '' if there else f'pam rig new, which writes {file}; then '
     return first + ', or '.join(ways)
 
 

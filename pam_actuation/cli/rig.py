@@ -15,6 +15,7 @@
 """``pam rig``: write a commented rig file; look at one."""
 
 import argparse
+import shlex
 import sys
 from typing import Any, TYPE_CHECKING
 
@@ -139,8 +140,8 @@ def _force_map(args: argparse.Namespace
 def _following(rig: 'Rig', out: str) -> str:
     """Return the command that comes next."""
     if rig.unknown:
-        return f'pam identify RUN --rig {out}'
-    return f'pam simulate pressure_identification --rig {out} --out runs/first'
+        return f'pam identify RUN --rig {shlex.quote(out)}'
+    return f'pam simulate pressure_identification --rig {shlex.quote(out)} --out runs/first'
 
 
 def _nothing_said(args: argparse.Namespace) -> bool:

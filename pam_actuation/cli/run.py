@@ -16,6 +16,7 @@
 
 import argparse
 import os
+import shlex
 import sys
 import time
 
@@ -72,7 +73,8 @@ def run(args: argparse.Namespace) -> int:
     lines += [f'finding: {text}' for text in result.findings]
     if result.bag:
         lines.insert(1, f'bag: {result.bag}')
-        lines.append(f'next: pam {"view" if args.view else "report"} {result.bag}')
+        lines.append(
+            f'next: pam {"view" if args.view else "report"} {shlex.quote(str(result.bag))}')
     elif result.stopped:
         lines = ['nothing is recorded']
     emit(args, {

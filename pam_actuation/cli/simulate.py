@@ -16,6 +16,7 @@
 
 import argparse
 import os
+import shlex
 import time
 
 from pam_actuation.cli.common import (
@@ -54,5 +55,5 @@ def run(args: argparse.Namespace) -> int:
     emit(args, result, (
         f'simulated {result["duration_s"]:.1f} s of "{experiment.name}" on {rig_title(rig)}, '
         f'{rig.valve}, in {result["wall_s"]:.1f} s\nbag: {result["bag"]}\n{said}'
-        f'next: pam report {result["bag"]}'))
+        f'next: pam report {shlex.quote(str(result["bag"]))}'))
     return EXIT_DONE

@@ -273,6 +273,9 @@ def test_the_next_command_works(capsys):
     assert main(command) == 0
     new('--unknown', 'mass_kg', '--overwrite')
     assert 'next: pam identify RUN --rig made.yaml' in capsys.readouterr().out
+    for options in (['--load', 'isometric'], ['--unknown', 'mass_kg']):
+        assert main(['rig', 'new', *options, '--out', 'my rig.yaml', '--overwrite']) == 0
+        assert "--rig 'my rig.yaml'" in capsys.readouterr().out
 
 
 def test_check_tells_what_is_unknown_and_how_well_the_rest_is_known(capsys):

@@ -65,10 +65,11 @@ def test_simulate_gives_the_same_bytes_twice(bags, tmp_path):
     assert digests[0] == digests[1]
 
 
-def test_simulate_follows_the_seed(bags, tmp_path):
+def test_simulate_follows_the_seed(bags, tmp_path, capsys):
     assert pam_here(
-        'simulate', 'short_sine', '--valve', 'ppr', '--seed', 1, '--out', tmp_path / 'b') == 0
-    first, other = (next(f.glob('*.mcap')).read_bytes() for f in (bags / 'ppr', tmp_path / 'b'))
+        'simulate', 'short_sine', '--valve', 'ppr', '--seed', 1, '--out', tmp_path / 'a b') == 0
+    assert f"next: pam report '{tmp_path / 'a b'}'" in capsys.readouterr().out
+    first, other = (next(f.glob('*.mcap')).read_bytes() for f in (bags / 'ppr', tmp_path / 'a b'))
     assert first != other
 
 

@@ -203,6 +203,8 @@ def test_a_muscle_longer_than_usual_is_taken_as_the_question_says(tmp_path, monk
      'my_rig.yaml --out gap'),
     ('p_bar,x_mm', 'a.yaml', ['--rig', 'a.yaml'], 'pam identify bag --rig a.yaml, or pam gap bag '
      '--model a.yaml --out gap'),
+    ('p_bar,x_mm', 'a b.yaml', ['--rig', 'a b.yaml', '--out', 'my bag'], "pam identify 'my bag' "
+     "--rig 'a b.yaml', or pam gap 'my bag' --model 'a b.yaml' --out gap"),
     ('p_bar,x_mm', '', ['--rig', 'dmsp_5_300_hanging_mass'],
      'pam gap bag --model dmsp_5_300_hanging_mass --out gap'),
     ('x_mm,F_N', '', [], 'pam report bag')])
