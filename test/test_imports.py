@@ -89,17 +89,19 @@ def anywhere(imports):
     return {name: found[0] | found[1] for name, found in imports.items()}
 
 
+def reached(graph, start):
+    """Return the modules that one reaches, over others too."""
+    seen, waiting = set(), [start]
+    while waiting:
+        for one in graph[waiting.pop()] - seen:
+            seen.add(one)
+            waiting.append(one)
+    return seen
+
+
 def circles(graph):
     """Return the sets of modules that reach each other."""
-    def reached(start):
-        seen, waiting = set(), [start]
-        while waiting:
-            for one in graph[waiting.pop()] - seen:
-                seen.add(one)
-                waiting.append(one)
-        return seen
-
-    reach = {name: reached(name) for name in graph}
+    reach = {name: reached(graph, name) for name in graph}
     found = []
     for name in graph:
         circle = {other for other in reach[name] if name in reach[other]}
@@ -139,6 +141,13 @@ def test_arrows_between_rooms_point_down(anywhere):
           if name.startswith('pam_actuation.') and other.startswith('pam_actuation.')
           and layer_of(other) > layer_of(name)}
     assert sorted(up) == []
+
+
+def test_control_laws_bring_neither_plant_nor_driver(at_top):
+    """A live controller simulates a rig only where its file brings no model to a linear law."""
+    beside = {'pam_actuation.plant_loop', 'pam_actuation.drivers.loop', 'pam_actuation.loops.bus'}
+    assert beside <= set(at_top)
+    assert reached(at_top, 'pam_actuation.control.laws') & beside == set()
 
 
 def test_the_physics_does_not_know_what_studies_it(anywhere):

@@ -40,7 +40,7 @@ from functools import lru_cache
 
 import numpy as np
 from pam_actuation.control.lqi_gains import MAX_DELAY_TICKS, MAX_ORDER, padded, state_matrices
-from pam_actuation.control.lqi_model import identification_record, LinearModel
+from pam_actuation.control.lqi_model import LinearModel
 from pam_actuation.control.observer import kalman_gains
 from pam_actuation.control.static_inverse import GRID, GRID_SIZE
 from pam_sim import load_rig
@@ -133,6 +133,7 @@ def identify_behind_inverse(rig: Rig, table: FloatArray, rate_hz: float,
 
 @lru_cache(maxsize=16)      # seconds each; the same rig is asked for again and again
 def _identified(rig_text: str, table: bytes, rate_hz: float, contraction_m: float) -> LinearModel:
+    from pam_actuation.control.identification_run import identification_record
     inverse = np.frombuffer(table)
     command_pa, moved_m = identification_record(load_rig(rig_text), rate_hz, contraction_m)
     equivalent, slope = equivalent_pa(inverse, command_pa, contraction_m)
