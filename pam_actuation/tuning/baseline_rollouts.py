@@ -22,38 +22,20 @@ from collections.abc import Callable
 from typing import Any
 
 from pam_actuation.control.ilc import ilc_step
-from pam_actuation.control.inputs import INPUT
 from pam_actuation.control.mpc import mpc_step
-from pam_actuation.tuning.loop_parts import DISTURBANCE, Driver, Plant, READINGS, WANTED
-from pam_actuation.tuning.rollouts import actuate, LOG, sense
-from pam_sim.annotations import FloatArray
+from pam_actuation.tuning.rollouts import actuate, sense
 from pam_sim.compiled import entry_point, source_key
-from pam_sim.records import part
-from pam_sim.rollout import layout
 
 
 def _of_ilc(key: int) -> Callable[..., None]:
     """Return the rollout of the ILC as a unit of compiled code, stored under ``key``."""
     @entry_point
-    def ilc_rollout(
-            plant: Plant, hsv: bool, driver: Driver, timing: tuple[int, int, int],
-            reference: FloatArray, noise: FloatArray, quantum: FloatArray,
-            disturbance: FloatArray, learn: FloatArray, controller: Any, inputs: FloatArray,
-            log: FloatArray) -> None:
+    def ilc_rollout(ticks: int, controller: Any, *loop: Any) -> None:
         """Track a reference with the ILC; arguments as ``sofc_rollout``, of ``ilc_step``."""
-        if key < 0:         # never; makes the key part of what is stored
-            return
-        _, _, _, plant_out = plant
-        seen = part(plant_out, 0, layout.OUTPUT)
-        steps, driver_every, latency_steps = timing
-        wanted, noises = reference.view(WANTED), noise.view(READINGS)
-        disturbances = disturbance.view(DISTURBANCE)
-        inp, steps_of, log_rows = part(inputs, 0, INPUT), part(quantum, 0, READINGS), log.view(LOG)
-        for tick in range(log_rows.shape[0]):
-            sense(tick, seen, noises[tick], steps_of, wanted[tick], learn, inp, log_rows[tick])
-            command_pa = ilc_step(*controller)
-            actuate(tick, command_pa, inp.pressure_pa, hsv, driver, driver_every, steps,
-                    latency_steps, disturbances, plant, log_rows[tick])
+        if key >= 0:        # always; makes the key part of what is stored
+            for tick in range(ticks):
+                sense(tick, *loop)
+                actuate(tick, ilc_step(*controller), *loop)
 
     return ilc_rollout
 
@@ -61,25 +43,12 @@ def _of_ilc(key: int) -> Callable[..., None]:
 def _of_mpc(key: int) -> Callable[..., None]:
     """Return the rollout of the MPC as a unit of compiled code, stored under ``key``."""
     @entry_point
-    def mpc_rollout(
-            plant: Plant, hsv: bool, driver: Driver, timing: tuple[int, int, int],
-            reference: FloatArray, noise: FloatArray, quantum: FloatArray,
-            disturbance: FloatArray, learn: FloatArray, controller: Any, inputs: FloatArray,
-            log: FloatArray) -> None:
+    def mpc_rollout(ticks: int, controller: Any, *loop: Any) -> None:
         """Track a reference with the MPC; arguments as ``sofc_rollout``, of ``mpc_step``."""
-        if key < 0:         # never; makes the key part of what is stored
-            return
-        _, _, _, plant_out = plant
-        seen = part(plant_out, 0, layout.OUTPUT)
-        steps, driver_every, latency_steps = timing
-        wanted, noises = reference.view(WANTED), noise.view(READINGS)
-        disturbances = disturbance.view(DISTURBANCE)
-        inp, steps_of, log_rows = part(inputs, 0, INPUT), part(quantum, 0, READINGS), log.view(LOG)
-        for tick in range(log_rows.shape[0]):
-            sense(tick, seen, noises[tick], steps_of, wanted[tick], learn, inp, log_rows[tick])
-            command_pa = mpc_step(*controller)
-            actuate(tick, command_pa, inp.pressure_pa, hsv, driver, driver_every, steps,
-                    latency_steps, disturbances, plant, log_rows[tick])
+        if key >= 0:
+            for tick in range(ticks):
+                sense(tick, *loop)
+                actuate(tick, mpc_step(*controller), *loop)
 
     return mpc_rollout
 

@@ -248,11 +248,11 @@ class ClosedLoop(MuscleLoop):
         controller.pause()
         log = np.empty(self.ticks * size_of(LOG))
         _rollout_of(controller.kind)(
-            self._fresh_plant(), self.hsv, self._driver.fresh(controller.driver),
-            self._timing, self._reference.rows(controller.lead_s),
-            self._noise, self._quantum, self._disturbance,
-            learning_mask(controller, learn, self.ticks, self.rate_hz),
-            controller.compiled_arguments(), controller.input_array, log)
+            self.ticks, controller.compiled_arguments(), self._fresh_plant(), self.hsv,
+            self._driver.fresh(controller.driver), self._timing,
+            self._reference.rows(controller.lead_s), self._noise, self._quantum,
+            self._disturbance, learning_mask(controller, learn, self.ticks, self.rate_hz),
+            controller.input_array, log)
         return log.view(LOG)
 
 

@@ -25,10 +25,9 @@ from pam_sim.compiled import compiled
 from pam_sim.records import part, record
 
 
-# state, par, inp, out of a plant; state, par, out of a driver law; rows of a record.
+# state, par, inp, out of a plant; state, par, out of a driver law.
 Plant: TypeAlias = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 Driver: TypeAlias = tuple[FloatArray, FloatArray, FloatArray]
-Rows: TypeAlias = 'np.ndarray[tuple[int], np.dtype[np.record]]'
 
 # Readings of a muscle and of a joint: their noise, and their steps.
 READINGS = record('pressure_pa', 'contraction_m', 'force_n')

@@ -59,7 +59,7 @@ def _entries(key: int) -> tuple[Callable[..., None], ...]:
         Parameters
         ----------
         plant, hsv, driver, timing, reference, noise, quantum, learn
-            As of ``rollouts.sofc_rollout``, the reference in N and N/s.
+            As of ``rollouts.sense``, the reference in N and N/s.
         way_m : float64[:]
             Contraction of the driven or isometric load at every tick and at the end (N + 1);
             linear in between.
@@ -130,7 +130,7 @@ def _entries(key: int) -> tuple[Callable[..., None], ...]:
         hsv, drivers : tuple of bool, tuple of tuple
             Driver law of flexor and extensor, its state, par and out.
         timing, reference, learn
-            As of ``rollouts.sofc_rollout``, the reference in rad and rad/s.
+            As of ``rollouts.sense``, the reference in rad and rad/s.
         noise, quantum : float64[:]
             N ``JOINT_READINGS`` of sensor noise, one behind the other, and those of the steps.
         torque_n_m : float64[:]
