@@ -29,6 +29,8 @@ from pam_sim.errors import InputError
 from pam_sim.rig import Rig
 from pam_sim.units import gauge_kpa, P_ATM_PA
 
+MIDDLE_M = 0.014
+_SEED = 0
 # Rest, then random levels to both sides of the middle.
 _REST_S, _EXCITATION_S, _LEFT_OUT_S = 3.0, 30.0, 2.0
 _EXCITED_PA = 4e4
@@ -36,13 +38,11 @@ _HOLDS_S = 0.1, 0.8
 _HIGHEST_PA = 1_300_000.0      # the most any experiment asks for
 
 
-def identification_record(
-        rig: Rig, rate_hz: float, contraction_m: float = 0.014,
-        seed: int = 0) -> tuple[FloatArray, FloatArray]:
+def identification_record(rig: Rig, rate_hz: float) -> tuple[FloatArray, FloatArray]:
     """
     Return (command [absolute Pa], measured contraction [m]) of a simulated run of a rig.
 
-    The data are 30 s of random pressure steps about the pressure that holds ``contraction_m``,
+    The data are 30 s of random pressure steps about the pressure that holds ``MIDDLE_M``,
     through the driver law and with sensor noise. The first two seconds at rest are left out.
 
     Raises
@@ -51,14 +51,14 @@ def identification_record(
         No pressure that a muscle bears holds this contraction.
 
     """
-    middle_pa = float(rig.static_pressure_pa(contraction_m))
+    middle_pa = float(rig.static_pressure_pa(MIDDLE_M))
     swing_pa = min(_EXCITED_PA, 0.9 * (middle_pa - P_ATM_PA))
     if not P_ATM_PA < middle_pa <= _HIGHEST_PA - swing_pa:
         raise InputError(
-            f'{contraction_m:g} m needs {gauge_kpa(middle_pa):.0f} kPa; identification needs one '
+            f'{MIDDLE_M:g} m needs {gauge_kpa(middle_pa):.0f} kPa; identification needs one '
             f'above 0 and below {gauge_kpa(_HIGHEST_PA - swing_pa):.0f} kPa', rig.name)
     levels = RandomLevels(
-        middle_pa - swing_pa, middle_pa + swing_pa, *_HOLDS_S, _EXCITATION_S, seed)
+        middle_pa - swing_pa, middle_pa + swing_pa, *_HOLDS_S, _EXCITATION_S, _SEED)
     sent: dict[str, list[Any]] = {'pressure_command': [], 'contraction': []}
 
     def note(topic: str, message: Message, now_ns: int) -> None:
@@ -76,7 +76,7 @@ def identification_record(
     attach(bus, driver)
     ticks = int((_REST_S + _EXCITATION_S) * rate_hz)
     times_ns = range(0, ticks * round(1e9 / rate_hz), round(1e9 / rate_hz))
-    bus.add(attach_plant(bus, PlantLoop(rig, seed=seed)), times_ns)
+    bus.add(attach_plant(bus, PlantLoop(rig, seed=_SEED)), times_ns)
     bus.add(send_command, times_ns)
     bus.add(driver_tick(bus, driver), times_ns[::_ticks_of_driver(rig, driver, rate_hz)])
     bus.run_until()

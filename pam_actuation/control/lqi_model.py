@@ -175,19 +175,17 @@ def _steiglitz_mcbride(
     return tuple(theta[:order].tolist()), tuple(theta[order:].tolist())
 
 
-def identify_on_rig(rig: Rig, rate_hz: float, contraction_m: float = 0.014,
-                    seed: int = 0) -> LinearModel:
+def identify_on_rig(rig: Rig, rate_hz: float) -> LinearModel:
     """Return the linear model of a rig with a hanging mass, see ``identification_record``."""
     if rig.is_driven:
         raise InputError(f'load `{rig.load}` does not move with the pressure', rig.name)
-    return _identified(rig.to_yaml(), rate_hz, contraction_m, seed)
+    return _identified(rig.to_yaml(), rate_hz)
 
 
 @lru_cache(maxsize=16)      # more than a second each; the same rig is asked for again and again
-def _identified(rig_text: str, rate_hz: float, contraction_m: float, seed: int) -> LinearModel:
+def _identified(rig_text: str, rate_hz: float) -> LinearModel:
     from pam_actuation.control.identification_run import identification_record
-    rig = load_rig(rig_text)
-    return identify(*identification_record(rig, rate_hz, contraction_m, seed), rate_hz)
+    return identify(*identification_record(load_rig(rig_text), rate_hz), rate_hz)
 
 
 def identify_on_run(run: 'Run', rate_hz: float) -> LinearModel:

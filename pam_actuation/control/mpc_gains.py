@@ -36,6 +36,7 @@ disturbance ``w``, the last command and the reference ``r`` as long as no bound 
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -111,8 +112,7 @@ def equivalent_pa(table: FloatArray, pressure_pa: FloatArray | float,
     return (held_m - contraction_m) * slope, slope
 
 
-def identify_behind_inverse(rig: Rig, table: FloatArray, rate_hz: float,
-                            contraction_m: float = 0.014) -> LinearModel:
+def identify_behind_inverse(rig: Rig, table: FloatArray, rate_hz: float) -> LinearModel:
     """
     Return the model of a rig with a hanging mass, identified in simulation as for the LQI.
 
@@ -126,18 +126,16 @@ def identify_behind_inverse(rig: Rig, table: FloatArray, rate_hz: float,
     """
     if rig.is_driven:
         raise InputError(f'load `{rig.load}` does not move with the pressure', rig.name)
-    found = _identified(rig.to_yaml(), table.tobytes(), rate_hz, contraction_m)
-    return LinearModel(rate_hz, found.delay_ticks, found.denominator, found.numerator,
-                       contraction_m, 0.0, found.fit)
+    return _identified(rig.to_yaml(), table.tobytes(), rate_hz)
 
 
 @lru_cache(maxsize=16)      # seconds each; the same rig is asked for again and again
-def _identified(rig_text: str, table: bytes, rate_hz: float, contraction_m: float) -> LinearModel:
-    from pam_actuation.control.identification_run import identification_record
-    inverse = np.frombuffer(table)
-    command_pa, moved_m = identification_record(load_rig(rig_text), rate_hz, contraction_m)
-    equivalent, slope = equivalent_pa(inverse, command_pa, contraction_m)
-    return identify_lag_and_mass(equivalent, moved_m, rate_hz, slope)
+def _identified(rig_text: str, table: bytes, rate_hz: float) -> LinearModel:
+    from pam_actuation.control.identification_run import identification_record, MIDDLE_M
+    command_pa, moved_m = identification_record(load_rig(rig_text), rate_hz)
+    equivalent, slope = equivalent_pa(np.frombuffer(table), command_pa, MIDDLE_M)
+    found = identify_lag_and_mass(equivalent, moved_m, rate_hz, slope)
+    return replace(found, contraction_m=MIDDLE_M, pressure_pa=0.0)
 
 
 def identify_lag_and_mass(command_pa: FloatArray, contraction_m: FloatArray, rate_hz: float,

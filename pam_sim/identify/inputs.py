@@ -65,8 +65,8 @@ def noise_beyond(weighted: Weighted, x: FloatArray, count: int, slopes: FloatArr
     return (axes * np.maximum(size, 0.0)) @ axes.T
 
 
-def scatter_by_inputs(weighted: Weighted, x: FloatArray, count: int, slopes: FloatArray,
-                      seed: int = 0) -> FloatArray:
+def scatter_by_inputs(weighted: Weighted, x: FloatArray, count: int, slopes: FloatArray
+                      ) -> FloatArray:
     """
     Return the covariance that noise of the inputs gives the first numbers, in coordinates.
 
@@ -80,11 +80,9 @@ def scatter_by_inputs(weighted: Weighted, x: FloatArray, count: int, slopes: Flo
         How many numbers are sought.
     slopes : numpy.ndarray, shape (N, K)
         Of the residuals there.
-    seed : int
-        Of the draws.
 
     """
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(0)
     room = weighted.low - x, weighted.high - x
     base = weighted.residuals(x)
     still = bounded_step(slopes, base, 0.0, *room)

@@ -32,8 +32,7 @@ TINY = 1e-300
 
 
 def solve_from(weighted: Weighted, x: FloatArray, slopes: FloatArray | None = None,
-               held: BoolArray | None = None, again: bool = True
-               ) -> tuple[FloatArray, float, FloatArray]:
+               held: BoolArray | None = None) -> tuple[FloatArray, float, FloatArray]:
     """
     Return (solution, cost, slopes there) near a start.
 
@@ -47,8 +46,6 @@ def solve_from(weighted: Weighted, x: FloatArray, slopes: FloatArray | None = No
         Of the residuals near the start; calculated by default.
     held : numpy.ndarray of bool, shape (K,), optional
         Numbers that stay; none by default.
-    again : bool
-        Whether slopes may be calculated again, once.
 
     Returns
     -------
@@ -56,7 +53,7 @@ def solve_from(weighted: Weighted, x: FloatArray, slopes: FloatArray | None = No
         The cost is the sum of the squared residuals.
 
     """
-    fresh = slopes is None
+    fresh, again = slopes is None, True         # slopes are calculated again once
     slopes = weighted.slopes(x) if slopes is None else np.array(slopes)
     free = np.arange(x.size) if held is None else np.flatnonzero(~held)
     residuals = weighted.residuals(x)

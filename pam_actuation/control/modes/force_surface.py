@@ -48,6 +48,7 @@ KEYS = (
 )
 _FORCES = 25
 _CONTRACTIONS = 51
+_MIDDLE_GAUGE_PA = 3e5         # where the stiffness is taken
 _HIGHEST_GAUGE_PA = 1.2e6      # instead of a pressure that no valve of this kind gives
 
 
@@ -113,7 +114,7 @@ def surface_head(surface: FloatArray) -> np.record:
     return fields(surface, SURFACE)
 
 
-def tabulate_force_surface(rig: Rig, upper_force_n: float | None = None) -> FloatArray:
+def tabulate_force_surface(rig: Rig) -> FloatArray:
     """
     Tabulate the pressure at rest over force and contraction of a rig's nominal muscle.
 
@@ -121,18 +122,15 @@ def tabulate_force_surface(rig: Rig, upper_force_n: float | None = None) -> Floa
     ----------
     rig : pam_sim.rig.Rig
         Gives ``static_pressure_pa(contraction_m, load_n)``.
-    upper_force_n : float, optional
-        Largest force [N]; by default what the muscle gives at 600 kPa, not contracted.
 
     Returns
     -------
     numpy.ndarray
-        Surface of this module. Contractions reach to the stroke of the muscle.
+        Surface of this module. Forces reach to what the muscle gives at 600 kPa, not contracted,
+        contractions to its stroke.
 
     """
-    if upper_force_n is None:
-        upper_force_n = highest_force_n(rig)
-    force_n = np.linspace(0.0, upper_force_n, _FORCES)
+    force_n = np.linspace(0.0, highest_force_n(rig), _FORCES)
     contraction_m = np.linspace(0.0, rig.muscle.stroke_m, _CONTRACTIONS)
     pressure_pa = rig.static_pressure_pa(contraction_m[:, None], force_n[None, :])
     pressure_pa = np.clip(pressure_pa, P_ATM_PA, P_ATM_PA + _HIGHEST_GAUGE_PA)
@@ -146,17 +144,17 @@ def highest_force_n(rig: Rig, gauge_pa: float = 6e5, contraction_m: float = 0.0)
                  * rig.parameters['force_map_gain'])
 
 
-def nominal_stiffness_n_per_m(rig: Rig, gauge_pa: float = 3e5) -> float:
+def nominal_stiffness_n_per_m(rig: Rig) -> float:
     """
-    Return how much the force falls with contraction at constant pressure [N/m].
+    Return how much the force falls with contraction at 300 kPa [N/m].
 
     Half way to the contraction at which the muscle pulls no more at that pressure.
     """
     law, length_m = rig.muscle.law.law, rig.muscle.length_m
-    middle = 0.5 * min(float(law.max_strain(gauge_pa)), rig.muscle.max_strain)
+    middle = 0.5 * min(float(law.max_strain(_MIDDLE_GAUGE_PA)), rig.muscle.max_strain)
     h = 1e-3
-    fall = (law.formula_n(gauge_pa, max(middle - h, 0.0))
-            - law.formula_n(gauge_pa, middle + h)) / (middle + h - max(middle - h, 0.0))
+    fall = (law.formula_n(_MIDDLE_GAUGE_PA, max(middle - h, 0.0))
+            - law.formula_n(_MIDDLE_GAUGE_PA, middle + h)) / (middle + h - max(middle - h, 0.0))
     return float(fall) / length_m * rig.parameters['force_map_gain']
 
 

@@ -70,7 +70,7 @@ def as_one(flexor_pa: float, extensor_pa: float, lowest_pa: float, highest_pa: f
 
 
 def tabulate_joint_inverse(joint: JointRig, co_contraction_pa: float, lowest_pa: float,
-                           highest_pa: float, nodes: int = NODES) -> FloatArray:
+                           highest_pa: float) -> FloatArray:
     """
     Tabulate the pair, as one pressure, that holds each angle of a joint at rest.
 
@@ -82,8 +82,6 @@ def tabulate_joint_inverse(joint: JointRig, co_contraction_pa: float, lowest_pa:
         Muscles, pulleys and limb.
     co_contraction_pa, lowest_pa, highest_pa : float
         Mean pressure and limits of both muscles, absolute Pa.
-    nodes : int
-        Number of equidistant angles over the range of the joint.
 
     Returns
     -------
@@ -93,15 +91,15 @@ def tabulate_joint_inverse(joint: JointRig, co_contraction_pa: float, lowest_pa:
 
     """
     lower, upper = joint.range_rad
-    angle = np.linspace(lower, upper, nodes)
-    low = np.full(nodes, lowest_pa)
-    high = np.full(nodes, highest_pa)
+    angle = np.linspace(lower, upper, NODES)
+    low = np.full(NODES, lowest_pa)
+    high = np.full(NODES, highest_pa)
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
         short = _torque_n_m(joint, angle, middle, co_contraction_pa, lowest_pa, highest_pa) < 0.0
         low, high = np.where(short, middle, low), np.where(short, high, middle)
     contraction_m, _ = joint.contractions_m(angle)
-    step_m = (contraction_m[-1] - contraction_m[0]) / (nodes - 1)
+    step_m = (contraction_m[-1] - contraction_m[0]) / (NODES - 1)
     return static_inverse(contraction_m[0], step_m, 0.5 * (low + high))
 
 

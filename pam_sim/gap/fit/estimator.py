@@ -62,16 +62,15 @@ class Estimator:
     rig : pam_sim.Rig
         The given model.
     problems : list of SubsystemProblem
-    use : tuple of int
-        Parts that are fitted.
     criteria : Criteria
         Decision thresholds.
 
     """
 
-    def __init__(self, rig: Rig, problems: list[SubsystemProblem], use: tuple[int, ...] = (FIT,),
+    def __init__(self, rig: Rig, problems: list[SubsystemProblem],
                  criteria: Criteria = CRITERIA) -> None:
-        self.rig, self.problems, self.use = rig, problems, use
+        self.rig, self.problems = rig, problems
+        self.use: tuple[int, ...] = (FIT,)          # parts that are fitted
         self.criteria, self.box = criteria, criteria.max_prior_sd
         self.slopes: dict[str, FloatArray] = {}
         self.take_slopes([], {c.subsystem: np.zeros(len(c.known)) for c in problems})

@@ -40,11 +40,10 @@ def gap(problem: SubsystemProblem, errors: FloatArray, part: int = SELECT) -> fl
     return problem.chi2(errors, part) - problem.level
 
 
-def share(problem: SubsystemProblem, base: FloatArray, errors: FloatArray, part: int = SELECT
-          ) -> float:
+def share(problem: SubsystemProblem, base: FloatArray, errors: FloatArray) -> float:
     """Return the share of the baseline's squared gap that a hypothesis explains, at most 1."""
-    whole = gap(problem, base, part)
-    return min((whole - gap(problem, errors, part)) / whole, 1.0) if whole > 0.0 else 0.0
+    whole = gap(problem, base)
+    return min((whole - gap(problem, errors)) / whole, 1.0) if whole > 0.0 else 0.0
 
 
 def block_chi2(problem: SubsystemProblem, errors: FloatArray, part: int = SELECT

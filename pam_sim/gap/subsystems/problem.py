@@ -23,7 +23,7 @@ import numpy as np
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.effects.unnamed.reading import of_reading, with_terms
 from pam_sim.gap.criteria import CRITERIA, Criteria
-from pam_sim.gap.data.noise import noise_of, sensor_floor, SMALLEST, STAMP_SD_S
+from pam_sim.gap.data.noise import noise_of, sensor_floor, SMALLEST
 from pam_sim.gap.data.recording import GRID_S, Recording
 from pam_sim.gap.data.signals import FIELD, SIGNALS
 from pam_sim.gap.data.split import split_of, UNUSED
@@ -94,7 +94,7 @@ class SubsystemProblem:
         self._place = lru_cache(maxsize=KEPT)(self._place_of)
         self.signals = tuple(s for s in SIGNALS
                              if any(s in self.outputs(r) for r in recordings))
-        self.level, self._stamp_sd_s = 1.0, STAMP_SD_S
+        self.level = 1.0
         self.simulations, self.asked, self._lock = 0, 0, threading.Lock()
         self._kept_errors: Recent[FloatArray] = Recent(KEPT_ERRORS)
         self._kept_runs: Recent[Response] = Recent(KEPT_RUNS)
@@ -150,10 +150,8 @@ class SubsystemProblem:
     def _nuisances(recordings: Sequence[Recording]) -> list[Known]:
         raise NotImplementedError
 
-    def disturb(self, random: np.random.Generator | None, stamp_sd_s: float = STAMP_SD_S
-                ) -> None:
+    def disturb(self, random: np.random.Generator | None) -> None:
         """Disturb the measured inputs as noise and stamps do, or no more where it is None."""
-        self._stamp_sd_s = stamp_sd_s
         self._forget()
         self._disturb(random)
 

@@ -21,7 +21,7 @@ import numpy as np
 from pam_sim.annotations import FloatArray
 from pam_sim.effects.registry import get_effect
 from pam_sim.gap.criteria import CRITERIA, Criteria
-from pam_sim.gap.data.noise import noise_sd, SMALLEST
+from pam_sim.gap.data.noise import noise_sd, SMALLEST, STAMP_SD_S
 from pam_sim.gap.data.recording import Recording, smoothed
 from pam_sim.gap.subsystems.effects import acts_on, true_value
 from pam_sim.gap.subsystems.known import (
@@ -119,9 +119,8 @@ class ValveProblem(SubsystemProblem):
         if random is None:
             self._shift_s = None
             return
-        own_s = self._stamp_sd_s
         self._shift_s = [
-            (own_s if self._stamps_only else r.stamp_sd_s(own_s))
+            (STAMP_SD_S if self._stamps_only else r.stamp_sd_s(STAMP_SD_S))
             * random.standard_normal(r.messages) for r in self.recordings]
 
     def _simulate(self, rig: Rig, index: int, numbers: Mapping[str, float]) -> Response:

@@ -91,7 +91,7 @@ class Notice:
         return large
 
 
-def notices(runs: OwnRuns, seed: int = 0) -> list[Notice]:
+def notices(runs: OwnRuns) -> list[Notice]:
     """
     Return what the recordings show that the calibrated model does not, signal by signal.
 
@@ -100,15 +100,13 @@ def notices(runs: OwnRuns, seed: int = 0) -> list[Notice]:
     runs : OwnRuns
         Each subsystem on its own measured inputs, on the certify data. The searched data count as
         well where a flow is integrated.
-    seed : int
-        Of the draws of noise.
 
     """
     estimator, found = runs.validation.estimator, runs.validation.base
     doubt = _doubt(estimator, found)
     tested = []
     for (problem, rig, known), searched in zip(runs.at(found), estimator.problems):
-        here = _Certified(runs, problem, rig, known, doubt, np.random.default_rng(seed))
+        here = _Certified(runs, problem, rig, known, doubt, np.random.default_rng(0))
         for signal in problem.signals:
             followed = 0.0
             if _integrates(problem, problem.recordings[0]):
