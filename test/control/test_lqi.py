@@ -74,7 +74,10 @@ def test_a_run_is_identified_on_its_own_stamps():
     stamp = np.arange(command.size) * 5_000_000
     run = Run({'pressure_command': Series(stamp, {'pressure_pa': command}),
                'contraction': Series(stamp, {'contraction_m': TRUE.simulate(command)})})
-    assert identify_on_run(run, 200.0).delay_ticks == TRUE.delay_ticks
+    model = identify_on_run(run, 200.0)
+    assert model.delay_ticks == TRUE.delay_ticks
+    controller = load_controller(dump_yaml({'controller': 'lqi', 'model': model.to_dict()}))
+    assert controller.gains.any()
 
 
 @pytest.mark.parametrize('command, contraction, says', [
