@@ -36,14 +36,14 @@ from pam_sim.records import fields, part, record, zeros
 STEP_S = 5e-3             # between two dead times of the grid; at least one tick
 LAGS, DELAYS = 11, 27
 _SHORTEST_S, _LONGEST_S = 6e-3, 0.25        # lags, evenly spaced in their logarithm
-_HIGH_PASS_HZ, _LOW_PASS_HZ = 3.0, 25.0     # the band, second order each
-_STILL_PA = 200.0         # changes of the command in the band that say as much as noise
-_MEMORY_S = 10.0          # of movement
-_LOCAL_S = 1.0            # over which the power of a movement is taken
+HIGH_PASS_HZ, LOW_PASS_HZ = 3.0, 25.0      # the band, second order each
+STILL_PA = 200.0          # what in the band says as much as noise
+MEMORY_S = 10.0           # of movement
+LOCAL_S = 1.0             # over which the power of a movement is taken
 _EVERY = 20               # steps between two estimates
-_FREE = 0.2               # share of the steps in the band that are independent
+FREE = 0.2                # share of the steps in the band that are independent
 _BEYOND = 1.5             # grid steps a paraboloid may reach beyond its middle
-_SPREADS = 3.0            # standard deviations taken as the uncertainty
+SPREADS = 3.0             # standard deviations taken as the uncertainty
 _MODEL_S = 2e-3           # error a valve that is not of first order leaves
 LEAST_MOVED_S, LEAST_EXPLAINED, MOST_UNCERTAIN_S = 3.0, 0.9, 1e-2
 
@@ -77,11 +77,11 @@ def _lag_s(place: float) -> float:
 @compiled
 def _in_band(filters: FloatArray, value: float, step_s: float) -> float:
     """Return a value behind two high passes and two low passes."""
-    share = 1.0 - math.exp(-2.0 * math.pi * _HIGH_PASS_HZ * step_s)
+    share = 1.0 - math.exp(-2.0 * math.pi * HIGH_PASS_HZ * step_s)
     for j in range(2):
         filters[j] += share * (value - filters[j])
         value -= filters[j]
-    share = 1.0 - math.exp(-2.0 * math.pi * _LOW_PASS_HZ * step_s)
+    share = 1.0 - math.exp(-2.0 * math.pi * LOW_PASS_HZ * step_s)
     for j in range(2, 4):
         filters[j] += share * (value - filters[j])
         value = filters[j]
@@ -164,7 +164,7 @@ def _gather(st: np.record, step_s: float, command_pa: float, pressure_pa: float)
         st.model_pa[i] = keep * st.model_pa[i] + (1.0 - keep) * st.former_pa
         st.past_pa[i * rows + row] = st.model_pa[i]
     st.former_pa = u
-    local = 1.0 - math.exp(-step_s / _LOCAL_S)
+    local = 1.0 - math.exp(-step_s / LOCAL_S)
     sent: float = st.command_power_pa2
     sent += local * (u * u - sent)
     seen: float = st.pressure_power_pa2
@@ -175,10 +175,10 @@ def _gather(st: np.record, step_s: float, command_pa: float, pressure_pa: float)
     st.steps = steps
     if steps <= DELAYS:
         return
-    still = _STILL_PA * _STILL_PA
+    still = STILL_PA * STILL_PA
     moves = sent / (sent + still)
     weight = moves / (seen + still)
-    keep = math.exp(-step_s * moves / _MEMORY_S)
+    keep = math.exp(-step_s * moves / MEMORY_S)
     st.power = keep * st.power + weight * y * y
     st.moved_s = keep * st.moved_s + moves * step_s
     for i in range(LAGS):
@@ -225,9 +225,9 @@ def _estimate(st: np.record, step_s: float, late_s: float) -> None:
     if curved > 0.0 and bend_i > 0.0:
         off_i = -(bend_d * slope_i - twist * slope_d) / curved
         off_d = -(bend_i * slope_d - twist * slope_i) / curved
-        free = _FREE * st.moved_s / step_s
+        free = FREE * st.moved_s / step_s
         spread = math.sqrt(2.0 * max(least, 0.0) / free * bend_i / curved) * step_s
-        uncertainty_s = _SPREADS * spread + _MODEL_S
+        uncertainty_s = SPREADS * spread + _MODEL_S
     off_i = min(max(off_i, -_BEYOND), _BEYOND)
     off_d = min(max(off_d, -_BEYOND), _BEYOND)
     st.delay_s = max((d + off_d) * step_s + late_s, 0.0)

@@ -22,7 +22,8 @@ not usable is ignored, counted, and the reason kept. No ROS inside.
 import math
 from typing import TYPE_CHECKING
 
-from pam_actuation.control.measurement import fresh, MAX_AGE_NS
+from pam_actuation.control.inputs import MAX_AGE_NS
+from pam_actuation.control.measurement import fresh
 from pam_actuation.control.reference_buffer import MAX_AHEAD_NS
 from pam_sim.errors import InputError
 

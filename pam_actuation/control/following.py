@@ -24,6 +24,7 @@ from collections import deque
 import math
 from typing import TYPE_CHECKING
 
+from pam_actuation.control.inputs import MAX_AGE_NS
 from pam_actuation.control.reference_buffer import MAX_AHEAD_NS
 from pam_sim.units import P_ATM_PA
 
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
 
 FOLLOWS, LESS, MORE, UNKNOWN = 0.0, 1.0, -1.0, 2.0      # what the driver does; ``IN_HELD_BACK``
 TOLERANCE_PA = 2_000.0
-MAX_AGE_NS = 100_000_000
 ON_THE_WAY_NS = 40_000_000  # a period of either, and what a busy machine takes
 _STANDS_NS = 200_000_000
 _INTRODUCED_NS = 5_000_000_000     # by then driver and controller have found each other

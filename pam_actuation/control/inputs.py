@@ -25,7 +25,9 @@ import struct
 from pam_sim.annotations import FloatArray
 from pam_sim.records import record, size_of
 
-MAX_AGE_S = 0.1         # an older measurement is not used
+# An older measurement is not used; after a longer gap, what is estimated of them begins anew.
+MAX_AGE_S = 0.1
+MAX_AGE_NS = round(MAX_AGE_S * 1e9)
 
 INPUT = record(
     'contraction_m',                  # measured

@@ -16,10 +16,10 @@
 
 import math
 
+from pam_actuation.control.inputs import MAX_AGE_S
 from pam_sim.compiled import compiled
 from pam_sim.units import P_ATM_PA
 
-_STALE_S = 0.1            # a longer gap between measurements restarts the rate filter
 _OFFSET_FLOOR_M = 1e-9    # then it is gone, before it becomes a denormal number
 _CHANGE_FLOOR_M_PER_S = 1e-12                    # the same
 
@@ -52,7 +52,7 @@ def filtered_change(
     """
     if not math.isfinite(elapsed_s):
         elapsed_s = period_s
-    if elapsed_s > _STALE_S:
+    if elapsed_s > MAX_AGE_S:       # a longer gap restarts the filter
         return 0.0
     if elapsed_s > 0.0 and known:
         raw = reference_rate - moved_m / elapsed_s

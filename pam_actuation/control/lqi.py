@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from pam_actuation.control.fixed_law import FixedLawController
-from pam_actuation.control.inputs import INPUT
+from pam_actuation.control.inputs import INPUT, MAX_AGE_S
 from pam_actuation.control.law_parts import (
     faded_offset, first_command_pa, held_offset, integral_growth, limited)
 from pam_actuation.control.lqi_gains import (
@@ -77,7 +77,6 @@ OUTPUT = record(
     'command_pa', 'error_m', 'estimated_contraction_m', 'innovation_m', 'feedforward_pa',
     'state_feedback_pa', 'integral_pa', 'unlimited_command_pa', 'saturated_low',
     'saturated_high', 'slew_limited', 'start_offset_m')
-_STALE_S = 0.1              # a longer gap between measurements restarts the estimate
 
 
 @compiled
@@ -162,7 +161,7 @@ def _tick(par: np.record, model: np.record, observer: FloatArray, st: np.record,
     # Correct the estimate; the same measurement once more tells nothing new.
     elapsed = inp.elapsed_s
     innovation = y - st.estimate_m[0]
-    if held_back != 0.0 or elapsed > _STALE_S:    # False for NaN: one period
+    if held_back != 0.0 or elapsed > MAX_AGE_S:    # False for NaN: one period
         _rest(model, st, y)                # what moved it is not known
         st.unread_ticks = 0.0
     elif not elapsed <= 0.0:

@@ -27,12 +27,10 @@ from typing import Any, TypeGuard, TypeVar
 from pam_actuation.control import tick as codes
 from pam_actuation.control.frozen import (
     FrozenMeasurement, JOINT_SWING_PA, STOP_SWING_PA, SWING_PA)
-from pam_actuation.control.inputs import MAX_AGE_S
+from pam_actuation.control.inputs import MAX_AGE_NS
 from pam_actuation.control.modes.tracked import CONTRACTION, FORCE, JOINT, Tracked
 from pam_actuation.control.reference_buffer import MAX_AHEAD_NS
 from pam_actuation.messages import Message
-
-MAX_AGE_NS = round(MAX_AGE_S * 1e9)
 
 Newest = Mapping[str, Any]      # the newest message of each topic
 Known = TypeVar('Known', bound=Message)

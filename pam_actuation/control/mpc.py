@@ -31,7 +31,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from pam_actuation.control.fixed_law import FixedLawController
-from pam_actuation.control.inputs import INPUT
+from pam_actuation.control.inputs import INPUT, MAX_AGE_S
 from pam_actuation.control.law_parts import faded_offset, first_command_pa, held_offset, limited
 from pam_actuation.control.lqi_gains import MAX_DELAY_TICKS, MAX_ORDER
 from pam_actuation.control.lqi_model import LinearModel
@@ -86,7 +86,6 @@ OUTPUT = record(
     'command_pa', 'error_m', 'estimated_contraction_m', 'innovation_m', 'disturbance_pa',
     'bounded', 'unlimited_command_pa', 'saturated_low', 'saturated_high', 'slew_limited',
     'start_offset_m')
-_STALE_S = 0.1              # a longer gap between measurements restarts the estimate
 _CALM_S = 2.0
 _SWEEPS, _HALVINGS = 40, 40
 _CLOSE_PA = 1.0             # change of a plan in a sweep, below which it is done
@@ -206,7 +205,7 @@ def _tick(par: np.record, model: np.record, inverse: FloatArray, observer: Float
     # Correct the estimate; the same measurement once more tells nothing new.
     elapsed = inp.elapsed_s
     innovation = y - st.estimate_m[0]
-    if begins or held_back != 0.0 or elapsed > _STALE_S:    # False for NaN: one period
+    if begins or held_back != 0.0 or elapsed > MAX_AGE_S:    # False for NaN: one period
         # What moved it is no disturbance of the command, nor what led up to it.
         _rest(model, st, y)
         st.disturbance_pa = st.calm_pa

@@ -31,7 +31,8 @@ import math
 
 import numpy as np
 from pam_actuation.control.delay_estimate import (
-    LEAST_EXPLAINED, LEAST_MOVED_S, MOST_UNCERTAIN_S, PathEstimate, STEP_S)
+    FREE, HIGH_PASS_HZ, LEAST_EXPLAINED, LEAST_MOVED_S, LOCAL_S, LOW_PASS_HZ, MEMORY_S,
+    MOST_UNCERTAIN_S, PathEstimate, SPREADS, STEP_S, STILL_PA)
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import Compiled, compiled, entry_point, source_key
 from pam_sim.errors import InputError
@@ -43,12 +44,6 @@ from pam_sim.valve.flow import flow_function
 
 DELAYS = 27
 PARTS = 3                 # air let in, air let out, motion
-_HIGH_PASS_HZ, _LOW_PASS_HZ = 3.0, 25.0     # the band, second order each
-_STILL_PA = 200.0         # of the pressure in the band, as much as noise
-_MEMORY_S = 10.0          # of movement
-_LOCAL_S = 1.0            # over which the power of a movement is taken
-_FREE = 0.2               # share of the steps in the band that are independent
-_SPREADS = 3.0            # standard deviations taken as the uncertainty
 _MODEL_S = 3e-3           # error that volume, valves and sensors unlike these leave
 _ABSENT = 1e-9            # of a part, left by those before it: it says nothing of its own
 _RIG = check_parameters(hsv.PARAMETERS, {})
@@ -116,8 +111,8 @@ def _begin(st: np.record, pressure_pa: float, contraction_m: float) -> None:
 def _gather(st: np.record, step_s: float, fill: float, vent: float, pressure_pa: float,
             contraction_m: float, supply_pa: float, critical_ratio: float) -> None:
     """Advance all filters by one step of the grid and add to the sums."""
-    high = math.exp(-2.0 * math.pi * _HIGH_PASS_HZ * step_s)
-    low = 1.0 - math.exp(-2.0 * math.pi * _LOW_PASS_HZ * step_s)
+    high = math.exp(-2.0 * math.pi * HIGH_PASS_HZ * step_s)
+    low = 1.0 - math.exp(-2.0 * math.pi * LOW_PASS_HZ * step_s)
     y = _in_band(st.pressure_filter, 0, pressure_pa - st.former_pa, high, low)
     motion = _in_band(
         st.motion_filter, 0, pressure_pa * (contraction_m - st.former_m), high, low)
@@ -125,7 +120,7 @@ def _gather(st: np.record, step_s: float, fill: float, vent: float, pressure_pa:
     st.former_m = contraction_m
     let_in = step_s * supply_pa * flow_function(pressure_pa / supply_pa, critical_ratio)
     let_out = step_s * pressure_pa * flow_function(P_ATM_PA / pressure_pa, critical_ratio)
-    local = 1.0 - math.exp(-step_s / _LOCAL_S)
+    local = 1.0 - math.exp(-step_s / LOCAL_S)
     works = 1.0 if fill > 0.0 or vent > 0.0 else 0.0
     moves: float = st.active
     moves += local * (works - moves)
@@ -136,10 +131,10 @@ def _gather(st: np.record, step_s: float, fill: float, vent: float, pressure_pa:
     steps: float = st.steps + 1.0
     st.steps = steps
     counts = steps > DELAYS
-    weight = moves / (seen + _STILL_PA * _STILL_PA)
+    weight = moves / (seen + STILL_PA * STILL_PA)
     keep = 1.0
     if counts:
-        keep = math.exp(-step_s * moves / _MEMORY_S)
+        keep = math.exp(-step_s * moves / MEMORY_S)
         st.power = keep * st.power + weight * y * y
         st.moved_s = keep * st.moved_s + moves * step_s
     rows = DELAYS
@@ -281,8 +276,8 @@ class ValveDelayEstimator:
         place, uncertainty_s = float(best), math.inf
         if bend > 0.0:
             place = middle + float(np.clip(0.5 * (below - above) / bend, -1.0, 1.0))
-            free = _FREE * moved_s / step_s
-            uncertainty_s = _SPREADS * step_s * math.sqrt(
+            free = FREE * moved_s / step_s
+            uncertainty_s = SPREADS * step_s * math.sqrt(
                 2.0 * max(error[best], 0.0) / (free * bend)) + _MODEL_S
         found = PathEstimate(
             max(place * step_s + 0.5 * (stride - 1) * self.period_s, 0.0), math.nan,

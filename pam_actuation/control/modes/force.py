@@ -27,7 +27,7 @@ import math
 
 import numpy as np
 from pam_actuation.control.compiled_controller import CompiledController
-from pam_actuation.control.inputs import INPUT
+from pam_actuation.control.inputs import INPUT, MAX_AGE_S
 from pam_actuation.control.modes.force_surface import (
     fill_inverse, nominal_stiffness_n_per_m, surface_from_tree, surface_head, surface_to_mapping,
     tabulate_force_surface)
@@ -72,7 +72,6 @@ STATE = record(
 )
 
 _FILTER_S = 0.05        # memory of the filter of the contraction
-_STALE_S = 0.1          # a longer gap between measurements restarts the rate
 _STIFFNESS = Key(
     'stiffness_n_per_m', float, 'So many newtons count as one metre in settings and rules.',
     otherwise='slope of the nominal force', unit='N/m', lower=1.0, upper=1e7)
@@ -95,7 +94,7 @@ def look_ahead(par: np.record, st: np.record, contraction_m: float, elapsed_s: f
         elapsed_s = par.period_s
     if not math.isfinite(contraction_m):
         st.rate_m_per_s = 0.0
-    elif st.known < 0.5 or elapsed_s > _STALE_S:
+    elif st.known < 0.5 or elapsed_s > MAX_AGE_S:
         st.contraction_m = contraction_m
         st.rate_m_per_s = 0.0
         st.known = 1.0
