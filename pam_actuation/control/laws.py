@@ -114,8 +114,10 @@ class ControlLaw:
 
 
 def _sofc(asked: Asked) -> CompiledController:
+    # A text of before that was written for a recording has its inverse and no revision.
+    before = {'revision': 0.0} if INVERSE.name in asked.tree else {}
     controller = SelfOrganizingFuzzyController(
-        asked.inverse(), asked.settings, rig_name=asked.identity, where=asked.where)
+        asked.inverse(), before | asked.settings, rig_name=asked.identity, where=asked.where)
     if asked.mode is not None:
         controller.rules.scaling.update(asked.mode.rule_scaling())
     _give_rules(controller, asked.tree, asked.folder)

@@ -26,7 +26,7 @@ from pam_actuation.control.sofc import muscle_model
 from pam_actuation.control.sofc.credit import ring_rows
 from pam_actuation.control.sofc.learning import REASONS
 from pam_actuation.control.sofc.persistence import check_fit
-from pam_actuation.control.sofc.records import ENTRY, MODEL_OUTPUTS, OUTPUT, STATE, TOLD
+from pam_actuation.control.sofc.records import ENTRY, KNOWN, MODEL_OUTPUTS, OUTPUT, STATE
 from pam_actuation.control.sofc.rule_table import (
     infer_feedback, infer_feedforward, infer_motion, linear_feedback_table, RuleBase)
 from pam_actuation.control.sofc.rule_text import NUMBERS
@@ -207,9 +207,9 @@ class SelfOrganizingFuzzyController(CompiledController):
     def _keep_output(self, before_pa: float) -> None:
         self.rules_replaced += 1
         ring = self._ring.view(ENTRY)
-        told = {name: ring[name].copy() for name in TOLD}
+        known = {name: ring[name].copy() for name in KNOWN}
         self._ring[:] = 0.0        # no credit for rules that are gone
-        for name, values in told.items():
+        for name, values in known.items():
             ring[name] = values
         state = fields(self._state, STATE)
         state.history_ticks = min(state.history_ticks, 1.0)

@@ -85,6 +85,16 @@ def row_of(ring: Ring, tick: int, ago: int) -> int:
 
 
 @compiled
+def known_ticks(par: np.record, st: np.record) -> float:
+    """
+    Return for how many ticks commands and previews are known; ``st`` is a ``STATE``.
+
+    Since the start: an exchange of rules leaves them in the ring. Revision 0 forgot them.
+    """
+    return float(st.tick if par.revision > 0.5 else st.history_ticks)
+
+
+@compiled
 def kernel_weight(offset: int, spread: int) -> float:
     """Return the triangular weight of the entry ``offset`` ticks off the credit delay."""
     side = spread + 1

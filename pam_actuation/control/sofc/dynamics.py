@@ -135,7 +135,7 @@ def note_announced(par: np.record, ring: Ring, st: np.record, inp: np.record) ->
     """
     tick = int(st.tick)
     ring[credit.row_of(ring, tick, 0)].told_rate_m_per_s = inp.lead_rate_m_per_s
-    if st.history_ticks < par.answer_ticks:
+    if credit.known_ticks(par, st) < par.answer_ticks:
         return
     rate: float = inp.reference_rate_m_per_s
     told = inp.lead_rate_m_per_s - rate

@@ -287,15 +287,22 @@ def find_numbers(par: np.record, inverse: FloatArray, st: np.record, surprised: 
 
 
 @compiled
-def _begin(st: np.record, contraction_m: float, pressure_pa: float) -> None:
-    """Begin the filters where the muscle is."""
-    st.known = 1.0
-    st.contraction_once_m = contraction_m
-    st.contraction_m = contraction_m
+def begin_motion(st: np.record, contraction_m: float, pressure_pa: float) -> None:
+    """Begin what the prediction begins with; the numbers of the model count as unknown."""
     st.fast_contraction_m = contraction_m
     st.fast_rate_m_per_s = 0.0
     motion_estimate.begin(st.motion, contraction_m, 0.0, pressure_pa)
     st.motion.unsure_pa2 = _UNKNOWN_PA * _UNKNOWN_PA
+
+
+@compiled
+def _begin(par: np.record, st: np.record, contraction_m: float, pressure_pa: float) -> None:
+    """Begin the filters where the muscle is."""
+    st.known = 1.0
+    st.contraction_once_m = contraction_m
+    st.contraction_m = contraction_m
+    if par.revision < 0.5 or st.motion.noise_m == 0.0:
+        begin_motion(st, contraction_m, pressure_pa)
     st.pressure_once_pa = pressure_pa
     st.pressure_pa = pressure_pa
 
@@ -322,7 +329,7 @@ def observe(par: np.record, inverse: FloatArray, rules: FloatArray, st: np.recor
         st.disturbance_pa *= _FADE
         return
     if st.known < 0.5:
-        _begin(st, contraction_m, pressure_pa)
+        _begin(par, st, contraction_m, pressure_pa)
     former_m, former_rate = st.contraction_m, st.rate_m_per_s
     once_m, x, rate = st.contraction_once_m, former_m, former_rate
     once_pa, p = st.pressure_once_pa, st.pressure_pa

@@ -77,7 +77,9 @@ def motion(par: np.record, inverse: FloatArray, rules: FloatArray, st: np.record
     if not par.unknown_acceleration_m_per_s2 > 0.0:
         return contraction_m, fast
     now = st.motion
-    if elapsed_s > 0.0:
+    if not math.isfinite(now.pressure_pa + pressure_pa):      # none is known yet
+        motion_estimate.begin(now, contraction_m, fast, pressure_pa)
+    elif elapsed_s > 0.0:
         inertia = inertia_pa_s2_per_m(par, st, now.contraction_m)
         # In the middle of the time between the readings.
         middle_m = now.contraction_m + 0.5 * elapsed_s * now.rate_m_per_s
@@ -93,17 +95,17 @@ def motion(par: np.record, inverse: FloatArray, rules: FloatArray, st: np.record
 
 @compiled
 def predict(par: np.record, inverse: FloatArray, rules: FloatArray, ring: Ring, tick: int,
-            st: np.record, contraction_m: float, elapsed_s: float, age_s: float,
-            pressure_pa: float, valve: np.record) -> tuple[float, float]:
+            st: np.record, contraction_m: float, begins_m: float, begins_m_per_s: float,
+            age_s: float, pressure_pa: float, valve: np.record) -> tuple[float, float]:
     """
     Return contraction [m] and rate [m/s] for the moment at which a command of now arrives.
 
     The model goes on from the measurement, which is ``age_s`` old, with the commands of one dead
-    time before. ``pressure_pa`` is the pressure of that time, ``valve`` a ``LAG``.
+    time before. ``begins_m`` and ``begins_m_per_s`` are those of ``motion``. ``pressure_pa`` is
+    the pressure of that time, ``valve`` a ``LAG``.
     """
     period = par.period_s
-    x, rate = motion(par, inverse, rules, st, contraction_m, elapsed_s, pressure_pa)
-    p = pressure_pa
+    x, rate, p = begins_m, begins_m_per_s, pressure_pa
     for q in range(int(par.path_sets)):
         st.predicted_path[q] = st.path[q]
     inertia = inertia_pa_s2_per_m(par, st, contraction_m)

@@ -32,6 +32,8 @@ ACTIVE_RULES = (
 # what is used of it, and of that the move made of a jump.
 TOLD = ('told_m', 'told_rate_m_per_s', 'lead_m', 'lead_rate_m_per_s', 'lead_move_m_per_s',
         'lead_move_m_per_s2', 'bend_m_per_s2')
+# What of the past an exchange of rules leaves as it was.
+KNOWN = ('command_pa', *TOLD)
 # One tick in the credit memory.
 ENTRY = record(
     *ACTIVE_RULES,
@@ -39,8 +41,7 @@ ENTRY = record(
     'motion_pass',                    # the same for the motion rules
     'correction_pa_per_m',            # pressure that mends an index of 1 m there
     'valid',                          # 1 = neither saturated nor disturbed when it was active
-    'command_pa',
-    *TOLD,
+    *KNOWN,
     'index_m',                        # performance index, 0 where nothing was learned
     'integral_deviation_pa',          # of the integral from its mean
 )

@@ -41,7 +41,8 @@ def goes_on_m_per_s2(par: np.record, ring: Ring, st: np.record, inp: np.record,
     ``ring`` and ``st`` are the credit memory and a ``STATE``; ``ahead_s`` is how far the reference
     is to go on.
     """
-    if not par.reference_bend_s > 0.0 or st.history_ticks < 2.0:
+    known = credit.known_ticks(par, st)
+    if not par.reference_bend_s > 0.0 or known < 2.0:
         return 0.0
     tick, period = int(st.tick), par.period_s
     rate: float = inp.lead_rate_m_per_s
@@ -59,7 +60,7 @@ def goes_on_m_per_s2(par: np.record, ring: Ring, st: np.record, inp: np.record,
     st.bend_m_per_s2 = bend
     ring[credit.row_of(ring, tick, 0)].bend_m_per_s2 = bend
     ago = int(ahead_s / period + 0.5)
-    if st.history_ticks <= ago:
+    if known <= ago:
         return 0.0
     then = ring[credit.row_of(ring, tick, ago)]
     expected = ago * period * then.bend_m_per_s2

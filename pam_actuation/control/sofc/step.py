@@ -66,6 +66,8 @@ def _start(par: np.record, inverse: FloatArray, values: Tables, kept: Tables, st
     st.reference_m = inp.reference_m
     st.lead_reference_m = inp.lead_reference_m
     st.model.slow_m = x
+    if par.revision > 0.5:
+        muscle_model.begin_motion(st.model, x, inp.pressure_pa)
     guard.keep(values, kept)
     pressure = inp.pressure_pa
     st.command_pa = first_command_pa(
@@ -294,10 +296,15 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
         lead_extra_rate, lead_extra)
     predicted = 0.0
     acts = par.predicted_proportional_pa_per_m > 0.0 or par.predicted_derivative_pa_s_per_m > 0.0
-    if acts and st.history_ticks >= par.answer_ticks:
+    predicts = acts and credit.known_ticks(par, st) >= par.answer_ticks
+    now_m, now_rate = inp.contraction_m, 0.0
+    if predicts or acts and par.revision > 0.5:
+        now_m, now_rate = predictor.motion(
+            par, inverse, path_rules, model, inp.contraction_m, elapsed_s, pressure)
+    if predicts:
         ahead_m, ahead_rate = predictor.predict(
             par, inverse, path_rules, ring, int(st.tick), model, inp.contraction_m,
-            elapsed_s, inp.age_s, pressure, st.lag)
+            now_m, now_rate, inp.age_s, pressure, st.lag)
         predicted = predictor.predicted_feedback_pa(
             par, model, lead - ahead_m, lead_rate - ahead_rate, st.lag.lag_s)
         path_memory.settle(par, model, lead - ahead_m, lead_rate)

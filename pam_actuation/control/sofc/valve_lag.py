@@ -153,8 +153,11 @@ def falls_behind(par: np.record, ring: Ring, st: np.record, inp: np.record) -> b
     Expected is the command of one dead time ago behind the lag of the valve. ``st`` is a
     ``STATE``.
     """
-    if st.history_ticks < par.answer_ticks + (1.0 if par.dead_time_s > 0.0 else 0.0):
+    first = par.answer_ticks + (1.0 if par.dead_time_s > 0.0 else 0.0)
+    if credit.known_ticks(par, st) < first:
         st.expected_pa = inp.pressure_pa
+        if par.revision > 0.5 and not math.isfinite(inp.pressure_pa):
+            st.expected_pa = st.command_pa
         st.lag.rest_s = _REST_S
         return False
     tick = int(st.tick)

@@ -1,0 +1,92 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Starts, exchanges of rules and lost readings in the middle of a motion."""
+
+import math
+
+import numpy as np
+from pam_actuation.control.config import load_controller
+from pam_actuation.control.static_inverse import inverse_pressure_pa
+from pam_sim import load_rig
+from pam_sim.located_yaml import dump_yaml, load_yaml
+import pytest
+
+PERIOD_S = 0.005
+
+
+def controller_of(name='sofc_model_ppr', **settings):
+    """Return a preset with some other settings."""
+    controller = load_controller(name, load_rig('dmsp_5_300_realistic'))
+    return controller.with_settings({**controller.settings, **settings})
+
+
+def reference(time_s, amplitude_m=0.006, frequency_hz=0.5, center_m=0.012):
+    """Return contraction [m] and rate [m/s] of a sine."""
+    pulsation = 2.0 * math.pi * frequency_hz
+    return (center_m + amplitude_m * math.sin(pulsation * time_s),
+            pulsation * amplitude_m * math.cos(pulsation * time_s))
+
+
+def drive(controller, ticks, learn=True, age_s=0.003, lost=(), error_m=1e-4):
+    """Move a muscle that nearly follows, open loop; return commands and outputs of each tick."""
+    commands, outputs = [], []
+    for tick in ticks:
+        time_s = PERIOD_S * tick
+        wanted, ahead = reference(time_s), reference(time_s + controller.lead_s)
+        x = wanted[0] - error_m * math.sin(3.0 * time_s)
+        pressure_pa = inverse_pressure_pa(controller.static_inverse, x)
+        commands.append(controller.step(
+            x, *wanted, *ahead, learn, PERIOD_S, math.nan if tick in lost else pressure_pa,
+            age_s=age_s, pressure_age_s=age_s))
+        outputs.append(dict(zip(controller.state_names, controller.state_values())))
+    return np.array(commands), outputs
+
+
+def of(outputs, name):
+    """Return one output over the ticks."""
+    return np.array([one[name] for one in outputs])
+
+
+def test_an_exchange_for_the_same_rules_changes_no_command():
+    one, other = controller_of(), controller_of()
+    for controller in (one, other):
+        drive(controller, range(400))
+    other.replace_rules(other.rules.copy())
+    commands, _ = drive(one, range(400, 460), learn=False)
+    again, _ = drive(other, range(400, 460), learn=False)
+    assert np.abs(again - commands).max() < 1e-3
+
+
+def test_a_prediction_that_begins_in_motion_knows_the_rate():
+    controller = controller_of(half_strength_m=0.0)
+    _, outputs = drive(controller, range(60), age_s=0.0, error_m=0.0)
+    assert np.abs(of(outputs, 'predicted_feedback_pa')).max() < 2e4
+
+
+def test_without_a_pressure_the_prediction_is_finite_from_the_start():
+    controller = controller_of(half_strength_m=0.0)
+    _, outputs = drive(controller, range(60), lost=range(60))
+    assert np.isfinite(of(outputs, 'predicted_feedback_pa')).all()
+    assert np.abs(of(outputs, 'predicted_feedback_pa')).max() > 0.0
+
+
+def test_a_text_of_before_is_of_revision_0():
+    rig = load_rig('dmsp_5_300_realistic')
+    tree = load_yaml(load_controller('sofc_model_ppr', rig).to_yaml(), name='text').plain()
+    assert tree['settings'].pop('revision') == 1.0
+    assert load_controller(dump_yaml(tree), rig).settings['revision'] == 0.0
+    for name in ('static_inverse', 'made_for', 'initial_rules'):
+        del tree[name]
+    assert load_controller(dump_yaml(tree), rig).settings['revision'] == 1.0
