@@ -90,3 +90,10 @@ def test_a_text_of_before_is_of_revision_0():
     for name in ('static_inverse', 'made_for', 'initial_rules'):
         del tree[name]
     assert load_controller(dump_yaml(tree), rig).settings['revision'] == 1.0
+
+
+@pytest.mark.parametrize('age_s', [0.02, 0.05])
+def test_before_the_start_the_command_was_that_of_the_start(age_s):
+    controller = controller_of(half_strength_m=0.0)
+    _, outputs = drive(controller, range(60), age_s=age_s, error_m=0.0)
+    assert np.abs(of(outputs, 'predicted_feedback_pa')).max() < 5e4

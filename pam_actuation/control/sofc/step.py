@@ -49,8 +49,8 @@ _LIFTED_M = 5e-4          # below this contraction the pressure at rest says not
 
 
 @compiled
-def _start(par: np.record, inverse: FloatArray, values: Tables, kept: Tables, st: np.record,
-           inp: np.record) -> None:
+def _start(par: np.record, inverse: FloatArray, values: Tables, kept: Tables, ring: Ring,
+           st: np.record, inp: np.record) -> None:
     """Begin so that the reference starts where the muscle is and the command where it is."""
     x = inp.contraction_m
     st.started = 1.0
@@ -73,6 +73,9 @@ def _start(par: np.record, inverse: FloatArray, values: Tables, kept: Tables, st
     st.command_pa = first_command_pa(
         pressure, P_ATM_PA + par.min_pressure_gauge_pa,
         P_ATM_PA + par.max_pressure_gauge_pa)
+    if par.revision > 0.5:
+        for row in range(ring.shape[0]):
+            ring[row].command_pa = st.command_pa
     if math.isfinite(pressure) and x > _LIFTED_M:
         trim = (pressure - inverse_pressure_pa(inverse, x)) / dynamics.load_shape(par, x)
         st.integral_pa = min(max(trim, -_START_TRIM_PA), _START_TRIM_PA)
@@ -215,7 +218,7 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
     period = par.period_s
     elapsed_s = inp.elapsed_s if math.isfinite(inp.elapsed_s) else period
     if st.started < 0.5:
-        _start(par, inverse, values, kept, st, inp)
+        _start(par, inverse, values, kept, ring, st, inp)
     jump, lead_jump = dynamics.jumps(par, st, inp)
     # A jump not seen ahead: the move can only begin one preview from now.
     wait = par.lead_s if lead_jump != 0.0 else 0.0
