@@ -97,3 +97,14 @@ def test_before_the_start_the_command_was_that_of_the_start(age_s):
     controller = controller_of(half_strength_m=0.0)
     _, outputs = drive(controller, range(60), age_s=age_s, error_m=0.0)
     assert np.abs(of(outputs, 'predicted_feedback_pa')).max() < 5e4
+
+
+@pytest.mark.parametrize('name', ['sofc_ppr', 'sofc_model_ppr'])
+def test_a_reference_that_moves_at_the_first_tick_is_no_jump(name):
+    controller = controller_of(name, rate_hz=50.0)
+    for tick in range(3):
+        wanted, ahead = (reference(time_s, 0.012, 1.0, 0.015)
+                         for time_s in (0.02 * tick, 0.02 * tick + controller.lead_s))
+        controller.step(wanted[0], *wanted, *ahead)
+        outputs = dict(zip(controller.state_names, controller.state_values()))
+        assert outputs['jump_to_go_m'] == 0.0

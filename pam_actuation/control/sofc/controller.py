@@ -77,7 +77,7 @@ class SelfOrganizingFuzzyController(CompiledController):
             self.state_names = self.state_names[:-len(MODEL_OUTPUTS)]
             self._told = self._outputs[:len(self.state_names)]
         for name in ('reference_knots', 'motion_position_knots', 'motion_rate_knots',
-                     'path_sets', 'path_fading_sets'):
+                     'path_sets', 'path_fading_sets', 'revision'):
             self.settings[name] = float(round(self.settings[name]))
         if self.settings['reference_upper_m'] <= self.settings['reference_lower_m']:
             raise InputError(

@@ -63,8 +63,10 @@ def _start(par: np.record, inverse: FloatArray, values: Tables, kept: Tables, ri
     st.contracting_share = 0.5
     st.offset_m = inp.reference_m - x
     st.contraction_m = x
-    st.reference_m = inp.reference_m
-    st.lead_reference_m = inp.lead_reference_m
+    # It moved before, too.
+    way = par.revision * par.period_s
+    st.reference_m = inp.reference_m - way * inp.reference_rate_m_per_s
+    st.lead_reference_m = inp.lead_reference_m - way * inp.lead_rate_m_per_s
     st.model.slow_m = x
     if par.revision > 0.5:
         muscle_model.begin_motion(st.model, x, inp.pressure_pa)
