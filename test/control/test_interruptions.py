@@ -108,3 +108,14 @@ def test_a_reference_that_moves_at_the_first_tick_is_no_jump(name):
         controller.step(wanted[0], *wanted, *ahead)
         outputs = dict(zip(controller.state_names, controller.state_values()))
         assert outputs['jump_to_go_m'] == 0.0
+
+
+@pytest.mark.parametrize('settings', [{}, {
+    'predicted_proportional_pa_per_m': 0.0, 'predicted_derivative_pa_s_per_m': 0.0}],
+    ids=['with_prediction', 'without'])
+def test_a_lost_pressure_in_motion_tells_no_acceleration(settings):
+    one, other = controller_of(**settings), controller_of(**settings)
+    drive(one, range(640))
+    _, outputs = drive(other, range(640), lost=(605,))
+    assert np.abs(of(outputs[600:], 'disturbance_pa')).max() < 200.0
+    assert np.abs(other.rules.numbers - one.rules.numbers).max() < 50.0

@@ -216,7 +216,7 @@ def test_the_damping_found_grows_no_further_beyond_its_rate(inverse):
         st.number_pa[muscle_model.RATE] = 2e3
         found = [muscle_model.damping_pa_s_per_m(par, st, rate) for rate in (0.0, -0.02)]
         assert found == pytest.approx([5e4 + share * 2e3 / 0.05 for share in shares])
-        muscle_model._begin(par, st, 0.014, 3e5)
+        muscle_model._begin(par, inverse, st, 0.014, PERIOD_S, 3e5)
         st.rate_m_per_s = -0.02
         muscle_model.find_numbers(par, inverse, st, False)
         assert st.now[muscle_model.RATE] == pytest.approx(-0.02 / 0.05 * shares[1])

@@ -296,15 +296,28 @@ def begin_motion(st: np.record, contraction_m: float, pressure_pa: float) -> Non
 
 
 @compiled
-def _begin(par: np.record, st: np.record, contraction_m: float, pressure_pa: float) -> None:
-    """Begin the filters where the muscle is."""
+def _begin(par: np.record, inverse: FloatArray, st: np.record, contraction_m: float,
+           elapsed_s: float, pressure_pa: float) -> None:
+    """Begin the filters where the muscle is, as if it had moved there with its present rate."""
     st.known = 1.0
-    st.contraction_once_m = contraction_m
-    st.contraction_m = contraction_m
     if par.revision < 0.5 or st.motion.noise_m == 0.0:
         begin_motion(st, contraction_m, pressure_pa)
+    st.contraction_once_m = contraction_m
+    st.contraction_m = contraction_m
     st.pressure_once_pa = pressure_pa
     st.pressure_pa = pressure_pa
+    if par.revision < 0.5:
+        return
+    rate: float = st.fast_rate_m_per_s
+    once_m = contraction_m - (elapsed_s + par.model_filter_s) * rate
+    x = once_m - par.model_filter_s * rate
+    beyond_pa = pressure_pa - inverse_pressure_pa(inverse, contraction_m)
+    st.contraction_once_m, st.contraction_m, st.rate_m_per_s = once_m, x, rate
+    st.pressure_once_pa = beyond_pa + inverse_pressure_pa(inverse, once_m)
+    st.pressure_pa = beyond_pa + inverse_pressure_pa(inverse, x)
+    st.unexplained_pa = 0.0
+    for i in range(NUMBERS):
+        st.regressor[i] = 0.0
 
 
 @compiled
@@ -329,7 +342,7 @@ def observe(par: np.record, inverse: FloatArray, rules: FloatArray, st: np.recor
         st.disturbance_pa *= _FADE
         return
     if st.known < 0.5:
-        _begin(par, st, contraction_m, pressure_pa)
+        _begin(par, inverse, st, contraction_m, elapsed_s, pressure_pa)
     former_m, former_rate = st.contraction_m, st.rate_m_per_s
     once_m, x, rate = st.contraction_once_m, former_m, former_rate
     once_pa, p = st.pressure_once_pa, st.pressure_pa

@@ -303,7 +303,7 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
     acts = par.predicted_proportional_pa_per_m > 0.0 or par.predicted_derivative_pa_s_per_m > 0.0
     predicts = acts and credit.known_ticks(par, st) >= par.answer_ticks
     now_m, now_rate = inp.contraction_m, 0.0
-    if predicts or acts and par.revision > 0.5:
+    if predicts or par.has_model * par.revision > 0.5:
         now_m, now_rate = predictor.motion(
             par, inverse, path_rules, model, inp.contraction_m, elapsed_s, pressure)
     if predicts:
