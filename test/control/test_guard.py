@@ -115,14 +115,18 @@ def test_another_movement_is_another_comparison():
     assert watched.state.best_rms_m == pytest.approx(1e-3)
 
 
-def spoiled(guard_ratio):
+def spoiling(**settings):
+    """Return a controller that makes it worse where the muscle answers the wrong way round."""
+    return sofc({
+        'integral_pa_per_m_s': 0.0, 'credit_delay_s': 0.05, 'feedback_gain_pa': 0.0,
+        'proportional_pa_per_m': 0.0, 'derivative_pa_s_per_m': 0.0, 'start_time_s': 0.01,
+        'motion_learning': 0.0, 'lead_s': 0.0, **settings})
+
+
+def spoil(controller, ticks=range(400 * 25), until_rolled=False):
     """Learn on a muscle that answers the wrong way round; return largest error, roll-backs."""
-    controller = sofc({
-        'guard_ratio': guard_ratio, 'integral_pa_per_m_s': 0.0, 'credit_delay_s': 0.05,
-        'feedback_gain_pa': 0.0, 'proportional_pa_per_m': 0.0, 'derivative_pa_s_per_m': 0.0,
-        'start_time_s': 0.01, 'motion_learning': 0.0, 'lead_s': 0.0})
     errors, rolled = [], 0.0
-    for k in range(400 * 25):
+    for k in ticks:
         phase = 2.0 * np.pi * k / 400
         r, v = 0.014 - 0.008 * np.cos(phase), 0.008 * np.sin(phase) * np.pi
         values = dict(zip(controller.state_names, controller.state_values()))
@@ -131,12 +135,22 @@ def spoiled(guard_ratio):
         controller.step(r - error, r, v, r, v)
         errors.append(error)
         rolled = max(rolled, values['times_rolled_back'])
+        if until_rolled and controller.learning_reason().startswith('rolled back'):
+            return k + 1
     return np.abs(errors).max(), rolled
 
 
 def test_spoiled_rules_are_rolled_back_in_the_running_controller():
-    free, never = spoiled(0.0)
-    guarded, rolled = spoiled(1.5)
+    free, never = spoil(spoiling(guard_ratio=0.0))
+    guarded, rolled = spoil(spoiling(guard_ratio=1.5))
     assert never == 0.0
     assert rolled >= 1.0
     assert guarded < 0.5 * free
+
+
+def test_rules_exchanged_after_a_roll_back_are_not_those_rolled_back():
+    controller = spoiling(guard_ratio=1.5)
+    first = spoil(controller, until_rolled=True)
+    controller.replace_rules(controller.rules.copy())
+    spoil(controller, range(first, first + 3))
+    assert controller.learning_reason() == 'starting'

@@ -218,6 +218,16 @@ def test_learning_freezes_on_saturation_slack_valve_and_reference_jump():
     assert values['learning_reason'] == learning.FROZEN_JUMP
 
 
+def test_rules_that_were_active_in_a_jump_are_not_told_as_a_limit():
+    for revision, told in ((1.0, learning.FROZEN_JUMP), (0.0, learning.FROZEN_SATURATED)):
+        controller = sofc({**QUIET, 'revision': revision})
+        controller.step(0.01, 0.01, 0.01, 0.01, 0.01)
+        feed(controller, 60, 5e-4)
+        reasons = {feed(controller, 1, 5e-4, reference_m=0.0115)['learning_reason']
+                   for _ in range(200)}
+        assert reasons == {learning.FROZEN_JUMP, learning.LEARNING, told}
+
+
 def test_an_error_out_of_proportion_is_left_to_the_integral():
     controller = sofc({**QUIET, 'surprise_ratio': 10.0, 'guard_window_s': 1.0})
     for k in range(1200):

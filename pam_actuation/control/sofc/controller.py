@@ -213,6 +213,7 @@ class SelfOrganizingFuzzyController(CompiledController):
             ring[name] = values
         state = fields(self._state, STATE)
         state.history_ticks = min(state.history_ticks, 1.0)
+        state.rolled_back = 0.0
         state.best_rms_m = 0.0        # the new rules are judged anew
         for kept, values in zip(self._kept, self.rules.arrays()):
             kept[...] = values

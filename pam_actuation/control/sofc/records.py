@@ -40,7 +40,7 @@ ENTRY = record(
     'feedforward_pass',               # part of a pass this tick was, for the feed-forward rules
     'motion_pass',                    # the same for the motion rules
     'correction_pa_per_m',            # pressure that mends an index of 1 m there
-    'valid',                          # 1 = neither saturated nor disturbed when it was active
+    'valid',                          # 1, else less the reason why its rules get no credit
     *KNOWN,
     'index_m',                        # performance index, 0 where nothing was learned
     'integral_deviation_pa',          # of the integral from its mean
@@ -113,6 +113,7 @@ STATE = record(
     'rate_factor',                    # of learning, by annealing
     'rate_ceiling',                   # the same, by roll-backs
     'times_rolled_back',
+    'rolled_back',                    # 1 until the rules are exchanged from outside
 )
 # Of a controller with a model of the muscle; the last of ``OUTPUT``.
 MODEL_OUTPUTS = (

@@ -100,7 +100,7 @@ def _reason(par: np.record, ring: Ring, st: np.record, inp: np.record, error: fl
     if inp.learning < 0.5:
         return learning.FROZEN_OFF
     if st.history_ticks < delay + spread or abs(st.offset_m) > _START_BAND_M:
-        if st.times_rolled_back > 0.0 and st.history_ticks < delay + spread:
+        if st.rolled_back > 0.0 and st.history_ticks < delay + spread:
             return learning.FROZEN_ROLLED_BACK
         return learning.FROZEN_START
     if lags:
@@ -112,7 +112,9 @@ def _reason(par: np.record, ring: Ring, st: np.record, inp: np.record, error: fl
         return learning.FROZEN_SLACK
     then = credit.row_of(ring, tick, delay)
     if at_limit or ring[then].valid < 0.5:
-        return learning.FROZEN_SATURATED
+        if at_limit or par.revision < 0.5:
+            return learning.FROZEN_SATURATED
+        return max(int(-ring[then].valid), learning.FROZEN_START)     # 0: rules that are gone
     if _surprising(par, st, error):
         return learning.FROZEN_SURPRISE
     if abs(error) <= par.dead_zone_m:
@@ -354,7 +356,13 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
         max(integral + growth, -par.integral_limit_pa), par.integral_limit_pa)
 
     # Credit memory and rule modification.
-    undisturbed = st.freeze_left_s <= 0.0 and abs(offset) <= _START_BAND_M
+    valid = 1.0
+    if at_limit:
+        valid = -float(learning.FROZEN_SATURATED)
+    elif st.freeze_left_s > 0.0:
+        valid = -float(learning.FROZEN_JUMP)
+    elif abs(offset) > _START_BAND_M:
+        valid = -float(learning.FROZEN_START)
     entry = ring[credit.row_of(ring, int(st.tick), 0)]
     mean = st.integral_mean_pa
     st.integral_mean_pa += period / (par.takeover_time_s + period) * (integral - mean)
@@ -363,8 +371,8 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
     correction = par.correction_pa_per_m
     if not correction > 0.0:
         correction = dynamics.slope_pa_per_m(inverse, lead)
-    credit.push_outcome(entry, a_pass, motion_pass, correction, integral - mean,
-                        0.0 if at_limit or not undisturbed else 1.0, command)
+    credit.push_outcome(
+        entry, a_pass, motion_pass, correction, integral - mean, valid, command)
     if par.index_form < 0.5:
         index = index_linear(error, change, par.index_tau_s, par.index_limit_m)
     else:
@@ -459,6 +467,7 @@ def _guard(par: np.record, values: Tables, kept: Tables, st: np.record, inp: np.
         st.integral_pa = min(
             max(st.integral_pa + (before - restored) / st.integral_shape, -limit), limit)
         st.history_ticks = 1.0        # no credit for rules that are gone
+        st.rolled_back = 1.0
     out.window_rms_error_m = st.former_rms_m
     out.best_window_rms_error_m = st.best_rms_m
     out.learning_rate_factor = st.rate_factor * st.rate_ceiling
