@@ -119,3 +119,14 @@ def test_a_lost_pressure_in_motion_tells_no_acceleration(settings):
     _, outputs = drive(other, range(640), lost=(605,))
     assert np.abs(of(outputs[600:], 'disturbance_pa')).max() < 200.0
     assert np.abs(other.rules.numbers - one.rules.numbers).max() < 50.0
+
+
+@pytest.mark.parametrize('name, value, keeps', [
+    ('path_longest_m', 0.005, False), ('path_sets', 6.0, False),
+    ('path_fading_longest_m', 0.003, False), ('reference_knots', 12.0, False),
+    ('integral_pa_per_m_s', 5e6, True)])
+def test_other_settings_keep_rules_only_where_these_keep_their_meaning(name, value, keeps):
+    controller = controller_of()
+    controller.rules.path[0] = 1e3
+    fresh = controller.with_settings({**controller.settings, name: value})
+    assert fresh.settings[name] == value and bool(fresh.rules.path.any()) == keeps

@@ -16,7 +16,6 @@
 
 from collections.abc import Callable, Mapping
 import math
-from typing import Any
 
 import numpy as np
 from pam_actuation.control.compiled_controller import CompiledController
@@ -31,7 +30,7 @@ from pam_actuation.control.sofc.rule_table import (
     infer_feedback, infer_feedforward, infer_motion, linear_feedback_table, RuleBase)
 from pam_actuation.control.sofc.rule_text import NUMBERS
 from pam_actuation.control.sofc.settings import (
-    FADING_SCALING, OF_MODEL, parameter_array, PARAMETERS, PATH_SCALING, SCALING, SETTINGS)
+    OF_MODEL, parameter_array, PARAMETERS, scaling_of, SETTINGS)
 from pam_actuation.control.sofc.step import sofc_step
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
@@ -84,8 +83,6 @@ class SelfOrganizingFuzzyController(CompiledController):
                 'reference_upper_m must be larger than reference_lower_m',
                 where('reference_upper_m') if where else 'reference_upper_m')
         self.static_inverse = np.ascontiguousarray(static_inverse, dtype=float)
-        scaling: dict[str, Any] = {name: self.settings[name] for name in SCALING}
-        scaling['rig'] = rig_name
         sets = int(self.settings['path_sets'])
         fading = int(self.settings['path_fading_sets'])
         if fading and fading > sets - 1:
@@ -93,12 +90,11 @@ class SelfOrganizingFuzzyController(CompiledController):
                 f'path_fading_sets is {fading} of {sets} path_sets; allowed are at most '
                 f'{max(sets - 1, 0)}, as the first is that of any path',
                 where('path_fading_sets') if where else 'path_fading_sets')
-        scaling |= {name: self.settings[name]
-                    for name in PATH_SCALING * bool(sets) + FADING_SCALING * bool(fading)}
         self.rules = RuleBase(
             linear_feedback_table(), np.zeros((2, int(self.settings['reference_knots']))),
-            scaling, np.zeros((int(self.settings['motion_position_knots']),
-                               int(self.settings['motion_rate_knots']))),
+            {**scaling_of(self.settings), 'rig': rig_name},
+            np.zeros((int(self.settings['motion_position_knots']),
+                      int(self.settings['motion_rate_knots']))),
             np.zeros((sets, int(self.settings['reference_knots']) if sets else 0)))
         if self.settings['model_noise_pa'] > 0.0:
             # The same memory: what the model finds is in the rules at once, and the reverse.
@@ -124,7 +120,7 @@ class SelfOrganizingFuzzyController(CompiledController):
     def with_settings(self, settings: Mapping[str, object], rules: RuleBase | None = None
                       ) -> 'SelfOrganizingFuzzyController':
         """Return a fresh controller with other settings; see ``CompiledController``."""
-        if rules is None and all(settings[name] == self.settings[name] for name in SCALING):
+        if rules is None and scaling_of(settings) == scaling_of(self.settings):
             rules = self.rules
         mode = {name: value for name, value in self.rules.scaling.items()
                 if name.startswith(OF_THE_MODE)}

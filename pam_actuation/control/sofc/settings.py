@@ -20,6 +20,7 @@ range in files follow from it.
 """
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from pam_actuation.control.settings import parameter_record, setting
@@ -234,6 +235,13 @@ SCALING = (
 PATH_SCALING = ('path_sets', 'path_shortest_m', 'path_longest_m')
 # The same, where some of them fade.
 FADING_SCALING = ('path_fading_sets', 'path_fading_shortest_m', 'path_fading_longest_m')
+
+
+def scaling_of(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what of checked settings says what rules mean."""
+    names = (*SCALING, *PATH_SCALING * bool(settings['path_sets']),
+             *FADING_SCALING * bool(settings['path_fading_sets']))
+    return {name: settings[name] for name in names}
 
 
 def parameter_array(values: Mapping[str, float]) -> FloatArray:
