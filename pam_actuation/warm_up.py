@@ -70,9 +70,10 @@ def muscle() -> None:
             rig = load_rig(name, valve=valve)
             for law in ('sofc', 'pid', 'lqi') if name == NOMINAL_RIG else ('sofc',):
                 suffix = '_hsv' if valve == 'hsv' else '_ppr' if law == 'sofc' else ''
+                controller = load_controller(f'{law}{suffix}', rig)
                 with tempfile.TemporaryDirectory() as folder:
-                    simulate_experiment(experiment, rig, load_controller(f'{law}{suffix}', rig),
-                                        str(Path(folder) / 'bag'))
+                    simulate_experiment(experiment, rig, controller, str(Path(folder) / 'bag'))
+                controller.reset_rules()
 
 
 def rollouts() -> None:

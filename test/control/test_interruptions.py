@@ -18,9 +18,12 @@ import math
 
 import numpy as np
 from pam_actuation.control.config import load_controller
+from pam_actuation.control.sofc.muscle_model import ACCELERATION, RATE
+from pam_actuation.control.sofc.records import STATE
 from pam_actuation.control.static_inverse import inverse_pressure_pa
 from pam_sim import load_rig
 from pam_sim.located_yaml import dump_yaml, load_yaml
+from pam_sim.records import fields
 import pytest
 
 PERIOD_S = 0.005
@@ -130,3 +133,48 @@ def test_other_settings_keep_rules_only_where_these_keep_their_meaning(name, val
     controller.rules.path[0] = 1e3
     fresh = controller.with_settings({**controller.settings, name: value})
     assert fresh.settings[name] == value and bool(fresh.rules.path.any()) == keeps
+
+
+STILL = {'predicted_proportional_pa_per_m': 0.0, 'predicted_derivative_pa_s_per_m': 0.0,
+         'disturbance_time_s': 0.0}      # nothing answers to the open loop
+
+
+# What of a table does not change with the motion itself.
+STEADY = {'feedforward': ..., 'motion': ..., 'path': 0, 'numbers': [0, RATE, ACCELERATION]}
+
+
+@pytest.mark.parametrize('name, share', [
+    ('feedforward', 1.0), ('motion', 1.0), ('path', 1.0), ('numbers', 1.0),
+    ('feedforward', 0.4), ('motion', 0.4)])
+def test_an_exchange_makes_no_step_in_the_command(name, share):
+    one, other = controller_of(**STILL), controller_of(**STILL)
+    for controller in (one, other):
+        drive(controller, range(400))
+        fields(controller._state, STATE).rules_share = share
+        drive(controller, [400], learn=False)
+    rules = other.rules.copy()
+    getattr(rules, name)[STEADY[name]] += 3e3
+    other.replace_rules(rules)
+    commands, _ = drive(one, range(401, 404), learn=False)
+    again, _ = drive(other, range(401, 404), learn=False)
+    assert np.abs(again - commands).max() < 300.0
+
+
+@pytest.mark.parametrize('name, share', [
+    ('feedforward', 1.0), ('motion', 1.0), ('path', 1.0), ('feedforward', 0.4)])
+def test_a_roll_back_makes_no_step_in_the_command(name, share):
+    found = {}
+    for guard_ratio in (0.0, 1.5):
+        controller = controller_of(**STILL, guard_ratio=guard_ratio)
+        drive(controller, range(480))
+        getattr(controller.rules, name)[STEADY[name]] += 3e3
+        st = fields(controller._state, STATE)
+        # Two windows that are worse and worse; the next turn of the reference ends the second.
+        st.window.ticks, st.window.turns, st.window.squares_m2 = 1e4, 1.0, 1.0
+        st.window.speeds_m_per_s = st.best_speed_m_per_s = 100.0
+        st.best_speed_m_per_s /= 1e4
+        st.best_rms_m, st.former_rms_m, st.bad_windows, st.direction = 1e-4, 2e-4, 1.0, -1.0
+        st.rules_share = share
+        found[guard_ratio], outputs = drive(controller, range(480, 490))
+    after = 1 + of(outputs, 'times_rolled_back').tolist().index(1.0)
+    assert np.abs(found[1.5] - found[0.0])[:after + 1].max() < 100.0

@@ -26,9 +26,9 @@ from pam_actuation.control.sofc.credit import ring_rows
 from pam_actuation.control.sofc.learning import REASONS
 from pam_actuation.control.sofc.persistence import check_fit
 from pam_actuation.control.sofc.records import ENTRY, KNOWN, MODEL_OUTPUTS, OUTPUT, STATE
-from pam_actuation.control.sofc.rule_table import (
-    infer_feedback, infer_feedforward, infer_motion, linear_feedback_table, RuleBase)
+from pam_actuation.control.sofc.rule_table import linear_feedback_table, RuleBase
 from pam_actuation.control.sofc.rule_text import NUMBERS
+from pam_actuation.control.sofc.rules_output import keep_command, sofc_output
 from pam_actuation.control.sofc.settings import (
     OF_MODEL, parameter_array, PARAMETERS, scaling_of, SETTINGS)
 from pam_actuation.control.sofc.step import sofc_step
@@ -110,12 +110,12 @@ class SelfOrganizingFuzzyController(CompiledController):
             int(par.delay_ticks), int(par.spread_ticks),
             int(par.answer_ticks) + 1 + math.ceil(MAX_AGE_S * self.rate_hz))
         self._ring = np.zeros(rows * size_of(ENTRY))
-        tables = self.rules.stacked()
-        self._kept = tuple(table[3] for table in tables)
+        self._tables = self.rules.stacked()
+        self._kept = tuple(table[3] for table in self._tables)
         self._step = sofc_step
         self._arguments = (
-            self.parameters, self.static_inverse, tables, self._ring, self._state, self._inputs,
-            self._outputs)
+            self.parameters, self.static_inverse, self._tables, self._ring, self._state,
+            self._inputs, self._outputs)
 
     def with_settings(self, settings: Mapping[str, object], rules: RuleBase | None = None
                       ) -> 'SelfOrganizingFuzzyController':
@@ -189,18 +189,18 @@ class SelfOrganizingFuzzyController(CompiledController):
             The rules do not fit this controller; the old ones stay.
 
         """
-        before = self._rule_output_pa()
+        before = self._output_pa()
         self.take_rules(rules, where)
         self._keep_output(before)
 
     def reset_rules(self) -> None:
         """Return to the initial rules without a step in the command."""
-        before = self._rule_output_pa()
+        before = self._output_pa()
         self.rules.reset()
         self._forget_numbers()
         self._keep_output(before)
 
-    def _keep_output(self, before_pa: float) -> None:
+    def _keep_output(self, before_pa: tuple[float, float, float]) -> None:
         self.rules_replaced += 1
         ring = self._ring.view(ENTRY)
         known = {name: ring[name].copy() for name in KNOWN}
@@ -213,32 +213,8 @@ class SelfOrganizingFuzzyController(CompiledController):
         state.best_rms_m = 0.0        # the new rules are judged anew
         for kept, values in zip(self._kept, self.rules.arrays()):
             kept[...] = values
-        change = before_pa - self._rule_output_pa()
-        limit = self.settings['integral_limit_pa']
-        integral = state.integral_pa + change / (state.integral_shape or 1.0)  # 0 = not begun
-        state.integral_pa = min(max(integral, -limit), limit)
+        keep_command.py_func(
+            fields(self.parameters, PARAMETERS), state, before_pa, self._output_pa())
 
-    def _rule_output_pa(self) -> float:
-        """Return the contribution [Pa] of all rule tables where the last tick was."""
-        out, st = fields(self._outputs, OUTPUT), fields(self._state, STATE)
-        share = out.contracting_share
-        return (
-            self.settings['feedback_gain_pa'] * infer_feedback(
-                self.rules.feedback, share, int(out.error_set), out.error_degree,
-                int(out.change_set), out.change_degree)
-            + st.rules_share * infer_feedforward(
-                self.rules.feedforward, share, int(out.reference_knot),
-                out.reference_knot_degree)
-            + st.rules_share * infer_motion(
-                self.rules.motion, int(out.motion_knot), out.motion_knot_degree,
-                int(out.motion_rate_knot), out.motion_rate_knot_degree)
-            + self._model_output_pa())
-
-    def _model_output_pa(self) -> float:
-        """Return what path rules and numbers of the model add [Pa] where the last tick was."""
-        state, par = fields(self._state, STATE), fields(self.parameters, PARAMETERS)
-        out = fields(self._outputs, OUTPUT)
-        path, lead_m = state.model.lead_path, state.lead_m
-        return float(muscle_model.rules_pa(par, self.rules.path, path, lead_m)
-                     + muscle_model.numbers_pa(
-                         par, state.model, path, lead_m, out.inverse_pa))
+    def _output_pa(self) -> tuple[float, float, float]:
+        return sofc_output(self.parameters, self._tables, self._state, self._outputs)

@@ -251,11 +251,10 @@ def load_shape(par: np.record, contraction_m: float) -> float:
 
 
 @compiled
-def dynamic_pressure_pa(par: np.record, st: np.record, static_pa: float, rate_m_per_s: float,
-                        rate_jumped: bool, damping: float, inertia: float,
-                        move_rate_m_per_s: float, move_m_per_s2: float) -> float:
+def accelerate(par: np.record, st: np.record, rate_m_per_s: float, rate_jumped: bool,
+               move_rate_m_per_s: float, move_m_per_s2: float) -> None:
     """
-    Return what moving takes beyond the static pressure [Pa]; advances the filters.
+    Find the acceleration of the lead reference; ``st`` is a ``STATE``.
 
     ``rate_jumped``: the rate of before means nothing. Rate and acceleration of a move made of a
     jump come last; its rate is part of ``rate_m_per_s``.
@@ -274,10 +273,15 @@ def dynamic_pressure_pa(par: np.record, st: np.record, static_pa: float, rate_m_
     if abs(acceleration) < _ACCELERATION_FLOOR_M_PER_S2:
         acceleration = 0.0
     st.acceleration_m_per_s2 = acceleration
-    moving = damping * rate_m_per_s + inertia * (acceleration + exact * move_m_per_s2)
-    quasi_static = static_pa + moving
+    st.moves_m_per_s = rate_m_per_s
+    st.moves_m_per_s2 = acceleration + exact * move_m_per_s2
+
+
+@compiled
+def ahead_of_lag_pa(st: np.record, quasi_static_pa: float, rate_jumped: bool) -> float:
+    """Return what makes up for the lag of the valve [Pa], for a pressure without it."""
     if rate_jumped:
-        st.quasi_static_pa = quasi_static
-    lag = st.lag.lag_s * (quasi_static - st.quasi_static_pa) / period
-    st.quasi_static_pa = quasi_static
-    return moving + lag
+        st.quasi_static_pa = quasi_static_pa
+    lag = st.lag.lag_s * (quasi_static_pa - st.quasi_static_pa) / st.gap_s
+    st.quasi_static_pa = quasi_static_pa
+    return float(lag)

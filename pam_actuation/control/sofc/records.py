@@ -77,6 +77,8 @@ STATE = record(
     'change_m_per_s',                 # of the error
     'lead_rate_m_per_s',
     'acceleration_m_per_s2',          # of the lead reference
+    'moves_m_per_s',                  # rate of the lead reference, with that of a move
+    'moves_m_per_s2',                 # the same of its acceleration
     'quasi_static_pa',                # pressure without the lag of the valve
     'expected_pa',                    # pressure to be measured
     'arriving_pa_per_s',              # its rate of change

@@ -52,6 +52,13 @@ DIRECTIONS = ('contracting', 'extending')
 
 
 @compiled
+def layer(tables: Tables, k: int) -> Tables:
+    """Return one layer of every table: values, initial values, counts or values kept."""
+    feedback, feedforward, motion, path = tables
+    return feedback[k], feedforward[k], motion[k], path[k]
+
+
+@compiled
 def contracting_share(share: float, way_m: float, blend_m: float) -> float:
     """
     Return the degree 0..1 of direction 'contracting' after a further way of the reference.

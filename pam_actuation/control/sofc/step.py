@@ -28,14 +28,14 @@ from pam_actuation.control.inputs import INPUT
 from pam_actuation.control.law_parts import (
     faded_offset, filtered_change, first_command_pa, held_offset, integral_growth, limited)
 from pam_actuation.control.sofc import (
-    credit, dynamics, guard, learning, muscle_model, path_memory, predictor, valve_lag)
+    credit, dynamics, guard, learning, muscle_model, path_memory, predictor, rules_output,
+    valve_lag)
 from pam_actuation.control.sofc.credit import Ring
 from pam_actuation.control.sofc.membership import (
     gaussian_degree, locate, locate_signed_logarithmic, SET_COUNT)
 from pam_actuation.control.sofc.performance_index import index_linear, index_table
 from pam_actuation.control.sofc.records import ENTRY, OUTPUT, STATE
-from pam_actuation.control.sofc.rule_table import (
-    contracting_share, infer_feedback, infer_feedforward, infer_motion, Tables)
+from pam_actuation.control.sofc.rule_table import contracting_share, layer, Tables
 from pam_actuation.control.sofc.settings import PARAMETERS
 from pam_actuation.control.static_inverse import inverse_pressure_pa
 from pam_sim.annotations import FloatArray
@@ -218,7 +218,7 @@ def _passes(par: np.record, st: np.record, knot_place: float, motion_place: floa
 def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, fired: Tables,
           kept: Tables, ring: Ring, st: np.record, inp: np.record, out: np.record) -> float:
     """Run one tick; see ``sofc_step``."""
-    feedback_rules, feedforward_rules, motion_rules, path_rules = values
+    _, feedforward_rules, motion_rules, path_rules = values
     period = par.period_s
     elapsed_s = inp.elapsed_s if math.isfinite(inp.elapsed_s) else period
     if st.started < 0.5:
@@ -273,17 +273,22 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
     st.lead_m = lead
     share = contracting_share(st.contracting_share, way, par.direction_blend_m)
     st.contracting_share = share
+    out.contracting_share = share
+    out.error_set, out.error_degree = i, wi
+    out.change_set, out.change_degree = j, wj
+    out.reference_knot, out.reference_knot_degree = k, wk
+    out.motion_knot, out.motion_knot_degree = m, wm
+    out.motion_rate_knot, out.motion_rate_knot_degree = n, wn
     a_pass, motion_pass = _passes(par, st, k + wk, m + wm, n + wn)
 
     # Inference and trim.
     base = inverse_pressure_pa(inverse, lead)
+    out.inverse_pa = base
     model = st.model
     # A pressure that does not follow the command may be that of a sensor that is off.
     measured = math.nan if lags else valve_lag.pressure_then(st, inp)
     pressure = measured if math.isfinite(measured) else valve_lag.expected_then(st, inp)
     path = 0.0
-    damping = par.rate_feedforward_pa_s_per_m
-    inertia = par.acceleration_feedforward_pa_s2_per_m
     if par.has_model > 0.5:
         predictor.engage(par, model, error, st.announced)
         surprising_move = st.move.left_s > 0.0 and st.surprising > 0.5
@@ -293,14 +298,13 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
         muscle_model.observe(par, inverse, path_rules, model, inp.contraction_m,
                              elapsed_s, measured)
         path_memory.go(par, model.lead_path, way)
-        path = (muscle_model.rules_pa(par, path_rules, model.lead_path, lead)
-                + muscle_model.numbers_pa(par, model, model.lead_path, lead, base))
-        damping = muscle_model.damping_pa_s_per_m(par, model, lead_rate)
-        inertia = par.inertia_feedforward * muscle_model.inertia_pa_s2_per_m(par, model, lead)
-    dynamic = dynamics.dynamic_pressure_pa(
-        par, st, base + par.lag_share * path, lead_rate,
-        st.history_ticks < 0.5 or lead_jump != 0.0, damping, inertia,
-        lead_extra_rate, lead_extra)
+        rules, numbers = rules_output.path_pa(par, path_rules, st, out)
+        path = rules + numbers
+    rate_jumped = st.history_ticks < 0.5 or lead_jump != 0.0
+    dynamics.accelerate(par, st, lead_rate, rate_jumped, lead_extra_rate, lead_extra)
+    moving = rules_output.moving_pa(par, st)
+    dynamic = moving + dynamics.ahead_of_lag_pa(
+        st, base + par.lag_share * path + moving, rate_jumped)
     predicted = 0.0
     acts = par.predicted_proportional_pa_per_m > 0.0 or par.predicted_derivative_pa_s_per_m > 0.0
     predicts = acts and credit.known_ticks(par, st) >= par.answer_ticks
@@ -315,9 +319,7 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
         predicted = predictor.predicted_feedback_pa(
             par, model, lead - ahead_m, lead_rate - ahead_rate, st.lag.lag_s)
         path_memory.settle(par, model, lead - ahead_m, lead_rate)
-    feedback = par.feedback_gain_pa * infer_feedback(feedback_rules, share, i, wi, j, wj)
-    whole_feedforward = infer_feedforward(feedforward_rules, share, k, wk)
-    whole_motion = infer_motion(motion_rules, m, wm, n, wn)
+    feedback, whole_feedforward, whole_motion = rules_output.rules_pa(par, values, out)
     feedforward = st.rules_share * whole_feedforward
     motion = st.rules_share * whole_motion
     proportional = par.proportional_pa_per_m * error
@@ -396,7 +398,6 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
     out.command_pa = command
     out.error_m = error
     out.change_of_error_m_per_s = change
-    out.inverse_pa = base
     out.dynamic_feedforward_pa = dynamic
     out.feedback_rules_pa = feedback
     out.feedforward_rules_pa = feedforward
@@ -411,17 +412,6 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
     out.saturated_low = 1.0 if at_low else 0.0
     out.saturated_high = 1.0 if at_high else 0.0
     out.slew_limited = 1.0 if at_slew else 0.0
-    out.contracting_share = share
-    out.error_set = i
-    out.error_degree = wi
-    out.change_set = j
-    out.change_degree = wj
-    out.reference_knot = k
-    out.reference_knot_degree = wk
-    out.motion_knot = m
-    out.motion_knot_degree = wm
-    out.motion_rate_knot = n
-    out.motion_rate_knot_degree = wn
     out.performance_index_m = index
     out.learning_reason = reason
     out.credited_tick_valid = 1.0 if reason == learning.LEARNING else 0.0
@@ -447,25 +437,11 @@ def _guard(par: np.record, values: Tables, kept: Tables, st: np.record, inp: np.
         guard.restart_window(st)      # such errors tell nothing about the rules
     elif par.guard_ratio > 0.0 and guard.watch(
             par, st, error, inp.reference_rate_m_per_s, values, kept):
-        feedback, feedforward, motion, path = values
-        share = out.contracting_share
-        restored = (
-            par.feedback_gain_pa * infer_feedback(
-                feedback, share, int(out.error_set), out.error_degree,
-                int(out.change_set), out.change_degree)
-            + st.rules_share * infer_feedforward(
-                feedforward, share, int(out.reference_knot), out.reference_knot_degree)
-            + st.rules_share * infer_motion(
-                motion, int(out.motion_knot), out.motion_knot_degree,
-                int(out.motion_rate_knot), out.motion_rate_knot_degree)
-            + muscle_model.rules_pa(par, path, st.model.lead_path, st.lead_m)
-            + muscle_model.numbers_pa(
-                par, st.model, st.model.lead_path, st.lead_m, out.inverse_pa))
-        before = (out.feedback_rules_pa + out.feedforward_rules_pa + out.motion_rules_pa
-                  + out.path_rules_pa)
-        limit = par.integral_limit_pa
-        st.integral_pa = min(
-            max(st.integral_pa + (before - restored) / st.integral_shape, -limit), limit)
+        rules = (out.feedback_rules_pa + out.feedforward_rules_pa + out.motion_rules_pa
+                 + out.path_rules_pa)
+        before = rules, out.path_rules_pa, rules_output.moving_pa(par, st)
+        rules_output.keep_command(
+            par, st, before, rules_output.output_pa(par, values, st, out))
         st.history_ticks = 1.0        # no credit for rules that are gone
         st.rolled_back = 1.0
     out.window_rms_error_m = st.former_rms_m
@@ -475,18 +451,11 @@ def _guard(par: np.record, values: Tables, kept: Tables, st: np.record, inp: np.
 
 
 @compiled
-def _layer(tables: Tables, k: int) -> Tables:
-    """Return one layer of every table: values, initial values, counts or values kept."""
-    feedback, feedforward, motion, path = tables
-    return feedback[k], feedforward[k], motion[k], path[k]
-
-
-@compiled
 def _step(par: FloatArray, inverse: FloatArray, tables: Tables, ring: FloatArray,
           st: FloatArray, inp: FloatArray, out: FloatArray) -> float:
     """Run one tick on arrays; see ``sofc_step``."""
-    return _tick(part(par, 0, PARAMETERS), inverse, _layer(tables, 0), _layer(tables, 1),
-                 _layer(tables, 2), _layer(tables, 3), ring.view(ENTRY), part(st, 0, STATE),
+    return _tick(part(par, 0, PARAMETERS), inverse, layer(tables, 0), layer(tables, 1),
+                 layer(tables, 2), layer(tables, 3), ring.view(ENTRY), part(st, 0, STATE),
                  part(inp, 0, INPUT), part(out, 0, OUTPUT))
 
 
