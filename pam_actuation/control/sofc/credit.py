@@ -65,6 +65,16 @@ def push_feedforward(entry: np.record, k: int, wk: float, m: int, wm: float, n: 
 
 
 @compiled
+def push_active(entry: np.record, out: np.record) -> None:
+    """Write the firing strengths of all rules, from an ``OUTPUT``."""
+    push_feedback(entry, int(out.error_set), out.error_degree, int(out.change_set),
+                  out.change_degree, out.contracting_share)
+    push_feedforward(
+        entry, int(out.reference_knot), out.reference_knot_degree, int(out.motion_knot),
+        out.motion_knot_degree, int(out.motion_rate_knot), out.motion_rate_knot_degree)
+
+
+@compiled
 def push_outcome(
         entry: np.record, feedforward_pass: float, motion_pass: float,
         correction_pa_per_m: float, integral_deviation_pa: float, valid: float,

@@ -28,12 +28,11 @@ from pam_actuation.control.inputs import INPUT
 from pam_actuation.control.law_parts import (
     faded_offset, filtered_change, first_command_pa, held_offset, integral_growth, limited)
 from pam_actuation.control.sofc import (
-    credit, dynamics, guard, learning, muscle_model, path_memory, predictor, rules_output,
-    valve_lag)
+    credit, dynamics, guard, learning, modification, muscle_model, path_memory, predictor,
+    rules_output, valve_lag)
 from pam_actuation.control.sofc.credit import Ring
 from pam_actuation.control.sofc.membership import (
     gaussian_degree, locate, locate_signed_logarithmic, SET_COUNT)
-from pam_actuation.control.sofc.performance_index import index_linear, index_table
 from pam_actuation.control.sofc.records import ENTRY, OUTPUT, STATE
 from pam_actuation.control.sofc.rule_table import contracting_share, layer, Tables
 from pam_actuation.control.sofc.settings import PARAMETERS
@@ -43,7 +42,6 @@ from pam_sim.compiled import Compiled, compiled, entry_point, source_key
 from pam_sim.records import part
 from pam_sim.units import P_ATM_PA
 
-_START_BAND_M = 5e-5      # start-up is over when the bumpless offset is below this
 _START_TRIM_PA = 1e4      # largest integral taken over at the start: what dry friction explains
 _LIFTED_M = 5e-4          # below this contraction the pressure at rest says nothing
 
@@ -85,144 +83,15 @@ def _start(par: np.record, inverse: FloatArray, values: Tables, kept: Tables, ri
 
 
 @compiled
-def _surprising(par: np.record, st: np.record, error: float) -> bool:
-    """Tell whether an error is out of proportion to those of the last window."""
-    return abs(error) > par.surprise_ratio * st.former_rms_m > 0.0
-
-
-@compiled
-def _reason(par: np.record, ring: Ring, st: np.record, inp: np.record, error: float,
-            at_limit: bool, lags: bool) -> int:
-    """Return why the rules do not change in this tick, ``learning.LEARNING`` if they do."""
-    tick = int(st.tick)
-    delay = int(par.delay_ticks)
-    spread = int(par.spread_ticks)
-    if inp.learning < 0.5:
-        return learning.FROZEN_OFF
-    if st.history_ticks < delay + spread or abs(st.offset_m) > _START_BAND_M:
-        if st.rolled_back > 0.0 and st.history_ticks < delay + spread:
-            return learning.FROZEN_ROLLED_BACK
-        return learning.FROZEN_START
-    if lags:
-        return learning.FROZEN_VALVE
-    if st.freeze_left_s > 0.0:
-        return learning.FROZEN_JUMP
-    force = inp.force_n
-    if force < par.slack_force_n:         # False for NaN: force is optional
-        return learning.FROZEN_SLACK
-    then = credit.row_of(ring, tick, delay)
-    if at_limit or ring[then].valid < 0.5:
-        if at_limit or par.revision < 0.5:
-            return learning.FROZEN_SATURATED
-        return max(int(-ring[then].valid), learning.FROZEN_START)     # 0: rules that are gone
-    if _surprising(par, st, error):
-        return learning.FROZEN_SURPRISE
-    if abs(error) <= par.dead_zone_m:
-        return learning.FROZEN_DEAD_ZONE
-    return learning.LEARNING
-
-
-@compiled
-def _learn(par: np.record, values: Tables, initial: Tables, ring: Ring,
-           st: np.record) -> tuple[float, float, float]:
-    """Modify the rules whose indices are now all known; return the squares of the changes."""
-    feedback, feedforward, motion, _ = values
-    first_feedback, first_feedforward, first_motion, _ = initial
-    tick = int(st.tick)
-    spread = int(par.spread_ticks)
-    entry = ring[credit.row_of(ring, tick, int(par.delay_ticks) + spread)]
-    index = credit.credited_index(ring, tick, spread)
-    if index == 0.0 or entry.valid < 0.5:
-        return 0.0, 0.0, 0.0
-    rate = par.learning_rate * st.rate_factor * st.rate_ceiling
-    leak = abs(index) * par.period_s
-    share = entry.contracting_share
-    fb_squares = learning.modify_feedback(
-        feedback, first_feedback, share,
-        int(entry.error_set), entry.error_degree,
-        int(entry.change_set), entry.change_degree,
-        rate * index * par.period_s * par.feedback_learning_per_m_s,
-        leak * par.feedback_leak_per_m_s, par.feedback_step_limit)
-    # What the index asks for in pressure, for one pass.
-    wanted_pa = st.rules_share * rate * (
-        index * entry.correction_pa_per_m
-        + par.takeover * entry.integral_deviation_pa)
-    ff_squares = learning.modify_feedforward(
-        feedforward, first_feedforward, share,
-        int(entry.reference_knot), entry.reference_knot_degree,
-        wanted_pa * entry.feedforward_pass * par.feedforward_learning,
-        leak * par.feedforward_leak_per_m_s,
-        par.feedforward_step_limit_pa, par.feedforward_limit_pa)
-    if st.jumped > 0.0:
-        wanted_pa *= par.jump_motion_learning
-    motion_squares = learning.modify_motion(
-        motion, first_motion,
-        int(entry.motion_knot), entry.motion_knot_degree,
-        int(entry.motion_rate_knot), entry.motion_rate_knot_degree,
-        wanted_pa * entry.motion_pass * par.motion_learning,
-        leak * par.feedforward_leak_per_m_s,
-        par.feedforward_step_limit_pa, par.feedforward_limit_pa)
-    return fb_squares, ff_squares, motion_squares
-
-
-@compiled
-def _count(fired: Tables, share: float, i: int, wi: float, j: int, wj: float, k: int, wk: float,
-           m: int, wm: float, n: int, wn: float) -> None:
-    """Add the firing strengths of this tick to the counts of the rules."""
-    feedback, feedforward, motion, _ = fired
-    for d in range(2):
-        direction = share if d == 0 else 1.0 - share
-        feedback[d, i, j] += direction * (1.0 - wi) * (1.0 - wj)
-        feedback[d, i, j + 1] += direction * (1.0 - wi) * wj
-        feedback[d, i + 1, j] += direction * wi * (1.0 - wj)
-        feedback[d, i + 1, j + 1] += direction * wi * wj
-        feedforward[d, k] += direction * (1.0 - wk)
-        feedforward[d, k + 1] += direction * wk
-    motion[m, n] += (1.0 - wm) * (1.0 - wn)
-    motion[m, n + 1] += (1.0 - wm) * wn
-    motion[m + 1, n] += wm * (1.0 - wn)
-    motion[m + 1, n + 1] += wm * wn
-
-
-@compiled
-def _passes(par: np.record, st: np.record, knot_place: float, motion_place: float,
-            rate_place: float) -> tuple[float, float]:
+def _follow(par: np.record, ring: Ring, st: np.record, inp: np.record, elapsed_s: float,
+            out: np.record) -> tuple[float, bool, bool]:
     """
-    Return which part of a pass over the feed-forward and the motion rules this tick was.
+    Find the error, and the lead reference without its jumps.
 
-    A pass is the way from one knot to the next. Standing still for ``pass_time_s`` also counts as
-    one, just after a jump as ``settling_passes``. There the error is one of the rules; later it is
-    creep. Motion rules do not know from which side the muscle came to rest, so less of that may
-    count for them (``motion_at_rest``).
+    Return the way of the lead reference, whether its rate of before means nothing, and whether the
+    pressure falls behind the commands.
     """
-    still = par.period_s / par.pass_time_s
-    if st.move.left_s > 0.0:
-        st.settling_left_s = par.settling_time_s
-    elif st.settling_left_s > 0.0:
-        st.settling_left_s -= par.period_s
-        still *= par.settling_passes
-    a_pass = still
-    motion_pass = still * par.motion_at_rest
-    if st.history_ticks > 0.0:
-        by_position = motion_place - st.motion_knot_place
-        by_rate = rate_place - st.motion_rate_place
-        a_pass += abs(knot_place - st.knot_place)
-        motion_pass += math.sqrt(by_position * by_position + by_rate * by_rate)
-    st.knot_place = knot_place
-    st.motion_knot_place = motion_place
-    st.motion_rate_place = rate_place
-    return min(a_pass, 1.0), min(motion_pass, 1.0)
-
-
-@compiled
-def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, fired: Tables,
-          kept: Tables, ring: Ring, st: np.record, inp: np.record, out: np.record) -> float:
-    """Run one tick; see ``sofc_step``."""
-    _, feedforward_rules, motion_rules, path_rules = values
     period = par.period_s
-    elapsed_s = inp.elapsed_s if math.isfinite(inp.elapsed_s) else period
-    if st.started < 0.5:
-        _start(par, inverse, values, kept, ring, st, inp)
     jump, lead_jump = dynamics.jumps(par, st, inp)
     # A jump not seen ahead: the move can only begin one preview from now.
     wait = par.lead_s if lead_jump != 0.0 else 0.0
@@ -238,8 +107,8 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
     dynamics.note_jump(par, st, inp.reference_rate_m_per_s, jump, lead_jump)
     lags = valve_lag.falls_behind(par, ring, st, inp)
     held_back = inp.held_back
-    stays_behind = lags or held_back != 0.0
-    if stays_behind or (par.jump_time_s <= 0.0 and (jump != 0.0 or lead_jump != 0.0)):
+    if lags or held_back != 0.0 or (
+            par.jump_time_s <= 0.0 and (jump != 0.0 or lead_jump != 0.0)):
         st.freeze_left_s = par.delay_ticks * period + par.jump_freeze_s
     offset = held_offset(
         st.offset_m, held_back, inp.reference_m - to_go - inp.contraction_m,
@@ -253,59 +122,63 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
     lead, lead_rate, lead_extra_rate, lead_extra = dynamics.later(
         par, ring, st, inp, lead, lead_rate, lead_extra_rate, lead_extra)
     st.offset_m = faded_offset(offset, par.start_time_s, period)
+    way = 0.0 if st.history_ticks < 0.5 else lead - st.lead_m
+    st.lead_m = lead
+    rate_jumped = st.history_ticks < 0.5 or lead_jump != 0.0
+    dynamics.accelerate(par, st, lead_rate, rate_jumped, lead_extra_rate, lead_extra)
+    out.error_m = error
+    out.change_of_error_m_per_s = change
+    out.start_offset_m = offset
+    out.jump_to_go_m = to_go
+    return way, rate_jumped, lags
 
-    # Fuzzification.
-    error_scaled = error / par.error_universe_m
-    change_scaled = change / par.change_universe_m_per_s
-    i, wi = locate(error_scaled, -1.0, 1.0, SET_COUNT)
-    j, wj = locate(change_scaled, -1.0, 1.0, SET_COUNT)
+
+@compiled
+def _fuzzify(par: np.record, values: Tables, st: np.record, way_m: float, out: np.record) -> None:
+    """Find the active rules and their degrees."""
+    _, feedforward, motion, _ = values
+    i, wi = locate(out.error_m / par.error_universe_m, -1.0, 1.0, SET_COUNT)
+    j, wj = locate(
+        out.change_of_error_m_per_s / par.change_universe_m_per_s, -1.0, 1.0, SET_COUNT)
     if par.membership_form > 0.5:
         wi = gaussian_degree(wi, par.membership_width)
         wj = gaussian_degree(wj, par.membership_width)
     lower = par.reference_lower_m
     upper = par.reference_upper_m
-    k, wk = locate(lead, lower, upper, feedforward_rules.shape[1])
-    m, wm = locate(lead, lower, upper, motion_rules.shape[0])
-    n, wn = locate_signed_logarithmic(
-        lead_rate, par.motion_rate_fine_m_per_s, par.motion_rate_upper_m_per_s,
-        motion_rules.shape[1])
-    way = 0.0 if st.history_ticks < 0.5 else lead - st.lead_m
-    st.lead_m = lead
-    share = contracting_share(st.contracting_share, way, par.direction_blend_m)
-    st.contracting_share = share
-    out.contracting_share = share
+    st.contracting_share = contracting_share(st.contracting_share, way_m, par.direction_blend_m)
+    out.contracting_share = st.contracting_share
     out.error_set, out.error_degree = i, wi
     out.change_set, out.change_degree = j, wj
-    out.reference_knot, out.reference_knot_degree = k, wk
-    out.motion_knot, out.motion_knot_degree = m, wm
-    out.motion_rate_knot, out.motion_rate_knot_degree = n, wn
-    a_pass, motion_pass = _passes(par, st, k + wk, m + wm, n + wn)
+    out.reference_knot, out.reference_knot_degree = locate(
+        st.lead_m, lower, upper, feedforward.shape[1])
+    out.motion_knot, out.motion_knot_degree = locate(st.lead_m, lower, upper, motion.shape[0])
+    out.motion_rate_knot, out.motion_rate_knot_degree = locate_signed_logarithmic(
+        st.moves_m_per_s, par.motion_rate_fine_m_per_s, par.motion_rate_upper_m_per_s,
+        motion.shape[1])
 
-    # Inference and trim.
-    base = inverse_pressure_pa(inverse, lead)
-    out.inverse_pa = base
+
+@compiled
+def _model(par: np.record, inverse: FloatArray, path_rules: FloatArray, ring: Ring, st: np.record,
+           inp: np.record, elapsed_s: float, way_m: float, lags: bool, out: np.record) -> None:
+    """Let the model of the muscle observe and predict; without one all it adds is 0."""
     model = st.model
     # A pressure that does not follow the command may be that of a sensor that is off.
     measured = math.nan if lags else valve_lag.pressure_then(st, inp)
     pressure = measured if math.isfinite(measured) else valve_lag.expected_then(st, inp)
-    path = 0.0
+    out.path_rules_pa = 0.0
     if par.has_model > 0.5:
-        predictor.engage(par, model, error, st.announced)
+        predictor.engage(par, model, out.error_m, st.announced)
         surprising_move = st.move.left_s > 0.0 and st.surprising > 0.5
         model.held = 1.0 - par.jump_disturbance if surprising_move else 0.0
         if surprising_move:
             muscle_model.forget(par, model)
         muscle_model.observe(par, inverse, path_rules, model, inp.contraction_m,
                              elapsed_s, measured)
-        path_memory.go(par, model.lead_path, way)
+        path_memory.go(par, model.lead_path, way_m)
         rules, numbers = rules_output.path_pa(par, path_rules, st, out)
-        path = rules + numbers
-    rate_jumped = st.history_ticks < 0.5 or lead_jump != 0.0
-    dynamics.accelerate(par, st, lead_rate, rate_jumped, lead_extra_rate, lead_extra)
-    moving = rules_output.moving_pa(par, st)
-    dynamic = moving + dynamics.ahead_of_lag_pa(
-        st, base + par.lag_share * path + moving, rate_jumped)
-    predicted = 0.0
+        out.path_rules_pa = rules + numbers
+    out.disturbance_pa = model.disturbance_pa
+    out.predicted_feedback_pa = 0.0
     acts = par.predicted_proportional_pa_per_m > 0.0 or par.predicted_derivative_pa_s_per_m > 0.0
     predicts = acts and credit.known_ticks(par, st) >= par.answer_ticks
     now_m, now_rate = inp.contraction_m, 0.0
@@ -316,116 +189,88 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
         ahead_m, ahead_rate = predictor.predict(
             par, inverse, path_rules, ring, int(st.tick), model, inp.contraction_m,
             now_m, now_rate, inp.age_s, pressure, st.lag)
-        predicted = predictor.predicted_feedback_pa(
-            par, model, lead - ahead_m, lead_rate - ahead_rate, st.lag.lag_s)
-        path_memory.settle(par, model, lead - ahead_m, lead_rate)
-    feedback, whole_feedforward, whole_motion = rules_output.rules_pa(par, values, out)
-    feedforward = st.rules_share * whole_feedforward
-    motion = st.rules_share * whole_motion
-    proportional = par.proportional_pa_per_m * error
-    derivative = par.derivative_pa_s_per_m * change
-    integral = st.integral_pa
-    st.integral_shape = dynamics.load_shape(par, lead)
-    trim = (integral - (1.0 - st.rules_share) * st.balance_pa) * st.integral_shape
-    st.rules_pa = (whole_feedforward + whole_motion) / st.integral_shape
-    wanted = (base + dynamic + feedback + feedforward + motion
-              + proportional + trim + derivative
-              + path + model.disturbance_pa + predicted)
+        out.predicted_feedback_pa = predictor.predicted_feedback_pa(
+            par, model, st.lead_m - ahead_m, st.moves_m_per_s - ahead_rate, st.lag.lag_s)
+        path_memory.settle(par, model, st.lead_m - ahead_m, st.moves_m_per_s)
 
+
+@compiled
+def _command(par: np.record, values: Tables, st: np.record, rate_jumped: bool,
+             out: np.record) -> float:
+    """Add all parts of the command within its limits; return what passes those of pressure."""
+    moving = rules_output.moving_pa(par, st)
+    dynamic = moving + dynamics.ahead_of_lag_pa(
+        st, out.inverse_pa + par.lag_share * out.path_rules_pa + moving, rate_jumped)
+    feedback, feedforward, motion = rules_output.rules_pa(par, values, out)
+    out.dynamic_feedforward_pa = dynamic
+    out.feedback_rules_pa = feedback
+    out.feedforward_rules_pa = st.rules_share * feedforward
+    out.motion_rules_pa = st.rules_share * motion
+    out.proportional_pa = par.proportional_pa_per_m * out.error_m
+    out.derivative_pa = par.derivative_pa_s_per_m * out.change_of_error_m_per_s
+    st.integral_shape = dynamics.load_shape(par, st.lead_m)
+    out.integral_pa = (
+        st.integral_pa - (1.0 - st.rules_share) * st.balance_pa) * st.integral_shape
+    st.rules_pa = (feedforward + motion) / st.integral_shape
+    wanted = (out.inverse_pa + dynamic + feedback + out.feedforward_rules_pa + out.motion_rules_pa
+              + out.proportional_pa + out.integral_pa + out.derivative_pa
+              + out.path_rules_pa + out.disturbance_pa + out.predicted_feedback_pa)
     # The limits of the actuator, then of its speed.
     lowest = P_ATM_PA + par.min_pressure_gauge_pa
     highest = P_ATM_PA + par.max_pressure_gauge_pa
     inside, command = limited(
-        wanted, st.command_pa, lowest, highest, par.slew_pa_per_s * period)
-    at_low = wanted < lowest
-    at_high = wanted > highest
-    at_slew = command != inside
-    at_limit = at_low or at_high or at_slew
+        wanted, st.command_pa, lowest, highest, par.slew_pa_per_s * par.period_s)
+    out.unlimited_command_pa = wanted
+    out.saturated_low = 1.0 if wanted < lowest else 0.0
+    out.saturated_high = 1.0 if wanted > highest else 0.0
+    out.slew_limited = 1.0 if command != inside else 0.0
+    out.command_pa = command
     st.command_pa = command
+    return float(inside)
 
-    # Integral with back-calculation against the limits of pressure.
-    integral_gain = par.integral_pa_per_m_s
-    if _surprising(par, st, error):
-        integral_gain *= par.surprise_integral
+
+@compiled
+def _integrate(par: np.record, st: np.record, inp: np.record, inside_pa: float, lags: bool,
+               out: np.record) -> None:
+    """Advance the integral, with back-calculation against the limits of pressure."""
+    gain = par.integral_pa_per_m_s
+    if modification.surprising(par, st, out.error_m):
+        gain *= par.surprise_integral
     growth = integral_growth(
-        integral_gain * error, (inside - wanted) / par.anti_windup_time_s,
-        held_back) * period
+        gain * out.error_m, (inside_pa - out.unlimited_command_pa) / par.anti_windup_time_s,
+        inp.held_back) * par.period_s
     # Supply, valve or driver hold the pressure back, or the command is on its way: more would
     # not help, and the way from one pressure to another is no error of the pressure at its end.
-    if lags or at_slew:
+    if lags or out.slew_limited > 0.5:
         growth = 0.0
-    st.integral_pa = min(
-        max(integral + growth, -par.integral_limit_pa), par.integral_limit_pa)
+    limit = par.integral_limit_pa
+    st.integral_pa = min(max(st.integral_pa + growth, -limit), limit)
 
-    # Credit memory and rule modification.
-    valid = 1.0
-    if at_limit:
-        valid = -float(learning.FROZEN_SATURATED)
-    elif st.freeze_left_s > 0.0:
-        valid = -float(learning.FROZEN_JUMP)
-    elif abs(offset) > _START_BAND_M:
-        valid = -float(learning.FROZEN_START)
-    entry = ring[credit.row_of(ring, int(st.tick), 0)]
-    mean = st.integral_mean_pa
-    st.integral_mean_pa += period / (par.takeover_time_s + period) * (integral - mean)
-    credit.push_feedback(entry, i, wi, j, wj, share)
-    credit.push_feedforward(entry, k, wk, m, wm, n, wn)
-    correction = par.correction_pa_per_m
-    if not correction > 0.0:
-        correction = dynamics.slope_pa_per_m(inverse, lead)
-    credit.push_outcome(
-        entry, a_pass, motion_pass, correction, integral - mean, valid, command)
-    if par.index_form < 0.5:
-        index = index_linear(error, change, par.index_tau_s, par.index_limit_m)
-    else:
-        index = index_table(error_scaled, change_scaled, par.index_limit_m)
-    reason = _reason(par, ring, st, inp, error, at_limit, stays_behind)
-    fb_squares = 0.0
-    ff_squares = 0.0
-    motion_squares = 0.0
-    path_squares = 0.0
-    entry.index_m = index if reason == learning.LEARNING else 0.0
-    learns = reason == learning.LEARNING or reason == learning.FROZEN_DEAD_ZONE
-    surprised = reason == learning.FROZEN_SURPRISE
-    if par.has_model > 0.5 and (learns or surprised):
-        muscle_model.find_numbers(par, inverse, model, surprised)
-    if learns:
-        fb_squares, ff_squares, motion_squares = _learn(par, values, initial, ring, st)
-        if par.has_model > 0.5:
-            path_squares = muscle_model.learn(par, path_rules, fired[3], model)
-    _count(fired, share, i, wi, j, wj, k, wk, m, wm, n, wn)
 
-    out.command_pa = command
-    out.error_m = error
-    out.change_of_error_m_per_s = change
-    out.dynamic_feedforward_pa = dynamic
-    out.feedback_rules_pa = feedback
-    out.feedforward_rules_pa = feedforward
-    out.motion_rules_pa = motion
-    out.path_rules_pa = path
-    out.disturbance_pa = model.disturbance_pa
-    out.predicted_feedback_pa = predicted
-    out.proportional_pa = proportional
-    out.integral_pa = trim
-    out.derivative_pa = derivative
-    out.unlimited_command_pa = wanted
-    out.saturated_low = 1.0 if at_low else 0.0
-    out.saturated_high = 1.0 if at_high else 0.0
-    out.slew_limited = 1.0 if at_slew else 0.0
-    out.performance_index_m = index
-    out.learning_reason = reason
-    out.credited_tick_valid = 1.0 if reason == learning.LEARNING else 0.0
-    out.feedback_rule_change_norm_pa = par.feedback_gain_pa * math.sqrt(fb_squares)
-    out.feedforward_rule_change_norm_pa = math.sqrt(ff_squares)
-    out.motion_rule_change_norm_pa = math.sqrt(motion_squares)
-    out.path_rule_change_norm_pa = math.sqrt(path_squares)
-    out.start_offset_m = offset
-    out.jump_to_go_m = to_go
+@compiled
+def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, fired: Tables,
+          kept: Tables, ring: Ring, st: np.record, inp: np.record, out: np.record) -> float:
+    """Run one tick; see ``sofc_step``."""
+    elapsed_s = inp.elapsed_s if math.isfinite(inp.elapsed_s) else par.period_s
+    if st.started < 0.5:
+        _start(par, inverse, values, kept, ring, st, inp)
+    way_m, rate_jumped, lags = _follow(par, ring, st, inp, elapsed_s, out)
+    _fuzzify(par, values, st, way_m, out)
+    out.inverse_pa = inverse_pressure_pa(inverse, st.lead_m)
+    _model(par, inverse, values[3], ring, st, inp, elapsed_s, way_m, lags, out)
+    inside_pa = _command(par, values, st, rate_jumped, out)
+    integral_pa = st.integral_pa
+    _integrate(par, st, inp, inside_pa, lags, out)
+    at_limit = out.saturated_low + out.saturated_high + out.slew_limited > 0.5
+    modification.remember(par, inverse, ring, st, integral_pa, at_limit, out)
+    reason = modification.reason(
+        par, ring, st, inp, out.error_m, at_limit, lags or inp.held_back != 0.0)
+    modification.modify(par, inverse, values, initial, fired, ring, st, reason, out)
     st.tick += 1.0
     st.history_ticks += 1.0
-    st.freeze_left_s = max(0.0, st.freeze_left_s - period)
-    _guard(par, values, kept, st, inp, error, reason, out)
-    return command
+    st.freeze_left_s = max(0.0, st.freeze_left_s - par.period_s)
+    _guard(par, values, kept, st, inp, out.error_m, reason, out)
+    return float(out.command_pa)
 
 
 @compiled
