@@ -66,7 +66,7 @@ def _start(par: np.record, inverse: FloatArray, values: Tables, kept: Tables, ri
     st.reference_m = inp.reference_m - way * inp.reference_rate_m_per_s
     st.lead_reference_m = inp.lead_reference_m - way * inp.lead_rate_m_per_s
     st.model.slow_m = x
-    if par.revision > 0.5:
+    if par.has_model * par.revision > 0.5:
         muscle_model.begin_motion(st.model, x, inp.pressure_pa)
     guard.keep(values, kept)
     pressure = inp.pressure_pa
