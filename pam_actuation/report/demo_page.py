@@ -18,10 +18,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TYPE_CHECKING
 
-from pam_actuation.report.metrics import run_metrics, RunMetrics
+from pam_actuation.report.metrics import RunMetrics
 from pam_actuation.report.page import (
     paragraph, render, Section, signed, table)
-from pam_actuation.report.pages import FOOTER, muscle_volume
+from pam_actuation.report.pages import FOOTER, recorded_metrics
 from pam_actuation.report.sections.cycles import cycles
 from pam_actuation.report.sections.gap import gap_section
 from pam_actuation.report.sections.metrics_table import metrics
@@ -111,8 +111,7 @@ def demo_report(out_path: StrPath, parts: Sequence[DemoPart],
     facts: dict[str, dict[str, Any]] = {}
     everything: list[tuple[str, Run]] = []
     for index, part in enumerate(parts):
-        measured = [(title, run, run_metrics(run, volume_m3=muscle_volume(run)))
-                    for title, run in part.runs]
+        measured = [(title, run, recorded_metrics(run)) for title, run in part.runs]
         everything += part.runs
         numbers += part_numbers([(title, m) for title, _, m in measured])
         facts.update({title: m.to_dict() for title, _, m in measured})

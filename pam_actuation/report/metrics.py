@@ -270,12 +270,13 @@ def _step_response(time_s: FloatArray, error: FloatArray, start_s: float, size_m
         start_s, size_m, float(time_s[outside[-1] + 1] - start_s), overshoot)
 
 
-def saturation_share(run: 'Run', high_v: float = 6.0) -> tuple[float | None, float] | None:
+def saturation_share(run: 'Run', rig: 'Rig | None' = None) -> tuple[float | None, float] | None:
     """
     Return (low, high): share of valve messages at the lower / upper limit, or None.
 
-    PPR: 0 V and ``high_v``. HSV: high is either duty fully open; low has no
-    meaning there (both shut is the wanted rest state) and is None.
+    PPR: the lowest and highest input of the regulator of ``rig``; without the rig they are not
+    known. HSV: high is either duty fully open; low has no meaning there (both shut is the
+    wanted rest state) and is None.
     """
     duty = signals.series(run, 'valve_signal', 'fill_duty')
     vent = signals.series(run, 'valve_signal', 'vent_duty')
@@ -283,9 +284,10 @@ def saturation_share(run: 'Run', high_v: float = 6.0) -> tuple[float | None, flo
         full = (duty[1] >= 0.999) | (vent[1] >= 0.999)
         return None, float(np.mean(full))
     volts = signals.series(run, 'valve_signal', 'ppr_voltage')
-    if volts is None or not len(volts[1]):
+    if volts is None or not len(volts[1]) or rig is None:
         return None
-    return float(np.mean(volts[1] <= 1e-6)), float(np.mean(volts[1] >= high_v - 1e-6))
+    low_v, high_v = rig.parameters['ppr_lowest_v'], rig.parameters['ppr_highest_v']
+    return float(np.mean(volts[1] <= low_v + 1e-6)), float(np.mean(volts[1] >= high_v - 1e-6))
 
 
 def interruptions(run: 'Run') -> tuple[int, float] | None:
@@ -405,13 +407,14 @@ def run_metrics(run: 'Run', cycles: Cycles | None = None,
     volume_m3 : callable, optional
         Muscle volume over contraction; without it air use is None.
     rig : pam_sim.rig.Rig, optional
-        Gives the data sheet of the valves; without it the air through the fill valve is None.
+        Gives the data sheet of the valves; without it the air through the fill valve and the
+        shares at the limits of a regulator are None.
 
     """
     cycles = find_cycles(run) if cycles is None else cycles
     tracked, pulled = tracking_error(run), force_error(run)
     error = None if tracked is None else tracked[1]
-    saturation = saturation_share(run) or (None, None)
+    saturation = saturation_share(run, rig) or (None, None)
     used = None
     pressure, contraction = signals.series(run, 'pressure'), signals.series(run, 'contraction')
     if volume_m3 is not None and pressure is not None and contraction is not None:

@@ -68,6 +68,11 @@ def muscle_volume(run: 'Run') -> 'Callable[[FloatArray], FloatArray] | None':
         np.clip(contraction_m, 0.0, rig.muscle.stroke_m))
 
 
+def recorded_metrics(run: 'Run') -> RunMetrics:
+    """Return the figures of a run, with the rig in its metadata."""
+    return run_metrics(run, volume_m3=muscle_volume(run), rig=recorded_rig(run))
+
+
 def experiment_report(runs: 'Sequence[Run]', out_path: StrPath,
                       titles: Sequence[str] | None = None,
                       rules_before: 'RuleBase | None' = None,
@@ -114,8 +119,7 @@ def experiment_report(runs: 'Sequence[Run]', out_path: StrPath,
     if not runs:
         raise InputError('a report needs at least one recording')
     titles = list(titles) if titles else default_titles(runs)
-    measured = [run_metrics(run, volume_m3=muscle_volume(run), rig=recorded_rig(run))
-                for run in runs]
+    measured = [recorded_metrics(run) for run in runs]
     named = list(zip(titles, measured))
     sections = [early_section(runs), _implausible(list(zip(titles, runs))),
                 metrics(named), cycles(named), overlaid(list(zip(titles, runs)))]

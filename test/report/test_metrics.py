@@ -17,6 +17,7 @@
 import numpy as np
 from pam_actuation.report import metrics
 from pam_actuation.report.decimate import decimate_min_max, decimate_steps
+from pam_sim import load_rig
 from pam_sim.run import Series
 import pytest
 
@@ -81,15 +82,20 @@ def test_a_sine_has_no_steps():
     assert metrics.step_responses(tracking_run(AMPLITUDES)) == ()
 
 
-def test_saturation_shares():
+@pytest.mark.parametrize('lowest_v, highest_v', [(0.0, 6.0), (1.0, 5.0)])
+def test_saturation_is_at_the_limits_of_the_regulator_of_the_rig(lowest_v, highest_v):
+    rig = load_rig('dmsp_5_300_hanging_mass').with_(
+        parameters={'ppr_lowest_v': lowest_v, 'ppr_highest_v': highest_v})
     run = tracking_run(AMPLITUDES)
     volts = run.topics['valve_signal'].values['ppr_voltage']
     volts[:] = 3.0
-    volts[: volts.size // 4] = 6.0
-    volts[-volts.size // 10:] = 0.0
-    low, high = metrics.saturation_share(run)
-    assert high == pytest.approx(0.25, abs=1e-3)
-    assert low == pytest.approx(0.10, abs=1e-3)
+    volts[: volts.size // 4] = highest_v
+    volts[-volts.size // 10:] = lowest_v
+    found = metrics.run_metrics(run, rig=rig)
+    assert found.saturation_high == pytest.approx(0.25, abs=1e-3)
+    assert found.saturation_low == pytest.approx(0.10, abs=1e-3)
+    unknown = metrics.run_metrics(run)
+    assert unknown.saturation_high is None and unknown.saturation_low is None
 
 
 def test_saturation_of_an_hsv_pair_is_either_valve_fully_open():
