@@ -245,11 +245,17 @@ def step_responses(run: 'Run') -> tuple[StepResponse, ...]:
     groups = np.split(large, np.flatnonzero(np.diff(large) > lag) + 1)
     # A ramp also moves far in 30 ms if it is long enough; a step is over at once.
     groups = [g for g in groups if g.size <= 2 * lag]
-    starts = [float(tr[g[0] + lag]) for g in groups]
-    ends = starts[1:] + [float(te[-1])]
+    # A quick sine moves as far in the 30 ms before and after.
+    padded = np.pad(jump, lag)
+    steps = []
+    for g in groups:
+        size = float(jump[g][np.argmax(np.abs(jump[g]))])
+        before, after = float(padded[g[0]]), float(padded[g[-1] + 2 * lag])
+        if max(abs(before), abs(after)) <= 0.5 * abs(size):
+            steps.append((float(tr[g[0] + lag]), size - 0.5 * (before + after)))
+    ends = [start for start, _ in steps[1:]] + [float(te[-1])]
     found = []
-    for group, start, end in zip(groups, starts, ends):
-        size = float(jump[group][np.argmax(np.abs(jump[group]))])
+    for (start, size), end in zip(steps, ends):
         inside = (te >= start) & (te < end - 2.0 * STEP_WITHIN_S)
         found.append(_step_response(te[inside], error[inside], start, size))
     return tuple(found)

@@ -78,8 +78,22 @@ def test_a_step_that_stays_off_is_not_settled():
     assert step.settling_s is None
 
 
-def test_a_sine_has_no_steps():
-    assert metrics.step_responses(tracking_run(AMPLITUDES)) == ()
+@pytest.mark.parametrize('frequency_hz', [0.25, 0.5, 0.9, 0.95, 1.0, 1.05, 1.1, 1.25, 2.0, 4.0])
+def test_a_sine_has_no_steps(frequency_hz):
+    # Of 16 mm from end to end: at 1 Hz its fastest 30 ms are 1.5 mm long.
+    run = tracking_run(AMPLITUDES, period_s=1.0 / frequency_hz)
+    assert metrics.step_responses(run) == ()
+
+
+def test_steps_on_a_moving_reference_are_found():
+    run = tracking_run(AMPLITUDES * 4, period_s=2.0)
+    reference = run.topics['reference']
+    time_s = reference.time_s(reference.stamp_ns[0])
+    for begin_s, size_m in ((5.5, 0.004), (12.0, -0.003)):
+        reference.values['contraction_m'][time_s >= begin_s] += size_m
+    steps = metrics.step_responses(run)
+    assert [step.start_s for step in steps] == pytest.approx([5.5, 12.0], abs=0.011)
+    assert [step.size_m for step in steps] == pytest.approx([0.004, -0.003], abs=1e-4)
 
 
 @pytest.mark.parametrize('lowest_v, highest_v', [(0.0, 6.0), (1.0, 5.0)])
