@@ -147,12 +147,10 @@ class Chain:
         return 0.0 <= t_s < self.duration_s and self.segments[self._index(t_s)].SHUTS_VALVE
 
     @property
-    def cycles(self) -> tuple[float, float, int] | None:
-        """Return (start_s, period_s, count) of the first periodic primitive, or None."""
-        for start, segment in zip(self._starts, self.segments):
-            if segment.periods:
-                return (start, *segment.periods)
-        return None
+    def periodic_parts(self) -> tuple[tuple[float, float, int], ...]:
+        """Return (start_s, period_s, count) of every periodic primitive."""
+        return tuple((start, *segment.periods)
+                     for start, segment in zip(self._starts, self.segments) if segment.periods)
 
     def extremes(self) -> tuple[float, float]:
         """Return the lowest and highest value, looked at every 10 ms."""

@@ -135,7 +135,12 @@ class Experiment:
     @property
     def cycles(self) -> tuple[float, float, int] | None:
         """Return (start_s, period_s, count) of the first periodic primitive, or None."""
-        return self.chain.cycles
+        return next(iter(self.periodic_parts), None)
+
+    @property
+    def periodic_parts(self) -> tuple[tuple[float, float, int], ...]:
+        """Return (start_s, period_s, count) of every periodic primitive."""
+        return self.chain.periodic_parts
 
     def check_reachable(self, rig: 'JointRig | Rig') -> None:
         """Raise InputError where the experiment asks for what the rig cannot do."""

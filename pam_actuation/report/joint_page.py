@@ -20,11 +20,11 @@ import os
 from typing import Any
 
 import numpy as np
-from pam_actuation.report import figures, metrics, signals
+from pam_actuation.report import errors, figures, metrics, signals
 from pam_actuation.report.page import plot, render, Section, table
-from pam_actuation.report.pages import default_titles, early_section
+from pam_actuation.report.pages import cycle_numbers, default_titles, early_section
 from pam_actuation.report.sections.markers import markers_sections
-from pam_actuation.report.sections.metrics_table import interrupted_text, value_at
+from pam_actuation.report.sections.metrics_table import each_part, interrupted_text
 from pam_actuation.report.sections.provenance import provenance
 from pam_actuation.report.sections.timing import timing
 from pam_sim.annotations import FloatArray
@@ -45,9 +45,10 @@ class JointMetrics:
     """
     Figures of merit of a recording of a joint, SI; None where it does not tell.
 
-    ``cycle_rmse_rad`` has one number per complete cycle of the experiment; ``co_contraction_pa``
-    is the mean gauge pressure of both muscles; ``interruptions`` are number and seconds of the
-    stretches in which the controller vented for want of input.
+    ``cycle_rmse_rad`` has one number per complete cycle of the experiment, those of its
+    ``cycle_parts`` one after another; ``co_contraction_pa`` is the mean gauge pressure of both
+    muscles; ``interruptions`` are number and seconds of the stretches in which the controller
+    vented for want of input.
     """
 
     duration_s: float
@@ -57,12 +58,14 @@ class JointMetrics:
     co_contraction_pa: float | None
     interruptions: tuple[int, float] | None
     timing: tuple[Any, ...]
+    cycle_parts: tuple[errors.Cycles, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Return the main numbers as plain data."""
         return {'duration_s': self.duration_s, 'tracking_rmse_rad': self.rmse_rad,
                 'max_error_rad': self.max_error_rad,
                 'cycle_rmse_rad': self.cycle_rmse_rad.tolist(),
+                'cycle_parts': errors.parts_as_data(self.cycle_parts),
                 'co_contraction_pa': self.co_contraction_pa,
                 'interruptions': self.interruptions and self.interruptions[0],
                 'loop_period_s': {one.topic: one.median_s for one in self.timing},
@@ -75,26 +78,24 @@ def angle_error(run: Run) -> tuple[FloatArray, FloatArray] | None:
 
     The reference is interpolated linearly to the stamps of the angle.
     """
-    return metrics.difference(signals.series(run, 'joint_reference', 'angle_rad'),
-                              signals.series(run, 'joint_state', 'angle_rad'))
+    return errors.difference(signals.series(run, 'joint_reference', 'angle_rad'),
+                             signals.series(run, 'joint_state', 'angle_rad'))
 
 
 def joint_metrics(run: Run) -> JointMetrics:
     """Return the figures of merit of a recording of a joint."""
-    error, cycles = angle_error(run), metrics.find_cycles(run)
+    error, parts = angle_error(run), errors.find_parts(run)
     pressures = [pair for side in SIDES
                  if (pair := signals.series(run, f'{side}/pressure')) is not None]
-    of_cycles: FloatArray = np.empty(0)
-    if error is not None and cycles is not None:
-        start_s, period_s, count = cycles
-        of_cycles = metrics.split_rmse(*error, period_s, start_s, count)
+    cycles = errors.part_rmse(error, parts)
     return JointMetrics(
-        signals.duration_s(run), None if error is None else metrics.rmse(error[1]),
-        None if error is None else float(np.max(np.abs(error[1]))), of_cycles,
+        signals.duration_s(run), None if error is None else errors.rmse(error[1]),
+        None if error is None else float(np.max(np.abs(error[1]))), errors.joined(cycles),
         float(np.mean([pair[1].mean() for pair in pressures])) - P_ATM_PA if pressures else None,
         metrics.interruptions(run),
         tuple(found for topic in run.topics
-              if (found := metrics.loop_timing(run, topic)) is not None))
+              if (found := metrics.loop_timing(run, topic)) is not None),
+        errors.counted(parts, cycles))
 
 
 def joint_report(runs: Sequence[Run], out_path: str | os.PathLike[str],
@@ -149,8 +150,10 @@ def _merits(named: Sequence[tuple[str, JointMetrics]]) -> Section:
     rows = [
         ('Tracking RMSE', cells(lambda m: _degrees(m.rmse_rad))),
         ('Largest error', cells(lambda m: _degrees(m.max_error_rad))),
-        ('RMSE of the first cycle', cells(lambda m: _degrees(value_at(m.cycle_rmse_rad, 0)))),
-        ('RMSE of the last cycle', cells(lambda m: _degrees(value_at(m.cycle_rmse_rad, -1)))),
+        ('RMSE of the first cycle', cells(lambda m: each_part(
+            m.cycle_rmse_rad, m.cycle_parts, lambda cycles: _degrees(cycles[0])))),
+        ('RMSE of the last cycle', cells(lambda m: each_part(
+            m.cycle_rmse_rad, m.cycle_parts, lambda cycles: _degrees(cycles[-1])))),
         ('Mean pressure of both muscles', cells(lambda m: (
             None if m.co_contraction_pa is None else f'{m.co_contraction_pa * 1e-3:.1f} kPa'))),
         ('Vented for missing or old input', cells(interrupted_text))]
@@ -163,9 +166,8 @@ def _key_numbers(named: Sequence[tuple[str, JointMetrics]]) -> list[tuple[str, s
     numbers = []
     for title, one in named[:4]:
         if len(one.cycle_rmse_rad) > 1:
-            first, last = np.degrees(one.cycle_rmse_rad[[0, -1]])
-            numbers.append((f'{first:.2f} → {last:.2f}°',
-                            'Tracking RMSE, first → last cycle', title, ''))
+            numbers += cycle_numbers('Tracking RMSE', np.degrees(one.cycle_rmse_rad),
+                                     one.cycle_parts, title, '°')
         elif one.rmse_rad is not None:
             numbers.append((str(_degrees(one.rmse_rad)), 'Tracking RMSE', title, ''))
     return numbers

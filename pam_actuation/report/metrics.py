@@ -20,7 +20,7 @@ they need. They return None if a topic is missing, so a page can leave a cell em
 failing.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TYPE_CHECKING
 
@@ -30,8 +30,9 @@ from numpy.typing import ArrayLike
 from pam_actuation.control.tick import RUNNING
 from pam_actuation.report import signals
 from pam_actuation.report.command_path import command_path
+from pam_actuation.report.errors import (
+    counted, Cycles, difference, find_parts, joined, part_rmse, parts_as_data, rmse, Signal)
 from pam_sim.annotations import FloatArray
-from pam_sim.errors import InputError
 from pam_sim.short_repr import short_repr
 from pam_sim.units import RHO_REFERENCE
 
@@ -39,9 +40,6 @@ if TYPE_CHECKING:
     from pam_actuation.control.delay_estimate import PathEstimate
     from pam_sim.rig import Rig
     from pam_sim.run import Run
-
-Signal = tuple[FloatArray, FloatArray]          # time [s], values
-Cycles = tuple[float, float, int]               # start [s], period [s], count
 
 STEP_MIN_M = 1.5e-3          # a reference jump this large within 30 ms counts as a step
 STEP_WITHIN_S = 0.03
@@ -94,6 +92,7 @@ class RunMetrics:
     max_error_n: float | None = None
     cycle_rmse_n: FloatArray = field(default_factory=lambda: np.empty(0))
     path: 'PathEstimate | None' = None       # from command to pressure
+    cycle_parts: tuple[Cycles, ...] = ()     # whose cycles follow one another above
 
     def to_dict(self) -> dict[str, Any]:
         """Return the main numbers as plain data, SI."""
@@ -102,19 +101,13 @@ class RunMetrics:
                 'cycle_rmse_m': [float(v) for v in self.cycle_rmse_m],
                 'tracking_rmse_n': self.rmse_n, 'max_error_n': self.max_error_n,
                 'cycle_rmse_n': [float(v) for v in self.cycle_rmse_n],
+                'cycle_parts': parts_as_data(self.cycle_parts),
                 'settling_s': [s.settling_s for s in self.steps],
                 'interruptions': self.interruptions and self.interruptions[0],
                 'saturation_high': self.saturation_high, 'air_use_kg': self.air_use_kg,
                 'air_fed_kg': self.air_fed_kg, 'saturation_low': self.saturation_low,
                 'loop_period_s': {t.topic: t.median_s for t in self.timing},
                 'loop_jitter_s': {t.topic: t.jitter_s for t in self.timing}}
-
-
-def rmse(error: ArrayLike) -> float | None:
-    """Return the root mean square of the finite values, or None if there is none."""
-    values = np.asarray(error, dtype=float)
-    values = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(values ** 2))) if values.size else None
 
 
 def tracking_error(run: 'Run') -> Signal | None:
@@ -132,94 +125,6 @@ def tracking_error(run: 'Run') -> Signal | None:
 def force_error(run: 'Run') -> Signal | None:
     """Return (time_s, error_n) with error = wanted - measured force, or None."""
     return difference(signals.series(run, 'reference', 'force_n'), signals.series(run, 'force'))
-
-
-def difference(reference: Signal | None, measured: Signal | None) -> Signal | None:
-    """Return (time_s, reference - measured) where both exist, or None."""
-    if reference is None or measured is None or len(reference[0]) < 2:
-        return None
-    (tr, r), (tx, x) = reference, measured
-    inside = (tx >= tr[0]) & (tx <= tr[-1])
-    if not inside.any():
-        return None
-    return tx[inside], np.interp(tx[inside], tr, r) - x[inside]
-
-
-def split_rmse(time_s: ArrayLike, error: ArrayLike, period_s: float, start_s: float,
-               count: int | None = None) -> FloatArray:
-    """
-    Return the RMSE of every complete period from start_s on, as an array.
-
-    Parameters
-    ----------
-    time_s, error : array_like, shape (N,)
-        Samples of the error over time.
-    period_s, start_s : float
-        Length of a cycle and start of the first one [s].
-    count : int, optional
-        Number of cycles; by default as many as are complete.
-
-    """
-    time, errors = np.asarray(time_s, dtype=float), np.asarray(error, dtype=float)
-    if time.size < 2 or period_s <= 0.0:
-        return np.empty(0)
-    # The last sample lies up to one sample before the end of the last cycle.
-    complete = int(np.floor((time[-1] - start_s) / period_s + 0.02))
-    complete = max(complete if count is None else min(complete, int(count)), 0)
-    values = []
-    for k in range(complete):
-        inside = ((time >= start_s + k * period_s)
-                  & (time < start_s + (k + 1) * period_s))
-        value = rmse(errors[inside])
-        values.append(np.nan if value is None else value)
-    return np.array(values)
-
-
-def cycle_rmse(run: 'Run', period_s: float, start_s: float, count: int | None = None
-               ) -> FloatArray:
-    """Return the tracking RMSE [m] of each cycle of a run; empty if nothing is tracked."""
-    tracked = tracking_error(run)
-    if tracked is None:
-        return np.empty(0)
-    return split_rmse(*tracked, period_s, start_s, count)
-
-
-def find_cycles(run: 'Run') -> Cycles | None:
-    """
-    Return (start_s, period_s, count) of the run's repeating reference, or None.
-
-    Read from the experiment in the bag's metadata; a foreign bag is searched for
-    equally spaced rising crossings of the reference's middle value.
-    """
-    text = run.metadata.get('experiment') if run.metadata else None
-    if text:
-        from pam_actuation.experiments import load_experiment
-        try:
-            return load_experiment(text).cycles
-        except InputError:
-            pass
-    reference = signals.series(run, 'reference')
-    return None if reference is None else cycles_of_signal(*reference)
-
-
-def cycles_of_signal(time_s: ArrayLike, value: ArrayLike) -> Cycles | None:
-    """Return (start_s, period_s, count) of an evenly repeating signal, or None."""
-    time, values = np.asarray(time_s, dtype=float), np.asarray(value, dtype=float)
-    if values.size < 8 or np.ptp(values) <= 0.0:
-        return None
-    centred = values - 0.5 * (values.max() + values.min())
-    rising = np.flatnonzero((centred[:-1] < 0.0) & (centred[1:] >= 0.0))
-    if rising.size < 3:
-        return None
-    share = -centred[rising] / (centred[rising + 1] - centred[rising])
-    crossing = time[rising] + share * (time[rising + 1] - time[rising])
-    gaps = np.diff(crossing)
-    period = float(np.median(gaps))
-    even = np.abs(gaps - period) < 0.03 * period
-    if even.sum() < 2 or even.sum() < 0.8 * even.size:
-        return None
-    start = float(crossing[np.flatnonzero(even)[0]])
-    return start, period, int((time[-1] - start) / period + 0.02)
 
 
 def step_responses(run: 'Run') -> tuple[StepResponse, ...]:
@@ -398,7 +303,7 @@ def air_fed(run: 'Run', conductance_m3_per_s_pa: float, critical_ratio: float,
     return float(np.sum(0.5 * (flow[1:] + flow[:-1]) * np.diff(time_s)))
 
 
-def run_metrics(run: 'Run', cycles: Cycles | None = None,
+def run_metrics(run: 'Run', parts: Sequence[Cycles] | None = None,
                 volume_m3: Callable[[FloatArray], FloatArray] | None = None,
                 rig: 'Rig | None' = None) -> RunMetrics:
     """
@@ -408,8 +313,8 @@ def run_metrics(run: 'Run', cycles: Cycles | None = None,
     ----------
     run : pam_sim.run.Run
         The recording.
-    cycles : (start_s, period_s, count), optional
-        Of the repeating part; by default as ``find_cycles``.
+    parts : sequence of (start_s, period_s, count), optional
+        Of the repeating parts; by default as ``errors.find_parts``.
     volume_m3 : callable, optional
         Muscle volume over contraction; without it air use is None.
     rig : pam_sim.rig.Rig, optional
@@ -417,8 +322,9 @@ def run_metrics(run: 'Run', cycles: Cycles | None = None,
         shares at the limits of a regulator are None.
 
     """
-    cycles = find_cycles(run) if cycles is None else cycles
+    parts = find_parts(run) if parts is None else parts
     tracked, pulled = tracking_error(run), force_error(run)
+    cycles_m, cycles_n = part_rmse(tracked, parts), part_rmse(pulled, parts)
     error = None if tracked is None else tracked[1]
     saturation = saturation_share(run, rig) or (None, None)
     used = None
@@ -432,8 +338,7 @@ def run_metrics(run: 'Run', cycles: Cycles | None = None,
         rmse_m=None if error is None else rmse(error),
         max_error_m=None if error is None else float(np.max(np.abs(error))),
         mean_error_m=None if error is None else float(np.mean(error)),
-        cycle_rmse_m=np.empty(0) if not cycles else cycle_rmse(
-            run, cycles[1], cycles[0], cycles[2]),
+        cycle_rmse_m=joined(cycles_m),
         steps=step_responses(run),
         saturation_low=saturation[0], saturation_high=saturation[1],
         air_use_kg=used, timing=tuple(t for t in timing if t is not None),
@@ -442,6 +347,5 @@ def run_metrics(run: 'Run', cycles: Cycles | None = None,
             run, rig.parameters['C'], rig.parameters['b'], rig.parameters['supply_pa']),
         rmse_n=None if pulled is None else rmse(pulled[1]),
         max_error_n=None if pulled is None else float(np.max(np.abs(pulled[1]))),
-        cycle_rmse_n=np.empty(0) if not cycles or pulled is None else split_rmse(
-            *pulled, cycles[1], cycles[0], cycles[2]),
+        cycle_rmse_n=joined(cycles_n), cycle_parts=counted(parts, cycles_m, cycles_n),
         path=command_path(run, rig))

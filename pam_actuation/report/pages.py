@@ -19,6 +19,7 @@ from typing import Any, TYPE_CHECKING
 
 import numpy as np
 from pam_actuation.bags.ending import early_sentences
+from pam_actuation.report.errors import by_part
 from pam_actuation.report.metrics import run_metrics, RunMetrics
 from pam_actuation.report.page import paragraph, render, Section, signed, table
 from pam_actuation.report.sections.cycles import cycles
@@ -38,6 +39,7 @@ from pam_sim.files import StrPath, write_text
 if TYPE_CHECKING:
     from pam_actuation.control.sofc.rule_table import RuleBase
     from pam_actuation.replay.controller import ReplayResult
+    from pam_actuation.report.errors import Cycles
     from pam_actuation.report.sections.replay import Overlay
     from pam_sim.annotations import FloatArray
     from pam_sim.gap import GapResult
@@ -177,19 +179,29 @@ def run_numbers(named: Sequence[tuple[str, RunMetrics]]) -> list[tuple[str, str,
     numbers = []
     for title, m in named[:4]:
         if len(m.cycle_rmse_m) > 1:
-            first, last = m.cycle_rmse_m[0] * 1e3, m.cycle_rmse_m[-1] * 1e3
-            numbers.append((f'{first:.2f} → {last:.2f} mm', 'Tracking RMSE, first → last cycle',
-                            f'{title}: {signed(100 * (last / first - 1))} %', ''))
+            numbers += cycle_numbers(
+                'Tracking RMSE', m.cycle_rmse_m * 1e3, m.cycle_parts, title, ' mm')
         elif m.rmse_m is not None:
             numbers.append((f'{m.rmse_m * 1e3:.2f} mm', 'Tracking RMSE', title, ''))
         if len(m.cycle_rmse_n) > 1:
-            first, last = m.cycle_rmse_n[0], m.cycle_rmse_n[-1]
-            numbers.append((f'{first:.2f} → {last:.2f} N', 'Force RMSE, first → last cycle',
-                            f'{title}: {signed(100 * (last / first - 1))} %', ''))
+            numbers += cycle_numbers('Force RMSE', m.cycle_rmse_n, m.cycle_parts, title, ' N')
         elif m.rmse_n is not None:
             numbers.append((f'{m.rmse_n:.2f} N', 'Force RMSE', title, ''))
         if m.max_error_m is not None and len(named) == 1:
             numbers.append((f'{m.max_error_m * 1e3:.2f} mm', 'Largest error', title, ''))
+    return numbers
+
+
+def cycle_numbers(what: str, values: 'FloatArray', parts: 'Sequence[Cycles]', title: str,
+                  unit: str) -> list[tuple[str, str, str, str]]:
+    """Return one key number for each part of a run: first and last cycle, in ``unit``."""
+    numbers = []
+    for hz, of_part in by_part(values, parts):
+        first, last = of_part[0], of_part[-1]
+        numbers.append((
+            f'{first:.2f} → {last:.2f}{unit}',
+            f'{what}, first → last cycle' + (f' of {hz}' if hz else ''),
+            f'{title}: {signed(100 * (last / first - 1))} %', ''))
     return numbers
 
 

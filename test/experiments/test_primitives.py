@@ -239,6 +239,7 @@ def test_named_experiments_load_and_round_trip(name):
 def test_sine_experiment_states_its_cycles():
     start, period, count = load_experiment('sine_quarter_hz').cycles
     assert (start, period, count) == (6.0, 4.0, 10)
+    assert load_experiment('knee_gait').periodic_parts == ((5.0, 2.0, 10), (25.0, 1.25, 10))
 
 
 def test_experiment_is_continuous_but_for_steps():

@@ -15,8 +15,9 @@
 """Figures of merit on runs whose figures are known."""
 
 import numpy as np
-from pam_actuation.report import metrics
+from pam_actuation.report import errors, metrics
 from pam_actuation.report.decimate import decimate_min_max, decimate_steps
+from pam_actuation.report.sections import metrics_table
 from pam_sim import load_rig
 from pam_sim.run import Series
 import pytest
@@ -27,18 +28,18 @@ AMPLITUDES = (2e-3, 1e-3, 0.5e-3)
 
 
 def test_cycle_rmse_is_that_of_each_cycle():
-    values = metrics.cycle_rmse(tracking_run(AMPLITUDES), 4.0, 3.0)
+    values = errors.split_rmse(*metrics.tracking_error(tracking_run(AMPLITUDES)), 4.0, 3.0)
     assert values == pytest.approx(np.array(AMPLITUDES) / np.sqrt(2), rel=2e-3)
 
 
 def test_cycle_rmse_takes_as_many_as_wanted_and_only_complete_ones():
-    run = tracking_run(AMPLITUDES)
-    assert len(metrics.cycle_rmse(run, 4.0, 3.0, count=2)) == 2
-    assert len(metrics.cycle_rmse(run, 4.0, 5.0)) == 2
+    error = metrics.tracking_error(tracking_run(AMPLITUDES))
+    assert len(errors.split_rmse(*error, 4.0, 3.0, count=2)) == 2
+    assert len(errors.split_rmse(*error, 4.0, 5.0)) == 2
 
 
 def test_cycles_are_found_without_metadata():
-    start, period, count = metrics.find_cycles(tracking_run([1e-3] * 6))
+    ((start, period, count),) = errors.find_parts(tracking_run([1e-3] * 6))
     assert period == pytest.approx(4.0, rel=1e-3)
     assert count >= 5
     assert 3.0 < start < 7.0 + 1e-6
@@ -49,12 +50,30 @@ def test_cycles_come_from_the_recorded_experiment():
             '  - rest: {duration_s: 1.0}\n'
             '  - sine: {center_m: 0.014, amplitude_m: 0.008, frequency_hz: 0.25, cycles: 3}\n')
     run = tracking_run(AMPLITUDES, metadata={'experiment': text})
-    assert metrics.find_cycles(run) == (1.0, 4.0, 3)
+    assert errors.find_parts(run) == ((1.0, 4.0, 3),)
+
+
+def test_each_part_of_an_experiment_has_its_own_cycles():
+    text = ('name: sines\ndomain: contraction\nsegments:\n  - rest: {duration_s: 3.0}\n')
+    for frequency_hz, cycles in ((0.25, 2), (0.5, 2), (1.0, 9)):
+        text += (f'  - sine: {{center_m: 0.014, amplitude_m: 0.008, frequency_hz: {frequency_hz}, '
+                 f'cycles: {cycles}}}\n')
+    # Errors of 2, 1, 0.5 and 0.25 mm, each for 4 s; then the recording ends.
+    run = tracking_run((*AMPLITUDES, 0.25e-3), metadata={'experiment': text})
+    found = metrics.run_metrics(run)
+    wanted = np.array([2e-3, 1e-3, 0.5e-3, 0.5e-3, *[0.25e-3] * 4]) / np.sqrt(2)
+    assert found.cycle_rmse_m == pytest.approx(wanted, rel=5e-3)
+    assert found.cycle_parts == ((3.0, 4.0, 2), (11.0, 2.0, 2), (15.0, 1.0, 4))
+    assert found.to_dict()['cycle_parts'][1] == {'start_s': 11.0, 'period_s': 2.0, 'count': 2}
+    section = metrics_table.metrics([('run', found)]).body
+    for words in ('1.414 mm (0.25 Hz), 0.354 mm (0.5 Hz), 0.1', '-50 % (0.25 Hz)',
+                  '2 (0.25 Hz), 2 (0.5 Hz), 4 (1 Hz)'):
+        assert words in section
 
 
 def test_a_hold_has_no_cycles():
     t = np.arange(0, 10, 0.01)
-    assert metrics.cycles_of_signal(t, np.where(t > 2, 1.0, 0.0)) is None
+    assert errors.cycles_of_signal(t, np.where(t > 2, 1.0, 0.0)) is None
 
 
 def test_rmse_and_largest_error_and_missing_topics():

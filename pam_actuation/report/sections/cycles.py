@@ -17,6 +17,7 @@
 from typing import TYPE_CHECKING
 
 from pam_actuation.report import figures
+from pam_actuation.report.errors import by_part
 from pam_actuation.report.page import paragraph, plot, Section
 
 if TYPE_CHECKING:
@@ -38,11 +39,14 @@ def cycles(named: 'list[tuple[str, RunMetrics]]', key: str = 'cycles',
         Anchor, heading, and a sentence above the chart.
 
     """
-    errors = [(name, m.cycle_rmse_m) for name, m in named if len(m.cycle_rmse_m)]
-    if not errors:
+    tracked = [(name, m) for name, m in named if len(m.cycle_rmse_m)]
+    if not tracked:
         return None
-    count = max(len(values) for _, values in errors)
-    groups = [(name, values * 1e3, ROLES[k % len(ROLES)])
-              for k, (name, values) in enumerate(errors)]
-    figure = figures.bars(range(1, count + 1), groups, 'cycle', 'tracking RMSE [mm]')
+    longest = max((m for _, m in tracked), key=lambda m: len(m.cycle_rmse_m))
+    frequencies = [hz for hz, values in by_part(longest.cycle_rmse_m, longest.cycle_parts)
+                   for _ in values]
+    labels = [f'{k} ({hz})' if hz else str(k) for k, hz in enumerate(frequencies, 1)]
+    groups = [(name, m.cycle_rmse_m * 1e3, ROLES[k % len(ROLES)])
+              for k, (name, m) in enumerate(tracked)]
+    figure = figures.bars(labels, groups, 'cycle', 'tracking RMSE [mm]')
     return Section(key, title, (paragraph(remark) if remark else '') + plot(figure))

@@ -17,10 +17,12 @@
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
+from pam_actuation.report.errors import by_part
 from pam_actuation.report.page import paragraph, Section, signed, table
 from pam_sim.annotations import FloatArray
 
 if TYPE_CHECKING:
+    from pam_actuation.report.errors import Cycles
     from pam_actuation.report.joint_page import JointMetrics
     from pam_actuation.report.metrics import RunMetrics
 
@@ -70,15 +72,26 @@ def _percent(value: float | None) -> str | None:
     return None if value is None else f'{100.0 * value:.1f} % of the messages'
 
 
-def value_at(values: FloatArray, index: int) -> float | None:
-    """Return one of the values, None of no values."""
-    return float(values[index]) if len(values) else None
+def each_part(values: FloatArray, parts: 'Sequence[Cycles]',
+              shown: Callable[[FloatArray], str | None]) -> str | None:
+    """Return in words what ``shown`` says of the cycles of each part; None of no cycles."""
+    said = [(hz, shown(cycles)) for hz, cycles in by_part(values, parts)]
+    return ', '.join(f'{words} ({hz})' if hz else words for hz, words in said if words) or None
+
+
+def _cycle(values: FloatArray, m: 'RunMetrics', index: int, unit: str) -> str | None:
+    """Return one cycle of each part with its unit."""
+    return each_part(values, m.cycle_parts, lambda cycles: f'{cycles[index]:.3f} {unit}')
 
 
 def _change(m: 'RunMetrics') -> str | None:
-    if len(m.cycle_rmse_m) < 2:
-        return None
-    return f'{signed(100.0 * (m.cycle_rmse_m[-1] / m.cycle_rmse_m[0] - 1.0))} %'
+    return each_part(m.cycle_rmse_m, m.cycle_parts, lambda cycles: None if len(cycles) < 2 else
+                     f'{signed(100.0 * (cycles[-1] / cycles[0] - 1.0))} %')
+
+
+def _count(m: 'RunMetrics') -> str | None:
+    values = m.cycle_rmse_m if len(m.cycle_rmse_m) else m.cycle_rmse_n
+    return each_part(values, m.cycle_parts, lambda cycles: str(len(cycles)))
 
 
 def _settling(m: 'RunMetrics') -> str | None:
@@ -116,14 +129,14 @@ _ROWS: 'tuple[tuple[str, Callable[[RunMetrics], str | int | None]], ...]' = (
     ('Tracking RMSE', lambda m: _mm(m.rmse_m)),
     ('Largest error', lambda m: _mm(m.max_error_m)),
     ('Mean error (reference − contraction)', _mean_error),
-    ('RMSE of the first cycle', lambda m: _mm(value_at(m.cycle_rmse_m, 0))),
-    ('RMSE of the last cycle', lambda m: _mm(value_at(m.cycle_rmse_m, -1))),
+    ('RMSE of the first cycle', lambda m: _cycle(m.cycle_rmse_m * 1e3, m, 0, 'mm')),
+    ('RMSE of the last cycle', lambda m: _cycle(m.cycle_rmse_m * 1e3, m, -1, 'mm')),
     ('Last cycle against the first', _change),
     ('Force tracking RMSE', lambda m: _n(m.rmse_n)),
     ('Largest force error', lambda m: _n(m.max_error_n)),
-    ('Force RMSE of the first cycle', lambda m: _n(value_at(m.cycle_rmse_n, 0))),
-    ('Force RMSE of the last cycle', lambda m: _n(value_at(m.cycle_rmse_n, -1))),
-    ('Cycles', lambda m: len(m.cycle_rmse_m) or len(m.cycle_rmse_n) or None),
+    ('Force RMSE of the first cycle', lambda m: _cycle(m.cycle_rmse_n, m, 0, 'N')),
+    ('Force RMSE of the last cycle', lambda m: _cycle(m.cycle_rmse_n, m, -1, 'N')),
+    ('Cycles', _count),
     ('Settling into 5 % after a step', _settling),
     ('Overshoot of steps', lambda m: _mm(max((s.overshoot_m for s in m.steps), default=None))),
     ('Valve at its upper limit', lambda m: _percent(m.saturation_high)),

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pam_actuation.report import figures
-from pam_actuation.report.metrics import rmse
+from pam_actuation.report.errors import rmse
 from pam_actuation.report.page import paragraph, plot, Section, table
 from pam_sim.units import P_ATM_PA
 
