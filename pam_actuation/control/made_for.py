@@ -132,6 +132,8 @@ def check_made_for(tree: 'Located', rig: 'JointRig | Rig',
     """
     Return (facts, sentence): what a controller file was made for, and how this rig differs.
 
+    What the file does not state is that of the rig, unless that is another one.
+
     Parameters
     ----------
     tree : Located
@@ -152,7 +154,7 @@ def check_made_for(tree: 'Located', rig: 'JointRig | Rig',
     if facts and not found and 'made_for' not in tree and 'muscle_length_m' not in facts:
         found = _other_name(tree, rig)
     if not found:
-        return facts_of(rig), ''
+        return {**facts_of(rig), **(facts or {})}, ''
     sentence = f'made for another rig: {", ".join(found)}'
     if not accept:
         raise InputError(

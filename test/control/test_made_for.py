@@ -92,6 +92,23 @@ def test_other_effects_numbers_and_names_are_the_same_rig(tuned, small):
                 assert load_controller(text, rig).other_rig == ''
 
 
+@pytest.mark.parametrize('name', ['sofc_ppr', 'pid', 'lqi'])
+def test_a_file_keeps_what_it_was_made_for_on_a_rig_that_will_do(name, tuned, small):
+    heavy = small.with_(parameters={'mass_kg': 7.0})
+    controller = load_controller(tuned[name, SMALL], heavy)
+    assert controller.made_for == facts_of(small) != facts_of(heavy)
+    told = load_controller(experiment_metadata(None, heavy, controller)['controller'], heavy)
+    assert told.made_for == facts_of(small)
+    # 14 kg is twice the mass of that rig, and not that of the file.
+    with pytest.raises(InputError, match='a load of 5 kg .here 14'):
+        load_controller(told.to_yaml(), small.with_(parameters={'mass_kg': 14.0}))
+
+
+def test_what_a_file_does_not_say_is_that_of_the_rig(small):
+    controller = load_controller('controller: pid\nmade_for: {mass_kg: 4.0}\n', small)
+    assert controller.made_for == {**facts_of(small), 'mass_kg': 4.0}
+
+
 def test_presets_run_on_every_rig_they_are_for(small):
     for preset, rig in (('sofc_ppr', load_rig(LARGE)), ('sofc_hsv', small.with_(valve='hsv')),
                         ('sofc_force_ppr', load_rig(FORCE)),
