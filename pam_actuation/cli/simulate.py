@@ -21,7 +21,7 @@ import time
 
 from pam_actuation.cli.common import (
     add_experiment_options, emit, EXIT_DONE, load_setup, progress, tell_remarks)
-from pam_actuation.cli.options import out_path, Parser
+from pam_actuation.cli.options import number, out_path, Parser
 
 HELP = 'Simulate an experiment without ROS, faster than real time, recorded as a bag.'
 EXAMPLE = 'pam simulate sine_quarter_hz --valve hsv --out runs/first'
@@ -30,6 +30,9 @@ EXAMPLE = 'pam simulate sine_quarter_hz --valve hsv --out runs/first'
 def add_arguments(parser: Parser) -> None:
     """Declare the options of the verb."""
     add_experiment_options(parser)
+    parser.add_argument('--preview', type=number(0.0, 10.0, 's'), default=None, metavar='SECONDS',
+                        help='how far ahead the controller is told the reference; 0 for motions '
+                        'nobody announces (default: 0.6, as live)')
     parser.add_argument('--out', type=out_path, default=None, metavar='DIR',
                         help='bag directory (default: runs/EXPERIMENT_VALVE)')
 
@@ -47,7 +50,8 @@ def run(args: argparse.Namespace) -> int:
     with progress(args, experiment.duration_s, ' s', experiment.name) as bar:
         result = simulate_experiment(
             experiment, rig, controller, out, seed=args.seed, learning=not args.freeze,
-            overwrite=args.overwrite, progress=lambda done: bar.update(done - bar.n))
+            overwrite=args.overwrite, progress=lambda done: bar.update(done - bar.n),
+            preview_s=args.preview)
         bar.update(experiment.duration_s - bar.n)
     result['wall_s'] = time.perf_counter() - started
     result['remarks'] = remarks

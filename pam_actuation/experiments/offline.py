@@ -44,6 +44,7 @@ from pam_actuation.loops.wiring import (
 from pam_actuation.messages import START_NS, Status
 from pam_actuation.namespaces import JOINT, MUSCLE
 from pam_actuation.plant_loop import PlantLoop
+from pam_sim.errors import InputError
 from pam_sim.files import cannot_write
 
 if TYPE_CHECKING:
@@ -64,14 +65,15 @@ class _Loops:
             self, experiment: 'Experiment', rig: 'Rig | JointRig',
             controller: 'Controller | None',
             seed: int, learning: bool, recorder: MessageWriter, transport_ns: int,
-            ticks: Mapping[str, Iterable[int]], changes: Mapping[str, object] | None) -> None:
+            ticks: Mapping[str, Iterable[int]], changes: Mapping[str, object] | None,
+            preview_s: float | None) -> None:
         self._recorder = recorder
         self._status_ns: dict[str, int] = {}    # by the place of a driver, when recorded last
         self.bus = bus = Bus(transport_ns, recorder.write)
         self.reached_ns = 0
         changes = {**(controller and controller.driver or {}), **(changes or {})}
         plant, drivers = PlantLoop(rig, seed), driver_loops(rig, changes)
-        reference = ReferenceLoop(experiment, valve=rig.valve)
+        reference = ReferenceLoop(experiment, valve=rig.valve, preview_s=preview_s)
         lead_ns = LEAD_NS if experiment.asks_for_motion else 0
 
         def add(name: str, tick: Callable[[int], object], rate_hz: float,
@@ -124,7 +126,8 @@ def simulate_experiment(
         out: Path | str, seed: int = 0, learning: bool = True, overwrite: bool = False,
         progress: Callable[[int], object] | None = None, namespace: str | None = None,
         ticks: Mapping[str, Iterable[int]] | None = None,
-        transport_ns: int = 0, driver: Mapping[str, object] | None = None) -> dict[str, Any]:
+        transport_ns: int = 0, driver: Mapping[str, object] | None = None,
+        preview_s: float | None = None) -> dict[str, Any]:
     """
     Simulate an experiment and record it as a bag.
 
@@ -156,6 +159,9 @@ def simulate_experiment(
         Time from the tick that sends a message to its arrival.
     driver : mapping, optional
         Parameters of the driver that differ from what the rig tells, by name.
+    preview_s : float, optional
+        How far ahead the controller is told the reference, 0 for motions nobody announces; by
+        default as live, 0.6 s.
 
     Returns
     -------
@@ -165,26 +171,32 @@ def simulate_experiment(
     Raises
     ------
     InputError
-        The experiment asks for what the rig cannot do or the controller does not track; the
-        bag directory exists or cannot be written. Nothing is left behind then.
+        The experiment asks for what the rig cannot do or the controller does not track, or has
+        no reference to tell ahead; the bag directory exists or cannot be written. Nothing is
+        left behind then.
     KeyboardInterrupt
         Ctrl-C or SIGTERM; the bag holds what was simulated and says that it stopped early.
 
     """
     experiment.check_reachable(rig)
     check_tracked(experiment, controller)
+    if preview_s is not None and not experiment.asks_for_motion:
+        raise InputError(
+            f'{experiment.name} is in {experiment.domain} and has no reference to tell ahead',
+            'preview')
     name, namespace = _names(rig, namespace)
     metadata = experiment_metadata(
         experiment=experiment, rig=rig.to_yaml(),
         controller=controller, valve=rig.valve, experiment_name=experiment.name, seed=seed,
-        remarks='\n'.join(experiment.remarks(rig.valve, rig, controller)), **driver_facts(driver))
+        remarks='\n'.join(experiment.remarks(rig.valve, rig, controller)),
+        preview_s='' if preview_s is None else f'{preview_s:g}', **driver_facts(driver))
     writer = None
     try:
         with interrupts.held() as stopped:
             writer = BagWriter(out, {'pam_experiment': metadata}, overwrite=overwrite)
             recorder = MessageWriter(writer, namespace, name)
             loops = _Loops(experiment, rig, controller, seed, learning, recorder, transport_ns,
-                           ticks or {}, driver)
+                           ticks or {}, driver, preview_s)
             ending = _recorded(loops, recorder, experiment, progress, stopped)
             if not ending.reached_s:
                 raise KeyboardInterrupt

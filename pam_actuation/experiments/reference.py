@@ -44,18 +44,25 @@ class ReferenceLoop:
         Ticks per second, 100 by default.
     valve : {'ppr', 'hsv'}
         Valve of the rig.
+    preview_s : float, optional
+        How far ahead the reference is told, 0 for not at all; by default the whole horizon of
+        0.6 s. A shorter one is sent with each tick, to its last point, 20 ms apart.
 
     """
 
     def __init__(self, experiment: 'Experiment', rate_hz: float = 100.0,
-                 valve: str = 'ppr') -> None:
+                 valve: str = 'ppr', preview_s: float | None = None) -> None:
         self.experiment = experiment
         self.valve = valve
         self.rate_hz = float(rate_hz)
         self._speaks_to_valve = experiment.sends_valve_command(valve)
-        self._tracked_topics = (
+        self._wanted_topic, self._ahead_topic = (
             ('joint_reference', 'joint_trajectory') if experiment.domain == JOINT.topic
             else ('reference', 'reference_trajectory'))
+        horizon_ns = (POINTS - 1) * POINT_NS
+        self._preview_ns = horizon_ns if preview_s is None else min(
+            round(preview_s * 1e9), horizon_ns)
+        self._trajectory_every_ns = 0 if self._preview_ns < horizon_ns else TRAJECTORY_EVERY_NS
         self.start_ns: int | None = None
         self._next_trajectory_ns = 0
 
@@ -73,6 +80,7 @@ class ReferenceLoop:
 
         Domain ``contraction`` or ``force``: ``reference``, and every 0.1 s
         ``reference_trajectory``; ``joint_angle``: ``joint_reference`` and ``joint_trajectory``.
+        With a short preview the trajectory comes each time, without one never.
         Domain ``pressure``: ``pressure_command``, or ``valve_command`` while a pair of valves
         is to be shut. Raw valve signals: ``valve_command``, after the end the one that vents.
         With a disturbance ``external_force`` as well, first.
@@ -85,11 +93,10 @@ class ReferenceLoop:
         if self.experiment.disturbance:
             out['external_force'] = Force(now_ns, self.experiment.external_force_n(elapsed_s))
         if self.experiment.asks_for_motion:
-            wanted, ahead = self._tracked_topics
-            out[wanted] = self._wanted(now_ns, value, rate)
-            if now_ns >= self._next_trajectory_ns:
-                out[ahead] = self.trajectory(now_ns)
-                self._next_trajectory_ns += TRAJECTORY_EVERY_NS
+            out[self._wanted_topic] = self._wanted(now_ns, value, rate)
+            if self._announces and now_ns >= self._next_trajectory_ns:
+                out[self._ahead_topic] = self.trajectory(now_ns)
+                self._next_trajectory_ns += self._trajectory_every_ns
         elif self.experiment.domain != 'pressure':
             out['valve_command'] = self._valve_command(now_ns, value)
         elif self._speaks_to_valve and self.experiment.shuts_valve(elapsed_s):
@@ -99,12 +106,16 @@ class ReferenceLoop:
         return out
 
     @property
+    def _announces(self) -> bool:
+        return self._preview_ns >= POINT_NS
+
+    @property
     def topics(self) -> tuple[str, ...]:
         """Return the topics it may send on, the one with the wanted value first."""
         domain = self.experiment.domain
         topics: tuple[str, ...]
         if self.experiment.asks_for_motion:
-            topics = self._tracked_topics
+            topics = (self._wanted_topic, *((self._ahead_topic,) if self._announces else ()))
         else:
             topics = ('pressure_command',) if domain == 'pressure' else ()
             topics += ('valve_command',) if self._speaks_to_valve else ()
@@ -134,16 +145,18 @@ class ReferenceLoop:
 
     def trajectory(self, now_ns: int) -> AngleTrajectory | ReferenceTrajectory:
         """
-        Return the next 0.6 s of the reference as one message.
+        Return the reference of the preview, usually the next 0.6 s, as one message.
 
         Its points lie on the grid of the experiment, and its stamp is the grid point before now. A
         jump therefore has the same time in every message, however late the tick is.
         """
         start_ns = now_ns if self.start_ns is None else self.start_ns
         begin_ns = now_ns - (now_ns - start_ns) % POINT_NS
-        offsets = tuple(k * POINT_NS for k in range(POINTS))
-        points = [self.experiment.at(self.elapsed_s(begin_ns + o)) for o in offsets]
-        values, rates = (tuple(column) for column in zip(*points))
+        points = POINTS if self._trajectory_every_ns else 1 + (
+            now_ns - begin_ns + self._preview_ns) // POINT_NS
+        offsets = tuple(k * POINT_NS for k in range(points))
+        wanted = [self.experiment.at(self.elapsed_s(begin_ns + o)) for o in offsets]
+        values, rates = (tuple(column) for column in zip(*wanted))
         if self.experiment.domain == FORCE.topic:
             return ReferenceTrajectory(begin_ns, offsets, force_n=values)
         if self.experiment.domain == JOINT.topic:

@@ -34,7 +34,7 @@ WRONG_NUMBERS = {
 # Range of every number an option takes, as a user reads it.
 NUMBERS = {
     ('run', '--seed'): '0 to 4294967295', ('run', '--domain-id'): '0 to 232',
-    ('simulate', '--seed'): '0 to 4294967295',
+    ('simulate', '--seed'): '0 to 4294967295', ('simulate', '--preview'): '0 to 10 s',
     ('up', '--domain-id'): '0 to 232', ('up', '--realtime-priority'): '0 to 96',
     ('up', '--seconds'): '0 s or more',
     **{(verb, option): allowed for verb in ('status', 'estop', 'reset', 'param')

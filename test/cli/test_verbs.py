@@ -21,8 +21,10 @@ import re
 import subprocess
 import sys
 
+from pam_actuation.bags.load import load_run
 from pam_actuation.cli.main import main
 from pam_actuation.cli.overview import VERBS
+from pam_actuation.report import metrics
 import pytest
 
 
@@ -71,6 +73,25 @@ def test_simulate_follows_the_seed(bags, tmp_path, capsys):
     assert f"next: pam report '{tmp_path / 'a b'}'" in capsys.readouterr().out
     first, other = (next(f.glob('*.mcap')).read_bytes() for f in (bags / 'ppr', tmp_path / 'a b'))
     assert first != other
+
+
+def test_simulate_withholds_what_nobody_announces(bags, tmp_path, capsys):
+    assert pam_here('simulate', 'short_sine', '--valve', 'ppr', '--preview', 0,
+                    '--out', tmp_path / 'unannounced') == 0
+    told, untold = load_run(bags / 'ppr'), load_run(tmp_path / 'unannounced')
+    assert told.reference_trajectories and not untold.reference_trajectories
+    assert untold.metadata['preview_s'] == '0' and 'preview_s' not in told.metadata
+    assert metrics.run_metrics(untold).rmse_m != metrics.run_metrics(told).rmse_m
+    assert pam_here('replay', tmp_path / 'unannounced', '--chain') == 0
+    assert pam_here('report', tmp_path / 'unannounced', '--out', tmp_path / 'page.html') == 0
+    page = (tmp_path / 'page.html').read_text()
+    assert re.search('Reference told ahead</td><td[^>]*>0 s<', page)
+    capsys.readouterr()
+    assert pam_here('simulate', 'voltage_steps', '--preview', 0.1, '--out', tmp_path / 'v') == 2
+    assert capsys.readouterr().err == (
+        'pam simulate: preview: voltage_steps is in ppr_voltage and has no reference to tell '
+        'ahead\n')
+    assert not (tmp_path / 'v').exists()
 
 
 def test_simulate_refuses_an_existing_bag(bags, capsys):

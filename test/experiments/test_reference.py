@@ -15,13 +15,14 @@
 """The reference loop: what goes on the wire, and when."""
 
 from pam_actuation.experiments import load_experiment, ReferenceLoop
+import pytest
 
 T0 = 1_700_000_000_000_000_000
 
 
-def run(name, seconds):
+def run(name, seconds, **options):
     """Collect (now, messages) of a reference loop at 100 Hz."""
-    loop = ReferenceLoop(load_experiment(name))
+    loop = ReferenceLoop(load_experiment(name), **options)
     period = 10_000_000
     return loop, [(T0 + k * period, loop.tick(T0 + k * period))
                   for k in range(int(seconds * 100))]
@@ -66,6 +67,33 @@ def test_trajectory_announces_the_later_reference():
         for offset, value in zip(message.time_from_start_ns, message.contraction_m):
             if now + offset in later:
                 assert value == later[now + offset]
+
+
+@pytest.mark.parametrize('preview_s', [0.0, 0.019])
+def test_without_preview_nothing_is_announced(preview_s):
+    loop, ticks = run('sine_quarter_hz', 2, preview_s=preview_s)
+    assert loop.topics == ('reference',)
+    assert all(set(messages) == {'reference'} for _, messages in ticks)
+
+
+@pytest.mark.parametrize('preview_s', [0.02, 0.1, 0.25])
+def test_a_preview_is_known_that_long_at_each_tick_and_no_longer(preview_s):
+    loop, ticks = run('step_10mm', 6, preview_s=preview_s)
+    assert loop.topics == ('reference', 'reference_trajectory')
+    first_ns = None
+    for now, messages in ticks:
+        message = messages['reference_trajectory']
+        ahead_s = (message.stamp_ns + message.time_from_start_ns[-1] - now) * 1e-9
+        assert preview_s - 0.02 < ahead_s <= preview_s + 1e-9
+        if first_ns is None and max(message.contraction_m) > message.contraction_m[0] + 5e-3:
+            first_ns = now
+    assert 5.0 - preview_s <= (first_ns - T0) * 1e-9 <= 5.0 - preview_s + 0.02
+
+
+def test_a_long_preview_is_the_usual_one():
+    _, ticks = run('sine_quarter_hz', 3)
+    for preview_s in (0.6, 10.0, None):
+        assert run('sine_quarter_hz', 3, preview_s=preview_s)[1] == ticks
 
 
 def test_pressure_experiments_command_pressure():

@@ -53,6 +53,8 @@ def provenance(runs: 'list[tuple[str, Run]]', key: str = 'provenance',
     if any((run.metadata or {}).get('controller_other_rig') for _, run in runs):
         fields.append(('Controller', lambda run: (run.metadata or {}).get(
             'controller_other_rig', 'made for this rig')))
+    if any('preview_s' in (run.metadata or {}) for _, run in runs):
+        fields.append(('Reference told ahead', lambda run: _preview(run)))
     rows = [[name] + [read(run) for _, run in runs] for name, read in fields]
     body = table([''] + [name for name, _ in runs], rows, 'facts')
     for name, run in runs:
@@ -71,6 +73,12 @@ def _valve(run: 'Run') -> str:
         return valve.upper()
     seen = getattr(run, 'valve', '')
     return f'{seen.upper()}, by its signal' if seen else NOT_RECORDED
+
+
+def _preview(run: 'Run') -> str:
+    """Return how far ahead a simulated controller was told the reference."""
+    told = (run.metadata or {}).get('preview_s')
+    return 'as live' if told is None else f'{told} s'
 
 
 def _counts(run: 'Run') -> str:
