@@ -21,7 +21,7 @@ failing.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
@@ -92,17 +92,20 @@ class RunMetrics:
     max_error_n: float | None = None
     cycle_rmse_n: FloatArray = field(default_factory=lambda: np.empty(0))
     path: 'PathEstimate | None' = None       # from command to pressure
+    command_variation_pa_per_s: float | None = None
     cycle_parts: tuple[Cycles, ...] = ()     # whose cycles follow one another above
 
     def to_dict(self) -> dict[str, Any]:
         """Return the main numbers as plain data, SI."""
         return {'duration_s': self.duration_s, 'tracking_rmse_m': self.rmse_m,
-                'max_error_m': self.max_error_m,
+                'max_error_m': self.max_error_m, 'mean_error_m': self.mean_error_m,
                 'cycle_rmse_m': [float(v) for v in self.cycle_rmse_m],
                 'tracking_rmse_n': self.rmse_n, 'max_error_n': self.max_error_n,
                 'cycle_rmse_n': [float(v) for v in self.cycle_rmse_n],
                 'cycle_parts': parts_as_data(self.cycle_parts),
                 'settling_s': [s.settling_s for s in self.steps],
+                'steps': [asdict(step) for step in self.steps],
+                'command_variation_pa_per_s': self.command_variation_pa_per_s,
                 'interruptions': self.interruptions and self.interruptions[0],
                 'saturation_high': self.saturation_high, 'air_use_kg': self.air_use_kg,
                 'air_fed_kg': self.air_fed_kg, 'saturation_low': self.saturation_low,
@@ -199,6 +202,14 @@ def saturation_share(run: 'Run', rig: 'Rig | None' = None) -> tuple[float | None
         return None
     low_v, high_v = rig.parameters['ppr_lowest_v'], rig.parameters['ppr_highest_v']
     return float(np.mean(volts[1] <= low_v + 1e-6)), float(np.mean(volts[1] >= high_v - 1e-6))
+
+
+def command_variation(run: 'Run') -> float | None:
+    """Return the total variation of the pressure command per second [Pa/s], or None."""
+    command = signals.series(run, 'pressure_command')
+    if command is None or not np.ptp(command[0]) > 0.0:
+        return None
+    return float(np.sum(np.abs(np.diff(command[1]))) / np.ptp(command[0]))
 
 
 def interruptions(run: 'Run') -> tuple[int, float] | None:
@@ -348,4 +359,4 @@ def run_metrics(run: 'Run', parts: Sequence[Cycles] | None = None,
         rmse_n=None if pulled is None else rmse(pulled[1]),
         max_error_n=None if pulled is None else float(np.max(np.abs(pulled[1]))),
         cycle_rmse_n=joined(cycles_n), cycle_parts=counted(parts, cycles_m, cycles_n),
-        path=command_path(run, rig))
+        path=command_path(run, rig), command_variation_pa_per_s=command_variation(run))

@@ -14,6 +14,8 @@
 
 """Figures of merit on runs whose figures are known."""
 
+import json
+
 import numpy as np
 from pam_actuation.report import errors, metrics
 from pam_actuation.report.decimate import decimate_min_max, decimate_steps
@@ -90,6 +92,30 @@ def test_settling_time_of_a_first_order_lag():
     assert step.size_m == pytest.approx(0.01)
     assert step.settling_s == pytest.approx(np.log(20) / 10.0, abs=0.012)
     assert step.overshoot_m == pytest.approx(0.0, abs=1e-9)
+
+
+def test_plain_data_assign_settling_and_overshoot_to_their_steps():
+    run = step_run(gain_per_s=10.0)
+    found = metrics.run_metrics(run)
+    (step,) = found.to_dict()['steps']
+    assert step['start_s'] == pytest.approx(2.0) and step['size_m'] == pytest.approx(0.01)
+    assert step['settling_s'] == found.to_dict()['settling_s'][0]
+    assert step['overshoot_m'] == pytest.approx(0.0, abs=1e-9)
+    assert found.to_dict()['mean_error_m'] == found.mean_error_m
+    json.dumps(found.to_dict(), allow_nan=False)
+
+
+def test_control_effort_is_the_total_variation_of_the_command_per_second():
+    run = tracking_run(AMPLITUDES)
+    stamp = run.topics['pressure_command'].stamp_ns
+    seconds = (stamp - stamp[0]) * 1e-9
+    triangle = np.abs((seconds + 1.0) % 2.0 - 1.0)      # 2 up and down in 2 s
+    run.topics['pressure_command'].values['pressure_pa'][:] = 2e5 + 3e4 * triangle
+    found = metrics.run_metrics(run)
+    assert found.command_variation_pa_per_s == pytest.approx(3e4, rel=1e-3)
+    assert found.to_dict()['command_variation_pa_per_s'] == found.command_variation_pa_per_s
+    assert '30.0 kPa/s' in metrics_table.metrics([('run', found)]).body
+    assert metrics.run_metrics(step_run()).command_variation_pa_per_s is None
 
 
 def test_a_step_that_stays_off_is_not_settled():

@@ -94,6 +94,11 @@ def _count(m: 'RunMetrics') -> str | None:
     return each_part(values, m.cycle_parts, lambda cycles: str(len(cycles)))
 
 
+def _variation(m: 'RunMetrics') -> str | None:
+    variation = m.command_variation_pa_per_s
+    return None if variation is None else f'{variation * 1e-3:.1f} kPa/s'
+
+
 def _settling(m: 'RunMetrics') -> str | None:
     if not m.steps:
         return None
@@ -139,6 +144,7 @@ _ROWS: 'tuple[tuple[str, Callable[[RunMetrics], str | int | None]], ...]' = (
     ('Cycles', _count),
     ('Settling into 5 % after a step', _settling),
     ('Overshoot of steps', lambda m: _mm(max((s.overshoot_m for s in m.steps), default=None))),
+    ('Total variation of the command', _variation),
     ('Valve at its upper limit', lambda m: _percent(m.saturation_high)),
     ('Valve at its lower limit', lambda m: _percent(m.saturation_low)),
     ('Vented for missing or old input', interrupted_text),
