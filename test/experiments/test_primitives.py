@@ -22,6 +22,7 @@ import subprocess
 import sys
 import textwrap
 
+import numpy as np
 from pam_actuation.experiments import load_experiment
 from pam_actuation.experiments.chain import Chain, DOMAINS
 from pam_actuation.experiments.primitives import make_primitive, PRIMITIVES
@@ -234,6 +235,13 @@ def test_named_experiments_load_and_round_trip(name):
     assert experiment.name == name
     times = [0.05 * k for k in range(int(experiment.duration_s / 0.05))]
     assert [experiment.at(t) for t in times] == [again.at(t) for t in times]
+
+
+@pytest.mark.parametrize('name', NAMED)
+def test_a_time_of_numpy_is_a_time(name):
+    experiment = load_experiment(name)
+    for t_s in np.linspace(-1.0, experiment.duration_s + 1.0, 60):
+        assert experiment.at(t_s) == experiment.at(float(t_s))
 
 
 def test_sine_experiment_states_its_cycles():

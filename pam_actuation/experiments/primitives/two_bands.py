@@ -50,7 +50,7 @@ class TwoBands(Primitive):
     def at(self, t_s: float) -> tuple[float, float]:
         """Return value and rate; each band begins and ends at its lowest point."""
         lows = (self.low_center - self.amplitude, self.high_center - self.amplitude)
-        second = t_s >= self.band_s
+        second = bool(t_s >= self.band_s)       # of a NumPy time it is no index
         left = min(t_s, self.duration_s) - (self.band_s if second else 0.0)
         if left < self.move_s:
             return least_jerk(lows[0] if second else self.start, lows[second], self.move_s, left)
