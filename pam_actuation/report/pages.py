@@ -26,6 +26,7 @@ from pam_actuation.report.sections.cycles import cycles
 from pam_actuation.report.sections.gap import gap_section
 from pam_actuation.report.sections.markers import markers_sections
 from pam_actuation.report.sections.metrics_table import metrics
+from pam_actuation.report.sections.over_seeds import over_seeds, seeds_section
 from pam_actuation.report.sections.overlaid import overlaid
 from pam_actuation.report.sections.provenance import provenance
 from pam_actuation.report.sections.replay import controller_replays, overlays
@@ -110,7 +111,7 @@ def experiment_report(runs: 'Sequence[Run]', out_path: StrPath,
     Returns
     -------
     dict
-        Main numbers of every run, plain data.
+        Main numbers of every run, plain data; ``over_seeds`` where seeds alone differ.
 
     Raises
     ------
@@ -123,8 +124,9 @@ def experiment_report(runs: 'Sequence[Run]', out_path: StrPath,
     titles = list(titles) if titles else default_titles(runs)
     measured = [recorded_metrics(run) for run in runs]
     named = list(zip(titles, measured))
-    sections = [early_section(runs), _implausible(list(zip(titles, runs))),
-                metrics(named), cycles(named), overlaid(list(zip(titles, runs)))]
+    spread = over_seeds(list(zip(titles, runs, measured)))
+    sections = [early_section(runs), _implausible(list(zip(titles, runs))), metrics(named),
+                seeds_section(spread), cycles(named), overlaid(list(zip(titles, runs)))]
     for k, (title, run) in enumerate(zip(titles, runs)):
         heading = 'Signals over time' + (f': {title}' if len(runs) > 1 else '')
         sections.append(time_plots(run, f'signals-{k}', heading))
@@ -144,7 +146,8 @@ def experiment_report(runs: 'Sequence[Run]', out_path: StrPath,
         page_title or f'Experiment {name}', 'Tracking of a pneumatic muscle on the rig: '
         'what was asked, what it did, and how well.', [s for s in sections if s],
         run_numbers(named), FOOTER, of))
-    return {title: m.to_dict() for title, m in named}
+    facts = {title: m.to_dict() for title, m in named}
+    return {**facts, 'over_seeds': spread} if spread else facts
 
 
 def early_section(runs: 'Sequence[Run]') -> Section | None:

@@ -164,6 +164,41 @@ def test_several_runs_are_laid_over_each_other(tmp_path):
     assert 'id="overlaid"' not in (tmp_path / 'single.html').read_text()
 
 
+def seeded(amplitude_m, seed, controller='controller: pid\n'):
+    """Return a run whose errors have an amplitude, recorded with a seed and a controller."""
+    return tracking_run([amplitude_m] * 3, metadata={
+        **METADATA, 'seed': str(seed), 'controller': controller})
+
+
+def test_runs_of_several_seeds_have_mean_and_standard_deviation(tmp_path):
+    runs = [seeded(1e-3, 1), seeded(2e-3, 2), seeded(3e-3, 3),
+            seeded(1e-3, 1, 'controller: lqi\n'), seeded(5e-3, 2, 'controller: lqi\n'),
+            seeded(9e-3, 1, 'controller: mpc\n')]
+    titles = ['p1', 'p2', 'p3', 'l1', 'l2', 'm1']
+    found = pages.bag_report(runs, tmp_path / 'page.html', titles)
+    assert set(found) == {*titles, 'over_seeds'}
+    pid, lqi = found['over_seeds']['pid: p1, p2, p3'], found['over_seeds']['lqi: l1, l2']
+    assert len(found['over_seeds']) == 2
+    assert pid['seeds'] == ['1', '2', '3'] and lqi['runs'] == ['l1', 'l2']
+    assert pid['max_error_m']['mean'] == pytest.approx(2e-3, rel=1e-3)
+    assert pid['max_error_m']['std'] == pytest.approx(1e-3, rel=1e-3)
+    rmse_m = [found[title]['tracking_rmse_m'] for title in ('l1', 'l2')]
+    assert lqi['tracking_rmse_m'] == {
+        'mean': pytest.approx(np.mean(rmse_m)), 'std': pytest.approx(np.std(rmse_m, ddof=1))}
+    assert lqi['cycle_rmse_m']['mean'] == pytest.approx([3e-3 / np.sqrt(2)] * 2, rel=2e-3)
+    body = markup(tmp_path / 'page.html')[0].partition('id="over-seeds"')[2]
+    assert '2.000 ± 1.000 mm' in body.partition('</section>')[0]
+
+
+def test_repeated_runs_of_one_seed_and_other_references_are_no_seeds(tmp_path):
+    other = seeded(2e-3, 2)
+    other.metadata['preview_s'] = '0'
+    found = pages.bag_report(
+        [seeded(1e-3, 1), seeded(1e-3, 1), other, step_run()], tmp_path / 'page.html')
+    assert 'over_seeds' not in found
+    assert 'over-seeds' not in (tmp_path / 'page.html').read_text()
+
+
 def test_the_table_of_figures_has_loops_saturation_and_air(tmp_path):
     rig = load_rig('dmsp_5_300_hanging_mass', valve='hsv').to_yaml()
     run = tracking_run(AMPLITUDES, valve='hsv', metadata={**METADATA, 'rig': rig})

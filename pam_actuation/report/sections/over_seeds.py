@@ -1,0 +1,117 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Figures of the same experiment with several seeds: mean and standard deviation."""
+
+from collections.abc import Sequence
+from typing import Any, TYPE_CHECKING
+
+import numpy as np
+
+from pam_actuation.report.page import paragraph, Section, table
+from pam_sim.errors import InputError
+from pam_sim.located_yaml import load_yaml
+
+if TYPE_CHECKING:
+    from pam_actuation.report.metrics import RunMetrics
+    from pam_sim.run import Run
+
+    Measured = tuple[str, Run, RunMetrics]
+
+_SAME = ('experiment', 'experiment_name', 'rig', 'valve', 'controller', 'preview_s')
+_FIGURES = (
+    ('Tracking RMSE', 'tracking_rmse_m', 1e3, 'mm'), ('Largest error', 'max_error_m', 1e3, 'mm'),
+    ('Force tracking RMSE', 'tracking_rmse_n', 1.0, 'N'),
+    ('Largest force error', 'max_error_n', 1.0, 'N'),
+    ('RMSE of each cycle', 'cycle_rmse_m', 1e3, 'mm'),
+    ('Force RMSE of each cycle', 'cycle_rmse_n', 1.0, 'N'),
+    ('Settling of each step', 'settling_s', 1.0, 's'),
+    ('Total variation of the command', 'command_variation_pa_per_s', 1e-3, 'kPa/s'))
+
+
+def over_seeds(measured: 'Sequence[Measured]') -> dict[str, dict[str, Any]]:
+    """
+    Return mean and sample standard deviation over runs that differ in their seed alone.
+
+    Parameters
+    ----------
+    measured : sequence of (title, Run, RunMetrics)
+        Runs of the same experiment, rig and controller belong together.
+
+    Returns
+    -------
+    dict
+        By controller and titles: ``runs``, ``seeds``, and for each figure that all of them
+        have ``{mean, std}``, SI.
+
+    """
+    groups: dict[tuple[str, ...], list[Measured]] = {}
+    for one in measured:
+        texts = one[1].metadata or {}
+        groups.setdefault(tuple(texts.get(name, '') for name in _SAME), []).append(one)
+    found = {}
+    for runs in groups.values():
+        titles = [title for title, _, _ in runs]
+        seeds = [(run.metadata or {}).get('seed', '') for _, run, _ in runs]
+        if '' in seeds or len(set(seeds)) < 2:
+            continue
+        figures = [one.to_dict() for _, _, one in runs]
+        found[f'{_kind(runs[0][1])}: {", ".join(titles)}'] = {
+            'runs': titles, 'seeds': seeds,
+            **{name: spread for _, name, _, _ in _FIGURES
+               if (spread := _spread([one[name] for one in figures])) is not None}}
+    return found
+
+
+def _kind(run: 'Run') -> str:
+    """Return the kind of the controller of a run."""
+    try:
+        return str(load_yaml(run.metadata['controller']).get('controller'))
+    except (InputError, KeyError):
+        return 'no controller'
+
+
+def _spread(values: list[Any]) -> dict[str, Any] | None:
+    """Return mean and standard deviation, of lists element by element; None if one lacks it."""
+    try:
+        numbers = np.array(values, dtype=float)
+    except ValueError:                  # lists of different length
+        return None
+    if not numbers.size or not np.isfinite(numbers).all():
+        return None
+    return {'mean': numbers.mean(axis=0).tolist(),
+            'std': numbers.std(axis=0, ddof=1).tolist()}
+
+
+def seeds_section(found: dict[str, dict[str, Any]], key: str = 'over-seeds',
+                  title: str = 'Over several seeds') -> Section | None:
+    """Return the table of what ``over_seeds`` found, None of nothing."""
+    if not found:
+        return None
+    rows: list[list[str | None]] = [
+        ['Seeds', *(', '.join(one['seeds']) for one in found.values())]]
+    rows += [[name, *(_shown(one.get(figure), factor, unit) for one in found.values())]
+             for name, figure, factor, unit in _FIGURES]
+    body = table(['', *found], [row for row in rows if any(cell is not None for cell in row[1:])])
+    return Section(key, title, paragraph(
+        'Mean and standard deviation over runs of the same experiment, rig and controller, '
+        'whose seeds differ.') + body)
+
+
+def _shown(spread: dict[str, Any] | None, factor: float, unit: str) -> str | None:
+    if spread is None:
+        return None
+    pairs = zip(np.atleast_1d(spread['mean']), np.atleast_1d(spread['std']))
+    return ', '.join(f'{factor * mean:.3f} ± {factor * std:.3f}' for mean, std in pairs) + (
+        f' {unit}')
