@@ -163,6 +163,7 @@ SCRIPT = """
     layout.modebar = { bgcolor: 'rgba(0,0,0,0)', color: css('--soft'),
       activecolor: css('--accent') };
     Plotly.react(node, figure.data, layout, { responsive: !printing, displaylogo: false,
+      toImageButtonOptions: { format: 'svg' },
       displayModeBar: 'hover', modeBarButtons: [['zoom2d', 'pan2d', 'resetScale2d', 'toImage']] });
     node.drawn = true;
   }

@@ -258,6 +258,13 @@ def test_signs_of_what_rounds_to_zero():
     assert page.signed(-0.3) == '0' and page.signed(4.6) == '+5' and page.signed(-4.6) == '-5'
 
 
+def test_the_camera_of_a_plot_saves_a_vector_graphic(tmp_path):
+    pages.bag_report([step_run()], tmp_path / 'page.html')
+    script = (tmp_path / 'page.html').read_text(encoding='utf-8').rpartition('<script>')[2]
+    options = re.search(r'Plotly\.react\(node.*?\}\);', script, re.S).group()
+    assert "'toImage'" in options and "toImageButtonOptions: { format: 'svg' }" in options
+
+
 def test_a_failed_write_leaves_the_old_page(tmp_path):
     path = tmp_path / 'page.html'
     path.write_text('old')
