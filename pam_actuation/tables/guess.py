@@ -24,14 +24,14 @@ from pam_actuation.tables.lengths import length_column, LengthColumn
 from pam_actuation.tables.mapping import column_of_text, ColumnMap, TableMapping
 from pam_actuation.tables.parts import is_length_of_muscle, kind_of_pressure
 from pam_actuation.tables.questions import (
-    needs_gain, of_output_column, Question, which_of)
+    either_of, needs_gain, of_output_column, Question, which_of)
 from pam_actuation.tables.signals import (
     ANGLES, are_of_joint, BY_NAME, of_words, Signal)
 from pam_actuation.tables.table import Table
 from pam_actuation.tables.units import (
     ABSOLUTE, ANGLE, checked_unit, FACTORS, GAUGE, LENGTH, names_of, PRESSURE, si_unit, Unit,
     unit_of_text, VOLTAGE)
-from pam_actuation.tables.words import path_and_name, unit_in, words_of
+from pam_actuation.tables.words import Heading, heading, words_in, words_of
 from pam_sim.annotations import BoolArray, FloatArray
 from pam_sim.units import P_ATM_PA
 
@@ -97,6 +97,7 @@ def guess(tables: Collection[Table], mapping: TableMapping,
             tables[0].require(one)
     found = as_stated(mapping)
     seen: dict[str, dict[str, tuple[ColumnMap, str] | Question]] = {}
+    either: dict[str, Question] = {}
     for table in tables:
         used = {table.name_of(one.column) for one in mapping.signals.values()}
         used |= {table.name_of(one) for one in left_out}
@@ -104,13 +105,16 @@ def guess(tables: Collection[Table], mapping: TableMapping,
         for column in table.columns:
             if column in used or is_called_time(table, column):
                 continue
-            signal = _signal_of(_name_of(table, column), unit_of_column(table, column))
-            if signal is None or signal.name in mapping.signals or column in seen.get(
-                    signal.name, {}):
-                continue
-            answer = _of_column(table, column, signal, missing)
-            if answer is not None:
-                seen.setdefault(signal.name, {})[column] = answer
+            meant = {signal.name: answer for signal in _signals_of(table, column)
+                     if signal.name not in mapping.signals and (
+                         answer := _of_column(table, column, signal, missing)) is not None}
+            if len(meant) > 1:
+                either[column] = either_of(column, {
+                    name: _units_of(answer) for name, answer in meant.items()})
+            else:
+                for name, answer in meant.items():
+                    seen.setdefault(name, {}).setdefault(column, answer)
+    found.questions += either.values()
     signals = dict(mapping.signals)
     joint = are_of_joint(signals) or are_of_joint(seen.keys() - {one.name for one in ANGLES})
     for name, candidates in seen.items():
@@ -139,7 +143,7 @@ def _of_lengths(tables: Collection[Table], mapping: TableMapping, missing: Colle
     lengths: dict[str, LengthColumn] = {}
     for table in tables:
         for column in table.columns:
-            words = words_of(path_and_name(_name_of(table, column))[1])
+            words = words_in(_heading_of(table, column).name.rpartition('/')[2])
             if (id(table), column) in used or not is_length_of_muscle(words) or (
                     table.begins_with_text(column)):
                 continue
@@ -166,8 +170,12 @@ def _chosen(name: str, candidates: dict[str, tuple[ColumnMap, str] | Question]
     if exported or len(candidates) == 1:
         return exported[0] if exported else next(iter(candidates.values()))
     return which_of(BY_NAME[name], [
-        (column, one.answers if isinstance(one, Question) else (one[0].unit.name,))
-        for column, one in candidates.items()])
+        (column, _units_of(one)) for column, one in candidates.items()])
+
+
+def _units_of(one: tuple[ColumnMap, str] | Question) -> tuple[str, ...]:
+    """Return the units in which a column may be read."""
+    return one.answers if isinstance(one, Question) else (one[0].unit.name,)
 
 
 def _is_output(one: tuple[ColumnMap, str] | Question) -> bool:
@@ -190,10 +198,9 @@ def ask(found: Guess, answer: Callable[[Question], str | None]) -> Guess:
     for question in found.questions:
         said = answer(question)
         if said:
-            column = f'{question.column}:' if question.column else ''
-            signals[question.signal] = column_of_text(
-                question.signal, f'{column}{said}', 'the answer')
-            told[question.signal] = 'as answered'
+            signal, rest = question.parted(said)
+            signals[signal] = column_of_text(signal, rest, 'the answer')
+            told[signal] = 'as answered'
     return Guess(replace(found.mapping, signals=signals), told)
 
 
@@ -212,14 +219,31 @@ def _name_of(table: Table, column: str) -> str:
 
 def unit_of_column(table: Table, column: str) -> str:
     """Return the unit that a table states for a column, as it is written; '' without one."""
-    return table.units.get(column, '') or unit_in(_name_of(table, column))
+    return table.units.get(column, '') or _heading_of(table, column).unit
 
 
-def _signal_of(column: str, unit: str) -> Signal | None:
-    """Return the signal that the name of a column and its unit mean."""
-    path, name = path_and_name(column)
-    return next((signal for signal in BY_NAME.values() if _is_exported(column, signal)),
-                None) or of_words(words_of(name), path, unit)
+def _heading_of(table: Table, column: str) -> Heading:
+    """Return name and unit of a column; the unit may stand in a row below."""
+    name = _name_of(table, column)
+    own, unit = heading(name), table.units.get(column, '')
+    return own if own.unit or not unit else heading(f'{name} [{unit}]')
+
+
+def _signals_of(table: Table, column: str) -> list[Signal]:
+    """Return the signals that a column may be by its name and unit; two where that is open."""
+    exported = next((one for one in BY_NAME.values() if _is_exported(
+        _name_of(table, column), one)), None)
+    if exported is not None:
+        return [exported]
+    own, unit = _heading_of(table, column), unit_of_column(table, column)
+    names = [own.name, *([own.inlet] if own.inlet else [])]
+    # A unit after a stroke, as in `p/bar`, or the last part of a path.
+    for texts in (names, [_name_of(table, column)] if own.unit else []):
+        found = [of_words(words_in(name), path, unit) for path, _, name in (
+            text.rpartition('/') for text in texts)]
+        if any(found):
+            return list(dict.fromkeys(one for one in found if one is not None))
+    return []
 
 
 def _is_exported(column: str, signal: Signal) -> bool:

@@ -70,6 +70,8 @@ _WORDS = {
     'sensor': 'aufnehmer messaufnehmer fühler opnemer capteur sensore transductor trasduttore',
     'pull': 'zug trek traction tracción trazione',
     'inner': 'innen intern interne interno interna intérieur intérieure',
+    'wire': 'draht draad',
+    'current': 'strom stroom courant corriente corrente',
     'load': 'belastung belasting carga carico',
     'loadcell': 'wägezelle kraftmessdose krachtcel',
     'cell': 'zelle dose cel cella celda cellule',
@@ -95,7 +97,8 @@ _IN_COMPOUNDS = (
     'druck druk tryck tryk kraft kracht weg hub länge lengte längd spannung spanning spänning '
     'kontraktion verkürzung verkorting winkel hoek vinkel zeit tijd wert waarde sollwert istwert '
     'messwert muskel spier zug trek regler regelaar ventil ventiel versorgung voeding gelenk knie '
-    'absolut absoluut beuger strecker aufnehmer opnemer fühler zelle dose cel').split()
+    'absolut absoluut strom stroom draht beuger strecker aufnehmer opnemer fühler zelle dose cel'
+).split()
 # Ends that tell what is measured although the front is not known, and that end no English word.
 _TAILS = 'druck kraft kracht spannung länge kontraktion verkürzung'.split()
 _LEAST_FRONT = 3                    # letters of it; fewer mean something alone, as `f`

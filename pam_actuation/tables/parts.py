@@ -21,7 +21,7 @@ only where every word of it is known: a `spring force` is no force of the muscle
 
 from pam_actuation.tables.languages import plain
 from pam_actuation.tables.units import (
-    ANGLE, FACTORS, FORCE, LENGTH, PRESSURE, unit_of_text, VOLTAGE)
+    ANGLE, bare, FACTORS, FORCE, is_output, LENGTH, PRESSURE, unit_of_text, VOLTAGE)
 
 # What is measured.
 _HEADS = {
@@ -54,6 +54,9 @@ _WANTED_NAMES = {PRESSURE: 'pressure_command', FORCE: 'reference_force', LENGTH:
                  VOLTAGE: 'ppr_voltage', ANGLE: 'reference_angle'}
 _NAMES = {PRESSURE: 'pressure', FORCE: 'force', LENGTH: 'contraction', VOLTAGE: 'ppr_voltage',
           ANGLE: 'angle'}
+# What says too little to be read: a `Seilzug` is the pull of a cable, or a draw wire.
+_VAGUE = {'pull': (FORCE, LENGTH), 'cable': (FORCE, LENGTH), 'wire': (FORCE, LENGTH),
+          'length': (LENGTH,), 'encoder': (LENGTH,)}
 # Of other things than the muscle, however much they are called alike.
 _OF_OTHERS = {'luft', 'umgebung', 'umgebungs', 'air', 'ambient', 'atmospheric', 'barometric',
               'baro', 'atm', 'room', 'raum'}
@@ -62,6 +65,11 @@ _OF_OTHERS = {'luft', 'umgebung', 'umgebungs', 'air', 'ambient', 'atmospheric', 
 def quantities_of(unit: str) -> set[str]:
     """Return the quantities that the text of a unit can be of; none where it is not known."""
     return {one for one in FACTORS if unit and unit_of_text(unit, one) is not None}
+
+
+def measured_by(words: str) -> set[str]:
+    """Return the quantities that words such as `pressure` name, whatever else they say."""
+    return {_HEADS[word] for word in _said(words) if word in _HEADS}
 
 
 def name_of_parts(words: str, unit: str = '') -> str:
@@ -131,9 +139,15 @@ def likely_signals(words: str, unit: str) -> list[str]:
         return []
     wanted = bool(said & _WANTED)
     names = _WANTED_NAMES if wanted else _NAMES
-    quantities = set(_heads(said, unit).values()) & quantities_of(unit)
-    if VOLTAGE in quantities_of(unit) and said & (_WANTED | _REGULATOR):
-        quantities = {VOLTAGE}
+    of_unit = quantities_of(unit)
+    vague = {one for word in said for one in _VAGUE.get(word, ())}
+    quantities = set(_heads(said, unit).values()) & of_unit or {
+        one for one in vague if one in of_unit or is_output(unit, one)}
+    if said & (_WANTED | _REGULATOR):
+        if VOLTAGE in of_unit:
+            quantities = {VOLTAGE}
+        elif not quantities and (bare(unit) == '%' or is_output(unit, PRESSURE)):
+            return ['pressure_command']
     return sorted(names[one] for one in quantities)
 
 

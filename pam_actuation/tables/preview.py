@@ -24,9 +24,10 @@ from pam_actuation.tables.guess import falls_below_atmosphere, Guess, unit_of_co
 from pam_actuation.tables.lengths import length_column
 from pam_actuation.tables.mapping import usual_unit
 from pam_actuation.tables.parts import likely_signals, name_of_parts
+from pam_actuation.tables.questions import needs_gain
 from pam_actuation.tables.signals import are_of_joint, BY_NAME
 from pam_actuation.tables.table import Table
-from pam_actuation.tables.units import ABSOLUTE, DATE, GAUGE, unit_of_text, VOLTAGE
+from pam_actuation.tables.units import ABSOLUTE, DATE, form_of, GAUGE, unit_of_text, VOLTAGE
 from pam_actuation.tables.words import words_of
 from pam_actuation.topics.table import OF_A_RUN, short_name
 from pam_sim.annotations import FloatArray
@@ -116,7 +117,7 @@ def how_to_begin(tables: Collection[Table], found: Guess) -> str:
 
 def may_be_signals(tables: Collection[Table], found: Guess) -> list[str]:
     """Return an option for each column that is not read and may be a signal that is missing."""
-    known = {*found.mapping.signals, *(one.signal for one in found.questions)}
+    known = {*found.mapping.signals, *(name for one in found.questions for name in one.signals)}
     # Of a joint each muscle has its own: `pressure` alone is none.
     missing = {name for name in BY_NAME if name not in known
                and are_of_joint([name]) == are_of_joint(known)}
@@ -175,6 +176,9 @@ def _option(table: Table, column: str, signal: str) -> str:
     length = length_column(column, finite, text) if signal == 'contraction' else None
     if length is not None:
         return length.maps[0].option(signal)
+    if unit is None and text and needs_gain(text, quantity) and not (
+            text == 'mA' and signal in _EXAMPLES):
+        return f'--map {signal}="{column}:{form_of(quantity)}"'
     if unit is None:
         more = f':zero=4:gain={_EXAMPLES[signal][1]:g}' if text == 'mA' else ''
         return f'--map {signal}="{column}:{usual_unit(quantity)}{more}"'
@@ -207,7 +211,8 @@ def _meaning(table: Table, found: Guess) -> dict[str, str]:
             meant[column] = f'{name} in {one.reading} ({found.told.get(name, "as stated")})'
     for question in found.questions:
         if table.name_of(question.column) is not None:
-            meant[question.column] = f'{question.signal}? ({BY_NAME[question.signal].meaning})'
+            meant[question.column] = ' or '.join(
+                f'{name}? ({BY_NAME[name].meaning})' for name in question.signals)
     return meant
 
 

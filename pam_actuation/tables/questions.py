@@ -14,12 +14,12 @@
 
 """What a file does not say of a column: the question, and which answers it admits."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 import re
 
 from pam_actuation.tables.mapping import column_of_text
-from pam_actuation.tables.signals import Signal
+from pam_actuation.tables.signals import BY_NAME, Signal
 from pam_actuation.tables.units import (
     ABSOLUTE, bare, DUTY, example_of, filled_unit, form_of, GAIN, GAUGE, is_output, LENGTH,
     unit_of_text, ZERO)
@@ -37,12 +37,14 @@ class Question:
     Parameters
     ----------
     signal, column : str
-        Which is meant; the column is '' where several could be the signal.
+        Which is meant; the column is '' where several could be the signal, the signal is '' where
+        the column could be one of several.
     text : str
         The question, in one sentence.
     answers : tuple of str
         Units among which to choose, as after the column in ``--map``; of several columns
-        ``COLUMN:UNIT``. ``ZERO`` and ``GAIN`` are to be filled in.
+        ``COLUMN:UNIT``, of several signals ``SIGNAL=UNIT``. ``ZERO`` and ``GAIN`` are to be
+        filled in.
     any_unit : bool
         Whether every unit of the signal is an answer.
     is_output : bool
@@ -58,10 +60,22 @@ class Question:
     any_unit: bool = False
     is_output: bool = False
 
+    @property
+    def signals(self) -> list[str]:
+        """Return the signals that are meant, more than one where that is the question."""
+        return list(dict.fromkeys(self.parted(one)[0] for one in self.answers))
+
     def options(self) -> str:
         """Return the words of the command line that answer it, one of them for each answer."""
-        column = f'{self.column}:' if self.column else ''
-        return ' or '.join(f'--map {self.signal}="{column}{unit}"' for unit in self.answers)
+        return ' or '.join(f'--map {signal}="{text}"' for signal, text in map(
+            self.parted, self.answers))
+
+    def parted(self, answer: str) -> tuple[str, str]:
+        """Return the signal and what is said of it, ``COLUMN:UNIT``, of an answer."""
+        signal, equals, unit = ('', '', answer) if self.signal else answer.partition('=')
+        if not equals:
+            signal, unit = self.signal, answer
+        return signal, f'{self.column}:{unit}' if self.column else unit
 
     def choice(self) -> str:
         """Return among which answers a person at a terminal chooses, in words."""
@@ -79,9 +93,8 @@ class Question:
         own = _NUMBERS.sub('', said)
         if not self.any_unit and own not in offered:
             return f'{said!r} is not one of them'
-        column = f'{self.column}:' if self.column else ''
         try:
-            column_of_text(self.signal, f'{column}{said}', f'{said!r}')
+            column_of_text(*self.parted(said), f'{said!r}')
         except InputError as error:
             return str(error)
         needed = ('gain=',) if self.is_output else () if self.any_unit else tuple(
@@ -150,3 +163,10 @@ def which_of(signal: Signal, columns: Sequence[tuple[str, tuple[str, ...]]]) -> 
     return Question(signal.name, '', f'columns {names} could each be the {signal.meaning}: '
                     'which one?', tuple(f'{column}:{unit}' for column, units in columns
                                         for unit in units[:2]))
+
+
+def either_of(column: str, signals: Mapping[str, tuple[str, ...]]) -> Question:
+    """Return the question which of several signals, each with its units, a column is."""
+    meanings = ' or the '.join(BY_NAME[name].meaning for name in signals)
+    return Question('', column, f'column "{column}" could be the {meanings}: which one?', tuple(
+        f'{name}={unit}' for name, units in signals.items() for unit in units))

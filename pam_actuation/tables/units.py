@@ -48,7 +48,10 @@ _OTHER_NAMES = {'µm': 'um', 'μm': 'um', 'µs': 'us', 'μs': 'us', 'sec': 's', 
                 'kp/cm²': 'kgf/cm2', 'kg/cm2': 'kgf/cm2', 'kg/cm²': 'kgf/cm2', 'n/mm2': 'MPa',
                 'n/mm²': 'MPa', 'inches': 'in', 'millimeter': 'mm', 'millimetre': 'mm',
                 'at': 'kgf/cm2', 'torr': 'mmHg', '°': 'deg', 'degree': 'deg', 'degrees': 'deg',
-                'grad': 'deg', 'radian': 'rad', 'radians': 'rad'}
+                'grad': 'deg', 'radian': 'rad', 'radians': 'rad', 'prozent': '%', 'zoll': 'in',
+                'pascal': 'Pa', 'kilopascal': 'kPa', 'sekunde': 's', 'sekunden': 's',
+                'secondes': 's', 'segundos': 's', 'millisekunden': 'ms', 'milliseconds': 'ms',
+                'millimeters': 'mm', 'milímetros': 'mm', 'millimètres': 'mm'}
 
 
 # What sensors put out: where that begins, and how far it goes.
