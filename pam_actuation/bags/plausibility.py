@@ -16,7 +16,7 @@
 
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import NamedTuple, TYPE_CHECKING
 
 import numpy as np
 
@@ -29,8 +29,9 @@ from pam_sim.units import allowed_range, gauge_kpa, P_ATM_PA
 if TYPE_CHECKING:
     from pam_actuation.bags.source import TopicData
     from pam_actuation.bags.topic_info import TopicInfo
+    from pam_sim.rig import Rig
 
-Length = Callable[[], float]           # gives the length of the muscle at rest [m]
+Length = Callable[[], 'Size']          # gives length and largest contraction of the muscle
 # What judges the finite values of a column, their lowest and highest.
 Check = Callable[[FloatArray, float, float, Length], tuple[str, bool]]
 MIN_RATE_HZ = 100.0
@@ -42,6 +43,7 @@ ATMOSPHERE_MARGIN_PA = 5e3             # sensor offset and weather
 MOST_ZERO_PA = 20e3                    # the zero of a sensor of 10 bar, 2 % of its range
 MUSCLE_LENGTH_M = 0.300                # DMSP-5-300
 MAX_CONTRACTION = 0.25                 # of the length, data sheet limit
+MOST_STRAIN = 0.43                     # threads along the axis: 1 - 1 / sqrt(3) = 0.423
 CONTRACTION_MARGIN_M = 1e-3
 MAX_GAUGE_PA = 800e3
 MAX_VOLTAGE = 10.0
@@ -72,14 +74,63 @@ class Implausible:
     unusable: bool = False
 
 
-def recorded_length_m(metadata: Mapping[str, str]) -> float:
-    """Return the length of the muscle that a bag's rig tells [m], else that of a DMSP-5-300."""
+class Size(NamedTuple):
+    """
+    What tells how far a muscle may shorten.
+
+    Parameters
+    ----------
+    length_m : float
+        Length at rest.
+    max_strain : float
+        Largest contraction, as a fraction of it.
+    known_by : {'', 'rig', 'length'}
+        What says so: the rig, or the length alone; '' where it is taken for a DMSP-5-300.
+
+    """
+
+    length_m: float = MUSCLE_LENGTH_M
+    max_strain: float = MAX_CONTRACTION
+    known_by: str = ''
+
+    @property
+    def stroke_m(self) -> float:
+        """Return the largest contraction, m."""
+        return self.max_strain * self.length_m
+
+    @property
+    def most_m(self) -> float:
+        """Return what no muscle of this length shortens by, m."""
+        return max(self.max_strain, MOST_STRAIN) * self.length_m
+
+    @property
+    def said(self) -> str:
+        """Return where the largest contraction comes from, in words."""
+        why = {'rig': ', by `max_strain` of its rig', 'length': ': none shortens by more'}
+        return (f'{100.0 * self.max_strain:.3g} % of a {1e3 * self.length_m:.0f} mm muscle'
+                f'{why.get(self.known_by, ", as no rig is stated")}')
+
+
+def size_of_rig(rig: 'Rig') -> Size:
+    """Return the size of the muscle of a rig."""
+    return Size(rig.muscle.length_m, rig.muscle.max_strain, 'rig')
+
+
+def recorded_length_m(metadata: Mapping[str, str]) -> Size:
+    """
+    Return the size of the muscle that a bag's rig tells, or what is known without one.
+
+    The import of a table tells itself what is odd where no length is stated. So a bag of such a
+    table may hold what any muscle shortens by.
+    """
     from pam_sim import load_rig
     from pam_sim.errors import InputError
     try:
-        return load_rig(metadata['rig']).muscle.length_m
+        return size_of_rig(load_rig(metadata['rig']))
     except (InputError, KeyError):
-        return MUSCLE_LENGTH_M
+        if metadata.get('origin') != 'imported':
+            return Size()
+        return Size(float(metadata.get('length_m') or MOST_M / MOST_STRAIN), MOST_STRAIN, 'length')
 
 
 def topic_remarks(topic: 'TopicData', info: 'TopicInfo', stamp_ns: IntArray,
@@ -250,7 +301,7 @@ def value_findings(topic: str, name: str, column: FloatArray,
     column : ndarray
         As read, in file order or by stamp.
     length_m : callable, optional
-        Gives the length of the muscle at rest [m]; asked only where it matters.
+        Gives the Size of the muscle; asked only where it matters.
 
     """
     finite = column[np.isfinite(column)]
@@ -270,7 +321,7 @@ def value_findings(topic: str, name: str, column: FloatArray,
             f'{topic}: {name} from {low:.4g} to {high:.4g} leaves '
             f'{allowed_range(*limits, name=name)}.'))
     if len(finite) and check is not None:
-        sentence, unusable = check(finite, low, high, length_m or _usual_length)
+        sentence, unusable = check(finite, low, high, length_m or Size)
         if sentence:
             found.append(Implausible(f'{topic}: {sentence}', unusable))
     return found
@@ -287,10 +338,6 @@ def not_finite(topic: str, name: str, column: FloatArray) -> int:
         return int(np.isinf(column).sum())
     bad = int((~np.isfinite(column)).sum())
     return 0 if name in OFTEN_EMPTY and bad == len(column) else bad
-
-
-def _usual_length() -> float:
-    return MUSCLE_LENGTH_M
 
 
 def _unit(low: float, high: float, unit: str, likely: str, fix: str) -> tuple[str, bool]:
@@ -341,22 +388,21 @@ def _contraction(finite: FloatArray, low: float, high: float,
                  length_m: Length) -> tuple[str, bool]:
     if low >= -CONTRACTION_MARGIN_M and high <= LEAST_LIMIT_M:
         return '', False
-    length = length_m()
-    limit = MAX_CONTRACTION * length
-    if low >= -CONTRACTION_MARGIN_M and high <= limit + CONTRACTION_MARGIN_M:
+    size = length_m()
+    if low >= -CONTRACTION_MARGIN_M and high <= size.stroke_m + CONTRACTION_MARGIN_M:
         return '', False
     largest = float(np.quantile(np.abs(finite), 0.99))
-    if largest > MOST_M and largest > 2.0 * length:
+    if largest > MOST_M and largest > 2.0 * size.length_m:
         likely, factor = ('micrometres', 1e6) if largest > 1e3 else ('millimetres', 1e3)
         return _unit(low, high, 'metres', likely,
                      f'Divide them by {factor:g}; the topic is in m.')
     hint = ''
-    if largest > limit and high <= 0.5:
+    if largest > (size.most_m if size.known_by else size.stroke_m) and high <= MOST_STRAIN:
         hint = SHARE_HINT
     elif low < -CONTRACTION_MARGIN_M and float(np.median(finite)) < -CONTRACTION_MARGIN_M:
         hint = ' Is the sign turned round, or the zero not set? Shortening is positive.'
     return (f'contraction from {1e3 * low:.1f} to {1e3 * high:.1f} mm leaves 0 to '
-            f'{1e3 * limit:.0f} mm (25 % of a {1e3 * length:.0f} mm muscle).{hint}'), False
+            f'{1e3 * size.stroke_m:.0f} mm ({size.said}).{hint}'), False
 
 
 def _force(finite: FloatArray, low: float, high: float, length_m: Length) -> tuple[str, bool]:

@@ -86,11 +86,11 @@ def run(args: argparse.Namespace) -> int:
     """Read, ask, check, write; say what to do next."""
     import os
     from pathlib import Path
-    from pam_actuation.bags.plausibility import MUSCLE_LENGTH_M
+    from pam_actuation.bags.plausibility import size_of_rig
     from pam_actuation.bags.place import check_bag_target
     from pam_actuation.cli.common import check_outputs
     from pam_actuation.tables.importer import digest_of, recording_of, write_bag
-    from pam_actuation.tables.lengths import longest_at_rest
+    from pam_actuation.tables.lengths import size_of_mapping
     from pam_actuation.tables.preview import may_be_signals, unread
     from pam_actuation.tables.repeats import without_repeats
     from pam_actuation.tables.resample import hint, resampled
@@ -107,9 +107,7 @@ def run(args: argparse.Namespace) -> int:
         return _show(args, tables, found)
     recording = recording_of(
         tables, found.mapping, sort=args.sort, missing=args.missing, accept=args.accept,
-        length_m=rig.muscle.length_m if rig is not None else longest_at_rest(
-            (one for name, one in found.mapping.signals.items()
-             if name.endswith('contraction')), MUSCLE_LENGTH_M))
+        size=size_of_rig(rig) if rig is not None else size_of_mapping(found.mapping))
     if args.begin_s > 0.0 or args.end_s < float('inf'):
         recording = recording.between(args.begin_s, args.end_s)
     recording = without_repeats(recording)

@@ -24,11 +24,13 @@ import numpy as np
 from pam_actuation import messages
 from pam_actuation.bags.message_writer import MessageWriter
 from pam_actuation.bags.metadata import experiment_metadata
+from pam_actuation.bags.plausibility import Size
 from pam_actuation.bags.writer import BagWriter
 from pam_actuation.messages import START_NS, VALVE_NAMES
 from pam_actuation.namespaces import JOINT, MUSCLE, namespace_of
 from pam_actuation.tables.clock import clock_of
 from pam_actuation.tables.guess import unit_of_column
+from pam_actuation.tables.lengths import size_of_mapping
 from pam_actuation.tables.mapping import TableMapping
 from pam_actuation.tables.plausible import Doubt, doubts
 from pam_actuation.tables.signals import are_of_joint, BY_NAME, of_muscles
@@ -106,7 +108,7 @@ class Recording:
         return Recording(signals, self.mapping, self.sources, self.told, self.found)
 
 
-def recording_of(tables: Sequence[Table], mapping: TableMapping, *, length_m: float,
+def recording_of(tables: Sequence[Table], mapping: TableMapping, *, size: Size,
                  start_ns: int = START_NS, sort: bool = False, missing: Collection[str] = (),
                  accept: bool = False) -> Recording:
     """
@@ -120,8 +122,8 @@ def recording_of(tables: Sequence[Table], mapping: TableMapping, *, length_m: fl
         Of one recording.
     mapping : TableMapping
         Columns and units of the signals.
-    length_m : float
-        Length of the muscle at rest.
+    size : Size
+        Of the muscle.
     start_ns, sort
         As ``clock_of``.
     missing : collection of str
@@ -157,7 +159,7 @@ def recording_of(tables: Sequence[Table], mapping: TableMapping, *, length_m: fl
         if name not in pieces:
             raise InputError(no_column_in(tables, one.column), one.where or name)
         result.signals[name] = _joined(name, pieces[name])
-    _check(result, length_m, accept)
+    _check(result, size, accept)
     return result
 
 
@@ -186,7 +188,7 @@ def _joined(name: str, pieces: list[tuple[IntArray, FloatArray, str]]
             np.concatenate([values for _, values, _ in pieces]))
 
 
-def _check(result: Recording, length_m: float, accept: bool) -> None:
+def _check(result: Recording, size: Size, accept: bool) -> None:
     if not result.signals:
         raise InputError('no column is mapped to a signal; add --map pressure="COLUMN:bar_gauge" '
                          'and others', '--map')
@@ -195,7 +197,7 @@ def _check(result: Recording, length_m: float, accept: bool) -> None:
                          'angle="COLUMN:deg"', '--map')
     for place, names in of_muscles(result.signals).items():
         _check_muscle(place, names, result.is_of_joint)
-    found = doubts(result.signals, result.mapping.signals, length_m)
+    found = doubts(result.signals, result.mapping.signals, size)
     wrong = next((one for one in found if one.is_wrong), None)
     if wrong is not None and not accept:
         raise InputError(f'{wrong.sentence}. (--accept takes the values as they are)')
@@ -249,7 +251,7 @@ def write_bag(recording: Recording, path: StrPath, *, rig: Any = None, namespace
     metadata = experiment_metadata(
         rig=rig, valve=recording.valve, origin='imported',
         experiment_name=Path(next(iter(recording.sources), 'table')).stem,
-        mapping=recording.mapping.to_yaml(),
+        mapping=recording.mapping.to_yaml(), length_m=_length_told(recording.mapping),
         resampled_hz='' if recording.resampled_hz is None else f'{recording.resampled_hz:g}',
         sources='\n'.join(f'{name} sha256 {digest}'
                           for name, digest in recording.sources.items()))
@@ -270,6 +272,12 @@ def write_bag(recording: Recording, path: StrPath, *, rig: Any = None, namespace
     finally:
         writer.discard()
     return writer.counts
+
+
+def _length_told(mapping: TableMapping) -> str:
+    """Return the length of a muscle longer than usual that a zero tells [m], '' without."""
+    size = size_of_mapping(mapping)
+    return f'{size.length_m:g}' if size.known_by else ''
 
 
 @dataclass

@@ -14,11 +14,11 @@
 
 """A column of the muscle's length: the contraction is what it lacks of the length at rest."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from pam_actuation.tables.mapping import ColumnMap
+from pam_actuation.bags.plausibility import MOST_STRAIN, MUSCLE_LENGTH_M, Size
+from pam_actuation.tables.mapping import ColumnMap, TableMapping
 from pam_actuation.tables.units import LENGTH, Unit, unit_of_text
 from pam_sim.annotations import FloatArray
 
@@ -89,10 +89,12 @@ def length_column(column: str, values: FloatArray, unit_text: str) -> LengthColu
     return LengthColumn(column, low, high, maps) if maps else None
 
 
-def longest_at_rest(maps: Iterable[ColumnMap], usual_m: float) -> float:
-    """Return the largest length [m] that muscles may have: the usual one, or a zero stated."""
-    return max([usual_m, *(one.zero * one.unit.factor * -one.gain for one in maps
-                           if one.gain < 0.0)])
+def size_of_mapping(mapping: TableMapping) -> Size:
+    """Return the size of the longest muscle that a mapping tells by a zero; else the usual one."""
+    longest_m = max((one.zero * one.unit.factor * -one.gain
+                     for name, one in mapping.signals.items()
+                     if name.endswith('contraction') and one.gain < 0.0), default=0.0)
+    return Size(longest_m, MOST_STRAIN, 'length') if longest_m > MUSCLE_LENGTH_M else Size()
 
 
 def _fits(low: float, high: float, unit: Unit) -> bool:

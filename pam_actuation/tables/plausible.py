@@ -19,7 +19,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from pam_actuation.bags.plausibility import (
-    GAUGE_HINT, Implausible, MAX_CONTRACTION, SHARE_HINT, value_findings)
+    GAUGE_HINT, Implausible, SHARE_HINT, Size, value_findings)
+from pam_actuation.tables.lengths import LEAST_KEPT
 from pam_actuation.tables.mapping import ColumnMap
 from pam_actuation.tables.signals import BY_NAME, of_muscles, Signal
 from pam_actuation.tables.units import (
@@ -28,6 +29,7 @@ from pam_actuation.tables.words import unit_in
 from pam_sim.annotations import BoolArray, FloatArray, IntArray
 from pam_sim.units import P_ATM_PA
 
+LONGEST_STROKE = 0.5                 # of the length at rest: no muscle moves by more
 FAR = 20.0                           # times the range of the others: no value of the rig
 MUCH_PA, LITTLE = 2e5, 0.01         # a free muscle shortens by more of its length
 MUCH_N = 8e3                         # the strongest muscle on sale pulls 6 kN
@@ -56,7 +58,7 @@ class Doubt:
 
 
 def doubts(signals: Mapping[str, tuple[IntArray, FloatArray]], mapped: Mapping[str, ColumnMap],
-           length_m: float) -> list[Doubt]:
+           size: Size) -> list[Doubt]:
     """
     Return what is doubtful in the signals of a recording.
 
@@ -66,8 +68,8 @@ def doubts(signals: Mapping[str, tuple[IntArray, FloatArray]], mapped: Mapping[s
         Stamps [ns] and SI values by name of the signal, NaN where missing.
     mapped : dict of str to ColumnMap
         Where they come from.
-    length_m : float
-        Length of the muscle at rest, for its largest contraction.
+    size : Size
+        Of the muscle, for its largest contraction.
 
     """
     found, whole = [], dict(signals)
@@ -90,12 +92,12 @@ def doubts(signals: Mapping[str, tuple[IntArray, FloatArray]], mapped: Mapping[s
             finite = column[np.isfinite(column) & ~dropped]
             whole[name] = stamp_ns, np.where(dropped, np.nan, column)
         found += [Doubt(f'{said}: {one.sentence}', one.is_wrong)
-                  for one in _of_values(signal, mapped[name], finite, length_m)]
+                  for one in _of_values(signal, mapped[name], finite, size)]
     for place, names in of_muscles(signals).items():
         if {'pressure', 'contraction'} <= names:
             own = {name: whole[f'{place}{name}'] for name in names}
             read = {name: mapped[f'{place}{name}'] for name in names}
-            both = _held(place, own, read, length_m), _zero(place, own, read, length_m)
+            both = _held(place, own, read, size), _zero(place, own, read, size)
             found += [one for one in both if one is not None]
     return found
 
@@ -118,13 +120,13 @@ def _dropped(mapped: ColumnMap, column: FloatArray) -> BoolArray:
 
 
 def _held(place: str, signals: Mapping[str, tuple[IntArray, FloatArray]],
-          mapped: Mapping[str, ColumnMap], length_m: float) -> Doubt | None:
+          mapped: Mapping[str, ColumnMap], size: Size) -> Doubt | None:
     """Return a doubt on a muscle that hardly moves under much pressure, None without."""
     both = [signals[name][1] for name in ('pressure', 'contraction')]
     if not all(np.isfinite(column).any() for column in both):
         return None
     risen_pa, moved_m = (float(np.nanmax(column) - np.nanmin(column)) for column in both)
-    if risen_pa < MUCH_PA or not LEAST_MOVE[LENGTH] <= moved_m < LITTLE * length_m:
+    if risen_pa < MUCH_PA or not LEAST_MOVE[LENGTH] <= moved_m < LITTLE * size.length_m:
         return None
     one = mapped['contraction']
     return Doubt(
@@ -134,7 +136,7 @@ def _held(place: str, signals: Mapping[str, tuple[IntArray, FloatArray]],
 
 
 def _zero(place: str, signals: Mapping[str, tuple[IntArray, FloatArray]],
-          mapped: Mapping[str, ColumnMap], length_m: float) -> Doubt | None:
+          mapped: Mapping[str, ColumnMap], size: Size) -> Doubt | None:
     """Return a doubt on a contraction that an empty muscle keeps, None without."""
     (own_ns, pressure_pa), (stamp_ns, contraction_m) = signals['pressure'], signals['contraction']
     known = np.isfinite(pressure_pa)
@@ -146,7 +148,7 @@ def _zero(place: str, signals: Mapping[str, tuple[IntArray, FloatArray]],
     if len(empty) < FEWEST_EMPTY:
         return None
     at_rest_m, one = float(np.median(empty)), mapped['contraction']
-    if at_rest_m < KEPT_SHARE * length_m:
+    if at_rest_m < KEPT_SHARE * size.length_m:
         return None
     zero = replace(one, zero=float(f'{float(_raw(one, np.array([at_rest_m]))[0]):.4g}'))
     return Doubt(
@@ -155,40 +157,40 @@ def _zero(place: str, signals: Mapping[str, tuple[IntArray, FloatArray]],
         f'{zero.option(f"{place}contraction")}')
 
 
-def _of_values(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: float
+def _of_values(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Size
                ) -> list[Doubt]:
     """Return the doubts on one signal by itself; the first that is certain stands alone."""
-    wrong = value_findings('', signal.field, finite, lambda: length_m)
-    certain = _apart(mapped, finite) or _impossible(signal, mapped, finite, length_m, wrong)
+    wrong = value_findings('', signal.field, finite, lambda: size)
+    certain = _apart(mapped, finite) or _impossible(signal, mapped, finite, size, wrong)
     if certain is not None:
         return [certain]
     # What the stated unit rules out.
     no_hint = SHARE_HINT if mapped.unit.factor != 1.0 else ''
     no_gauge = GAUGE_HINT if mapped.unit.name.endswith(GAUGE) else ''
     found = [Doubt(one.sentence.partition(': ')[2].removesuffix(no_hint).removesuffix(
-        no_gauge).rstrip('.')) for one in wrong]
+        no_gauge).rstrip('.') + _longer(signal, finite, size)) for one in wrong]
     if finite.min() == finite.max():
         return [*found, Doubt(f'the value never changes ({_shown(signal, float(finite.min()))}): '
                               'is the sensor connected?')]
     looks = (_hardly_moves, _pulls_much, _pushes, _moves_no_muscle, _gauge_or_absolute,
              _other_unit)
-    doubted = [look(signal, mapped, finite, length_m) for look in looks]
+    doubted = [look(signal, mapped, finite, size) for look in looks]
     return [*found, *(doubt for doubt in doubted if doubt is not None)]
 
 
-def _impossible(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: float,
+def _impossible(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Size,
                 wrong: Sequence[Implausible]) -> Doubt | None:
     """Return a doubt on values that no rig or no muscle has, None without."""
     low, high = float(finite.min()), float(finite.max())
     if any(one.unusable for one in wrong) or signal.quantity == LENGTH and (
-            high - low > 2.0 * MAX_CONTRACTION * length_m):
+            high - low > LONGEST_STROKE * size.length_m):
         return Doubt(f'{_shown(signal, low)} to {_shown(signal, high)}, which no rig has'
-                     f'{_fix(signal, mapped, finite, length_m)}', True)
-    turned = _turned(signal, mapped, finite, length_m) if (
+                     f'{_fix(signal, mapped, finite, size)}{_longer(signal, finite, size)}', True)
+    turned = _turned(signal, mapped, finite, size) if (
         wrong and signal.quantity == LENGTH) else ''
     if turned:
         return Doubt(f'{_shown(signal, low)} to {_shown(signal, high)}, which no muscle '
-                     f'shortens by; {turned}', True)
+                     f'shortens by; {turned}{_longer(signal, finite, size)}', True)
     return None
 
 
@@ -199,25 +201,25 @@ def _moves_too_little(signal: Signal, finite: FloatArray) -> bool:
 
 # Each of these returns a doubt on the values of a signal, None without.
 
-def _hardly_moves(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: float
+def _hardly_moves(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Size
                   ) -> Doubt | None:
     if not _moves_too_little(signal, finite):
         return None
     moved = float(finite.max()) - float(finite.min())
     return Doubt(f'it moves by {_shown(signal, moved, difference=True)} only'
-                 f'{_fix(signal, mapped, finite, length_m)}')
+                 f'{_fix(signal, mapped, finite, size)}')
 
 
-def _pulls_much(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: float
+def _pulls_much(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Size
                 ) -> Doubt | None:
     most = max(float(finite.max()), -float(finite.min()))
     if signal.quantity != FORCE or most <= MUCH_N:
         return None
     return Doubt(f'it reaches {_shown(signal, most)}, more than a muscle pulls'
-                 f'{_fix(signal, mapped, finite, length_m)}')
+                 f'{_fix(signal, mapped, finite, size)}')
 
 
-def _pushes(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: float
+def _pushes(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Size
             ) -> Doubt | None:
     low, high = float(finite.min()), float(finite.max())
     if signal.name.rpartition('/')[2] != 'force' or not (
@@ -228,13 +230,13 @@ def _pushes(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: flo
                  f'positive; if it counts the other way, write {other.option(signal.name)}')
 
 
-def _moves_no_muscle(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: float
+def _moves_no_muscle(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Size
                      ) -> Doubt | None:
     high = float(finite.max())
     if _moves_too_little(signal, finite) or not _is_too_low(signal, high):
         return None
     return Doubt(f'it reaches {_shown(signal, high)} only, at which no muscle moves'
-                 f'{_fix(signal, mapped, finite, length_m)}')
+                 f'{_fix(signal, mapped, finite, size)}')
 
 
 def _is_too_low(signal: Signal, highest: float) -> bool:
@@ -242,7 +244,7 @@ def _is_too_low(signal: Signal, highest: float) -> bool:
     return signal.quantity == PRESSURE and P_ATM_PA < highest < P_ATM_PA + SMALL_GAUGE_PA
 
 
-def _gauge_or_absolute(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: float
+def _gauge_or_absolute(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Size
                        ) -> Doubt | None:
     """Ask about a gauge pressure that ends where an absolute one does when vented."""
     if signal.quantity != PRESSURE or not mapped.unit.name.endswith(GAUGE) or (
@@ -252,7 +254,7 @@ def _gauge_or_absolute(signal: Signal, mapped: ColumnMap, finite: FloatArray, le
                  f'Then write {mapped.unit.name.replace(GAUGE, ABSOLUTE)}')
 
 
-def _other_unit(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: float
+def _other_unit(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Size
                 ) -> Doubt | None:
     in_name = unit_in(mapped.column)
     if mapped.gain == 1.0 and (output := of_output(in_name, signal.quantity)):
@@ -287,23 +289,36 @@ def _apart(mapped: ColumnMap, finite: FloatArray) -> Doubt | None:
     return None
 
 
-def _turned(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: float) -> str:
+def _turned(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Size) -> str:
     """Return how to read a length that is no contraction, '' where most values can be one."""
-    middle = float(np.median(finite))
-    if 0.0 <= middle <= MAX_CONTRACTION * length_m:
+    middle, low, high = (float(one) for one in (
+        np.median(finite), finite.min(), finite.max()))
+    if 0.0 <= middle <= size.most_m:
         return ''
     sign = replace(mapped, gain=-mapped.gain)
-    if not value_findings('', signal.field, -finite, lambda: length_m):
+    if not value_findings('', signal.field, -finite, lambda: size):
         return f'if it counts the other way, write {sign.option(signal.name)}'
-    zero = float(_raw(mapped, np.array([finite.max()]))[0])
-    least = float(_raw(mapped, np.array([finite.min()]))[0])
-    ways = [replace(mapped, zero=float(f'{zero:.6g}'), gain=-mapped.gain),
-            replace(mapped, zero=float(f'{least:.6g}'))]
-    return (f'if it is the length of the muscle, write {ways[0].option(signal.name)}, with its '
-            f'length at rest; if only the zero is off, {ways[1].option(signal.name)}')
+    zero, least = (float(f'{one:.6g}') for one in _raw(mapped, np.array([high, low])))
+    ways = []
+    if low >= LEAST_KEPT * high:
+        way = replace(mapped, zero=zero, gain=-mapped.gain)
+        ways.append(f'if it is the length of the muscle, write {way.option(signal.name)}, with '
+                    'its length at rest')
+    if high - low <= size.most_m:
+        ways.append('if only the zero is off, '
+                    f'{replace(mapped, zero=least).option(signal.name)}')
+    return '; '.join(ways) or 'look for the unit, zero and gain of the column'
 
 
-def _fix(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: float) -> str:
+def _longer(signal: Signal, finite: FloatArray, size: Size) -> str:
+    """Return what helps where a length is judged by a muscle that nobody stated."""
+    if signal.quantity != LENGTH or size.known_by == 'length' or finite.max() <= size.stroke_m:
+        return ''
+    return ('; if it is right, state `max_strain` under `muscle` in the file of the rig'
+            if size.known_by else '; if the muscle is longer, name the file of its rig with --rig')
+
+
+def _fix(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Size) -> str:
     """Return the unit in which the values would be plausible, with the option to write."""
     raw = (finite - mapped.unit.offset) / mapped.unit.factor
     fitting = []
@@ -313,7 +328,7 @@ def _fix(signal: Signal, mapped: ColumnMap, finite: FloatArray, length_m: float)
             continue
         values = unit.to_si(raw)
         moved = float(values.max() - values.min())
-        if not value_findings('', signal.field, values, lambda: length_m) and (
+        if not value_findings('', signal.field, values, lambda: size) and (
                 moved >= 10.0 * LEAST_MOVE.get(signal.quantity, 0.0)) and (
                 not _is_too_low(signal, float(values.max()))):
             fitting.append(replace(mapped, unit=unit))

@@ -20,7 +20,7 @@ import numpy as np
 from pam_actuation.bags.info import bag_info
 from pam_actuation.bags.load import load_run
 from pam_actuation.bags.load_joint import load_recording
-from pam_actuation.bags.plausibility import repeat_remarks, value_findings
+from pam_actuation.bags.plausibility import repeat_remarks, Size, value_findings
 from pam_actuation.bags.source import read_bag
 from pam_actuation.bags.writer import BagWriter
 from pam_actuation.cli.main import main
@@ -102,8 +102,8 @@ def test_what_a_rig_measures_is_left_alone():
     # A long muscle may shorten by more.
     far = CONTRACTION_M * 5.0
     assert 'leaves 0 to 75 mm' in look('contraction_m', far)[0]
-    assert look('contraction_m', far, length_m=lambda: 0.5) == ('', False)
-    assert look('contraction_m', far, length_m=lambda: 0.3)[1] is False
+    assert look('contraction_m', far, length_m=lambda: Size(0.5)) == ('', False)
+    assert look('contraction_m', far, length_m=Size)[1] is False
 
 
 def test_values_that_are_not_finite_are_counted():

@@ -16,6 +16,7 @@
 
 import numpy as np
 from pam_actuation.bags.load import load_run
+from pam_actuation.bags.plausibility import Size
 from pam_actuation.cli.main import main
 from pam_actuation.tables.guess import Guess, guess
 from pam_actuation.tables.mapping import column_of_text, TableMapping
@@ -241,7 +242,7 @@ def test_a_zero_that_is_off_shows_while_the_muscle_is_empty(text, shortening):
     for at_rest_m in (0.0, 0.004, 0.0314):
         said = ' '.join(one.sentence for one in doubts(
             {'pressure': (10 * STAMP_NS[:-7], PRESSURE_PA[:-7]),
-             'contraction': (10 * STAMP_NS, SHORTENED_M + at_rest_m)}, mapped, 0.3))
+             'contraction': (10 * STAMP_NS, SHORTENED_M + at_rest_m)}, mapped, Size()))
         off = at_rest_m > 0.03
         assert ('31.4 mm while the muscle is empty' in said) == off
         assert (f'zero={column.zero + shortening * 31.4:.4g}' in said) == off
@@ -256,7 +257,7 @@ def test_a_wire_that_breaks_is_told_with_its_option(begin, end, zero, is_told):
     current[begin:end] = 0.0
     column = column_of_text('pressure', text, 'here')
     said = [one.sentence for one in doubts(
-        {'pressure': (STAMP_NS, column.to_si(current))}, {'pressure': column}, 0.3)]
+        {'pressure': (STAMP_NS, column.to_si(current))}, {'pressure': column}, Size())]
     assert ('4 of 60 values are 0' in ' '.join(said)) == is_told
     assert any(one.endswith(f'--map pressure="{text}:missing=0"') for one in said) == is_told
     whole = column_of_text('pressure', f'{text}:missing=0', 'here')
@@ -275,7 +276,7 @@ def test_a_sensor_in_milliamperes_without_a_gain(text, is_told):
     column = column_of_text('pressure', text, 'here')
     said = ' '.join(one.sentence for one in doubts(
         {'pressure': (STAMP_NS, column.to_si(5.0 + 0.02 * np.arange(60.0)))},
-        {'pressure': column}, 0.3))
+        {'pressure': column}, Size()))
     assert ('mA is what a sensor puts out' in said) == is_told
 
 
@@ -308,7 +309,7 @@ def of_pressure(gauge_pa):
     """Return the doubts on a pressure that a person gave as gauge."""
     mapped = column_of_text('pressure', 'p:kPa_gauge', '--map')
     return doubts({'pressure': (np.arange(gauge_pa.size), P_ATM_PA + gauge_pa)},
-                  {'pressure': mapped}, 0.3)
+                  {'pressure': mapped}, Size())
 
 
 @pytest.mark.parametrize('highest_pa', [1.4e5, 5e5])
