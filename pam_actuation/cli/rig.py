@@ -97,7 +97,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _new(args: argparse.Namespace) -> int:
-    from pam_actuation.rig_files.force_map import off_in_table, size_in_table
+    from pam_actuation.rig_files.force_map import (
+        off_in_table, size_in_table, unknown_in_table)
     from pam_actuation.rig_files.questions import ask_description
     from pam_actuation.rig_files.text import rig_file
     from pam_sim.errors import InputError
@@ -112,6 +113,7 @@ def _new(args: argparse.Namespace) -> int:
         described.force_map = table or described.force_map
         if table is not None:
             described.force_map_off = off_in_table(table)
+            described.force_map_unknown = unknown_in_table(table)
         if table is not None and args.muscle is None and not described.dimensions:
             described.dimensions.update(size_in_table(table))
         described.work_out()

@@ -53,6 +53,8 @@ class Description:
         Path of a table that ``pam characterise`` wrote.
     force_map_off : float
         How far it is off the points it was made from, as a fraction of the largest force.
+    force_map_unknown : list of str
+        Sentences on what the table does not know.
     load, valve : str
         As in a rig.
     regulator : str or None
@@ -74,6 +76,7 @@ class Description:
     dimensions: dict[str, float] = field(default_factory=dict)
     force_map: str | None = None
     force_map_off: float = 0.0
+    force_map_unknown: list[str] = field(default_factory=list)
     load: str = 'hanging_mass'
     valve: str = 'ppr'
     regulator: str | None = None

@@ -28,6 +28,7 @@ from pam_sim.muscle.lookup_table import COLUMNS, read_commented_csv, read_table
 _SIZE = re.compile(r'^muscle of length (\d+(?:\.\d+)?) mm(?:, bore (\d+(?:\.\d+)?) mm)?', re.M)
 
 _OFF = re.compile(r'^force of the table off at the measured points: ([\d.e+-]+) %', re.M)
+_UNKNOWN = re.compile(r'^not known: (.+)$', re.M)
 
 
 def size_in_table(path: str) -> dict[str, float]:
@@ -49,6 +50,11 @@ def off_in_table(path: str) -> float:
     """
     found = _OFF.search(read_commented_csv(path)[1])
     return 0.01 * float(found[1]) if found else 0.0
+
+
+def unknown_in_table(path: str) -> list[str]:
+    """Return what the comments of a table say is not known, as ``pam characterise`` writes it."""
+    return _UNKNOWN.findall(read_commented_csv(path)[1])
 
 
 @contextmanager
@@ -80,7 +86,7 @@ def force_map_of(path: str, length_m: float | None, bore_m: float | None, out: s
     rows, _ = rows_of_text(path)
     if rows and tuple(rows[0]) == COLUMNS:
         read_table(path)
-        yield path, []
+        yield path, unknown_in_table(path)
         return
     # Slow to import, and most rig files need no table.
     from pam_sim.characterise import characterise_table

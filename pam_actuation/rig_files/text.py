@@ -113,6 +113,7 @@ def _muscle(described: Description, force_map: str) -> list[str]:
                   for key, value in data.items()]
     if force_map:
         lines += ['# Force map measured by `pam characterise`; the path counts from this file.',
+                  *(row for text in described.force_map_unknown for row in _comment(text)),
                   'law:', '  name: lookup', f'  table: {_quoted(force_map)}']
     return lines
 

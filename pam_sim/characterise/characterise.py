@@ -236,6 +236,9 @@ def _finish(result: Characterisation) -> None:
             'hysteresis.')
     if result.loads and result.loads[0].load_n > 0.05:
         result.remarks.append('No run had 0 N: that column was extrapolated from the others.')
+    if result.surfaces.unknown:
+        result.remarks.append(result.surfaces.unknown)
+        result.provenance.append(f'not known: {result.surfaces.unknown}')
     moved = result.surfaces.monotone
     if moved['moved']:
         result.remarks.append(

@@ -24,7 +24,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from pam_sim.annotations import FloatArray
+from pam_sim.annotations import BoolArray, FloatArray
 from pam_sim.characterise.fixed_load import by_load, FixedLoad
 from pam_sim.errors import InputError
 from pam_sim.short_repr import short_repr
@@ -33,6 +33,7 @@ from scipy.interpolate import PchipInterpolator
 EDGE_PA = 3e3               # a pressure this far beyond a branch is read at its end
 LIFTED_STRAIN = 1e-4        # contraction from which a load counts as lifted
 STUCK_STRAIN = 5e-3         # branches closer than this are never a stuck muscle
+MOST_STRAIN = 0.43          # threads along the axis: no braided muscle shortens by more
 _SURFACES = ('strain', 'half_distance', 'noise', 'settling', 'reading')
 LEAST = 4                   # points a cubic needs along an axis
 SAME_PA = 1e3               # grid pressures are rounded to this
@@ -211,7 +212,8 @@ def with_no_load(points: Points) -> Points:
 
     Through the three smallest loads where they are lifted; where fewer are, with
     the slope of the next higher pressure. The difference from a straight line, or
-    half of the step, is taken for its uncertainty.
+    half of the step, is taken for its uncertainty. Where no load was lifted, the
+    contraction without one may be anything from 0 to that of the next pressure.
 
     Raises
     ------
@@ -232,16 +234,26 @@ def with_no_load(points: Points) -> Points:
     bend = ((third - second) / (c - b) - (second - first) / (b - a)) / (c - a)
     curve = line + a * b * bend
     extrapolated, doubt = first.copy(), np.zeros_like(first)
-    slope = 0.0
+    slope, most = np.nan, MOST_STRAIN
     for i in range(first.size - 1, -1, -1):
         if third[i] > LIFTED_STRAIN:
             extrapolated[i] = max(curve[i], first[i])
             doubt[i] = abs(curve[i] - line[i])
             slope = (extrapolated[i] - first[i]) / a
-        elif first[i] > LIFTED_STRAIN:
+        elif first[i] > LIFTED_STRAIN and np.isfinite(slope):
             extrapolated[i] = first[i] + a * slope
             doubt[i] = 0.5 * a * slope
+        elif first[i] > LIFTED_STRAIN or points.pressure_gauge_pa[i] > EDGE_PA:
+            doubt[i] = (most - first[i]) / np.sqrt(3.0)
+            continue
+        most = min(most, extrapolated[i] + 2.0 * doubt[i])
     return _replaced(points, np.concatenate([[0.0], load]), (extrapolated, doubt))
+
+
+def not_lifted(points: Points) -> BoolArray:
+    """Return the pressures, shape (P,), at which a muscle under pressure lifted no load."""
+    lifted = points.strain[:, points.load_n > 0.05].max(axis=1) > LIFTED_STRAIN
+    return ~lifted & (points.pressure_gauge_pa > EDGE_PA)
 
 
 def _replaced(

@@ -21,7 +21,8 @@ import numpy as np
 from pam_sim.annotations import FloatArray
 from pam_sim.characterise.dimensions import Dimensions
 from pam_sim.characterise.monotone import monotone_surface
-from pam_sim.characterise.points import load_grid, Points, with_enough_pressures, with_no_load
+from pam_sim.characterise.points import (
+    load_grid, not_lifted, Points, with_enough_pressures, with_no_load)
 from pam_sim.errors import InputError
 from pam_sim.muscle.laws.lookup import Lookup
 from pam_sim.muscle.lookup_table import LookupTable
@@ -58,6 +59,8 @@ class Surfaces:
         where the volume of the muscle is not known.
     monotone : dict
         How many points the monotone fit moved, and how far at most and rms.
+    unknown : str
+        A sentence on pressures at which no load was lifted, '' without any.
 
     """
 
@@ -73,6 +76,7 @@ class Surfaces:
     air_mass_kg: FloatArray | None = None
     pressure_u_pa: FloatArray | None = None
     monotone: dict[str, Any] = field(default_factory=dict)
+    unknown: str = ''
 
     def table(self, source: str = '') -> LookupTable:
         """
@@ -118,7 +122,9 @@ def build_surfaces(
         Fewer than 3 loads, the smallest too far from 0 N, or nothing contracts.
 
     """
+    smallest_n = float(points.load_n[0])
     points = with_enough_pressures(with_no_load(points))
+    unknown = not_lifted(points) & (smallest_n > 0.05)
     loads = load_grid(points.load_n, load_step_n) if loads_n is None else loads_n
     at = np.clip(loads, points.load_n[0], points.load_n[-1])
 
@@ -146,13 +152,26 @@ def build_surfaces(
     mass, pressure_u = _air(points.pressure_gauge_pa, strain, strain_u, dimensions)
     force_strain, force, force_u = _force(
         points.pressure_gauge_pa, loads, strain, strain_u, mass)
+    # The force at rest is at most the load that it does not lift.
+    force_u[unknown] = np.hypot(force_u[unknown], smallest_n / np.sqrt(3.0))
     moved = np.abs(strain - measured) > 10.0 ** -_DIGITS_STRAIN
     return Surfaces(
         points.pressure_gauge_pa, loads, strain, strain_u, parts, half, force_strain, force,
         force_u, mass, pressure_u, {
             'points': int(strain.size), 'moved': int(np.count_nonzero(moved)),
             'largest_strain': float(parts['monotone'].max()),
-            'rms_strain': float(np.sqrt(np.mean(parts['monotone'] ** 2)))})
+            'rms_strain': float(np.sqrt(np.mean(parts['monotone'] ** 2)))},
+        _unknown_text(points.pressure_gauge_pa[unknown], smallest_n))
+
+
+def _unknown_text(pressure: FloatArray, smallest_n: float) -> str:
+    """Return the sentence on pressures at which no load was lifted, '' without any."""
+    if not pressure.size:
+        return ''
+    low, high = (f'{1e-3 * one:.0f}' for one in (pressure.min(), pressure.max()))
+    return (f'At {low if low == high else f"{low} to {high}"} kPa no load was lifted: the force '
+            f'at rest lies between 0 and {smallest_n:.1f} N there, and the table holds 0. Measure '
+            'smaller loads.')
 
 
 def _open_loop(half_distance: FloatArray) -> FloatArray:

@@ -97,6 +97,32 @@ def test_no_load_is_extrapolated_from_a_small_one():
     assert found.surfaces.parts['reading'][:, 0].max() > 1e-5
 
 
+def test_what_no_load_was_lifted_at_is_not_known():
+    loads = np.arange(40.0, 161.0, 40.0)
+    found = characterise_runs(series_of_runs(loads), MUSCLE)
+    surfaces, law = found.surfaces, make_law('sarosi')
+    pressure = surfaces.pressure_gauge_pa
+    truth = contraction_m(pressure, 0.0) / LENGTH_M
+    unlifted = (pressure > 1e3) & (contraction_m(pressure, 40.0) == 0.0)
+    assert unlifted.sum() >= 2
+    assert np.all(np.abs(surfaces.strain[unlifted, 0] - truth[unlifted])
+                  <= 2.0 * surfaces.strain_u[unlifted, 0])
+    assert np.all(surfaces.strain_u[unlifted, 0] > 0.02)
+    assert np.all(surfaces.force_u_n[unlifted, 0] > 20.0)
+    assert np.all(np.abs(surfaces.force_n[unlifted, 0] - law.force_n(pressure[unlifted], 0.0))
+                  <= 2.0 * surfaces.force_u_n[unlifted, 0])
+    low, high = 1e-3 * pressure[unlifted][[0, -1]]
+    said = f'At {low:.0f} to {high:.0f} kPa no load was lifted: the force at rest lies between 0'
+    assert any(line.startswith(said) for line in found.remarks)
+    assert f'not known: {said}' in found.table().source
+    # Without pressure the muscle is at rest.
+    assert surfaces.strain_u[0, 0] < 1e-3
+
+
+def test_loads_that_are_all_lifted_leave_nothing_unknown(found):
+    assert not found.surfaces.unknown and 'not known' not in found.table().source
+
+
 def test_a_load_that_friction_holds_is_left_out():
     runs = series_of_runs(np.arange(10.0, 151.0, 10.0), half_m=1e-3)
     stuck = stepped_run(1.0, half_m=8e-3)

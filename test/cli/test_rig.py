@@ -187,6 +187,22 @@ def test_the_strength_is_known_no_better_than_the_table_holds_its_points(folder,
     assert stated.tolerance['force_map_gain'] == 0.01
 
 
+def test_a_table_says_what_it_does_not_know(folder, capsys):
+    lines = ['pressure_kpa,load_n,contraction_mm']
+    for load_n in (100, 200, 300):
+        lines += [f'{kpa},{load_n},{max(0.0, 0.2 * (kpa - load_n / 2.0)):.2f}'
+                  for kpa in range(0, 401, 25)]
+    (folder / 'lifted.csv').write_text('\n'.join(lines) + '\n')
+    sizes = ('--length-m', '0.4', '--bore-m', '0.02')
+    assert main(['characterise', 'lifted.csv', *sizes, '--out', 'surfaces', '--json']) == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert any(one.startswith('At 25 to 50 kPa no load was lifted') for one in summary['remarks'])
+    new('--force-map', 'surfaces/lookup.csv')
+    said = 'no load was lifted: the force at rest lies between 0 and 100.0 N'
+    assert said in capsys.readouterr().out
+    assert 'At 25 to 50 kPa no load was lifted' in open('made.yaml', encoding='utf-8').read()
+
+
 def test_a_force_map_from_60_kpa_on_gives_no_warning(folder):
     from pam_sim.muscle.laws.lookup import SHIPPED
     lines = (SHIPPED / 'dmsp_5_300.csv').read_text(encoding='utf-8').splitlines(keepends=True)
