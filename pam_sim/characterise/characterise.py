@@ -230,6 +230,7 @@ def _finish(result: Characterisation) -> None:
     if left_out:
         total = left_out + sum(len(one.holds) for one in result.loads)
         result.remarks.append(f'{left_out} of {total} holds had not settled and were left out.')
+        result.remarks += _holes(result.loads, result.surfaces.pressure_gauge_pa)
     if result.loads and not np.all(np.isfinite(result.surfaces.half_distance)):
         result.remarks.append(
             'Some points were measured on one branch only: their uncertainty holds no '
@@ -244,6 +245,20 @@ def _finish(result: Characterisation) -> None:
         result.remarks.append(
             f'{moved["moved"]} of {moved["points"]} points were moved by at most '
             f'{100 * moved["largest_strain"]:.4f} % contraction to make the surface monotone.')
+
+
+def _holes(loads: Sequence[FixedLoad], grid_pa: FloatArray) -> list[str]:
+    """Return what unsettled holds left without a number: pressures of a load, and of all."""
+    remarks = []
+    for one in loads:
+        levels = np.unique([5.0 * round(2e-4 * hold.pressure_gauge_pa) for hold in one.unsettled
+                            if not one.is_held_at(hold.pressure_gauge_pa)])
+        between = [f'{kpa:.0f}' for kpa in levels if np.abs(1e-3 * grid_pa - kpa).min() <= 5.0]
+        missing = [f'{kpa:.0f}' for kpa in levels if f'{kpa:.0f}' not in between]
+        remarks += [f'{one.load_n:.2f} N had no settled hold at {", ".join(kpas)} kPa: {what}.'
+                    for kpas, what in ((between, 'its contraction there is read between others'),
+                                       (missing, 'the table has no row there')) if kpas]
+    return remarks
 
 
 def against_rig(surfaces: Surfaces, rig: Rig) -> dict[str, float | list[list[float]]]:

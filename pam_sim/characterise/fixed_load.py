@@ -28,6 +28,7 @@ from pam_sim.short_repr import short_repr
 from pam_sim.units import GRAVITY_M_PER_S2
 
 HANGING_STRAIN = 2e-3        # from this contraction on, the load certainly hangs on the muscle
+NEAR_PA = 3e3                # holds this close are of one level
 SAME_LOAD_N = 0.5            # closer loads are repetitions of one load
 SCATTER_N, SCATTER = 0.5, 0.02     # a load whose force varies more is not fixed
 
@@ -78,6 +79,11 @@ class FixedLoad:
             for hold in sorted(chosen, key=lambda hold: hold.pressure_gauge_pa)])
         group = np.concatenate([[0], np.cumsum(np.diff(rows[:, 0]) >= 1e3)])
         return np.array([rows[group == k].mean(axis=0) for k in range(group[-1] + 1)]).T
+
+    def is_held_at(self, pressure_gauge_pa: float) -> bool:
+        """Return whether a hold near a gauge pressure [Pa] had settled."""
+        return any(abs(hold.pressure_gauge_pa - pressure_gauge_pa) <= NEAR_PA
+                   for hold in self.holds)
 
 
 def fixed_load(

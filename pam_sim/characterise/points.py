@@ -25,7 +25,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from pam_sim.annotations import BoolArray, FloatArray
-from pam_sim.characterise.fixed_load import by_load, FixedLoad
+from pam_sim.characterise.fixed_load import by_load, FixedLoad, NEAR_PA
 from pam_sim.errors import InputError
 from pam_sim.short_repr import short_repr
 from scipy.interpolate import PchipInterpolator
@@ -79,7 +79,8 @@ def points_of(loads: Sequence[FixedLoad], pressures_pa: FloatArray | None = None
     loads : list of FixedLoad
         Repetitions of one load are put together.
     pressures_pa : array_like, optional
-        Grid, gauge; by default the levels of the first load within the range of all.
+        Grid, gauge; by default the levels within the range of all loads at which half of
+        them or more were settled.
 
     Raises
     ------
@@ -90,16 +91,22 @@ def points_of(loads: Sequence[FixedLoad], pressures_pa: FloatArray | None = None
     loads = by_load(loads)
     grid = _levels(loads) if pressures_pa is None else np.asarray(pressures_pa, dtype=float)
     columns = [_column(one, grid) for one in loads]
-    strain, half, noise, settling = (np.array(part).T for part in zip(*columns))
+    strain, half, noise, settling, reading = (np.array(part).T for part in zip(*columns))
     return Points(grid, np.array([one.load_n for one in loads]),
                   np.array([one.load_u_n for one in loads]), strain, half, noise, settling,
-                  np.zeros_like(strain))
+                  reading)
 
 
 def _levels(loads: Sequence[FixedLoad]) -> FloatArray:
     low = max(min(h.pressure_gauge_pa for h in one.holds) for one in loads)
     high = min(max(h.pressure_gauge_pa for h in one.holds) for one in loads)
     levels = SAME_PA * np.round(loads[0].branch('up')[0] / SAME_PA)
+    # A load may not have settled where most others did.
+    for level in np.unique(np.concatenate([
+            SAME_PA * np.round(one.branch('up')[0] / SAME_PA) for one in loads[1:]])):
+        held = sum(one.is_held_at(level) for one in loads)
+        if 2 * held >= len(loads) and np.abs(levels - level).min() > NEAR_PA:
+            levels = np.append(levels, level)
     levels = np.unique(levels[(levels >= low - EDGE_PA) & (levels <= high + EDGE_PA)])
     levels = np.maximum(levels, 0.0)
     if levels.size < 3:
@@ -110,20 +117,25 @@ def _levels(loads: Sequence[FixedLoad]) -> FloatArray:
 
 
 def _column(
-        one: FixedLoad, grid: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return (mean, half distance, noise, settling) of one load on the grid of pressures."""
+        one: FixedLoad, grid: FloatArray) -> tuple[FloatArray, ...]:
+    """Return (mean, half distance, noise, settling, reading) of one load on the pressures."""
     parts = []
     for name in ('up', 'down'):
         pressure, strain, noise, drift = one.branch(name)
         if pressure.size < 3:
-            parts.append(np.full((3, grid.size), np.nan))
+            parts.append(np.full((4, grid.size), np.nan))
             continue
         at = np.clip(grid, pressure[0], pressure[-1])
         curve = PchipInterpolator(pressure, strain)
         # The mean pressure of a hold is uncertain too; its slope carries it over.
         hold_u = np.mean([hold.pressure_u_pa for hold in one.holds])
         total = np.hypot(np.interp(at, pressure, noise), curve(at, 1) * hold_u)
-        part = np.array([curve(at), total, np.interp(at, pressure, drift)])
+        # Where no hold settled, all between the holds before and after is possible.
+        is_far = np.abs(at[:, None] - pressure).min(axis=1) > NEAR_PA
+        after = np.clip(np.searchsorted(pressure, at), 1, pressure.size - 1)
+        doubt = is_far / np.sqrt(3.0) * np.abs(
+            [strain[after - 1] - curve(at), strain[after] - curve(at)]).max(axis=0)
+        part = np.array([curve(at), total, np.interp(at, pressure, drift), doubt])
         part[:, (grid < pressure[0] - EDGE_PA) | (grid > pressure[-1] + EDGE_PA)] = np.nan
         parts.append(part)
     up, down = parts
@@ -132,7 +144,8 @@ def _column(
     return (np.where(both, 0.5 * (up[0] + down[0]), either[0]),
             np.where(both, 0.5 * (down[0] - up[0]), np.nan),
             np.where(both, 0.5 * np.hypot(up[1], down[1]), either[1]),
-            np.where(both, 0.5 * (up[2] + down[2]), either[2]) / np.sqrt(3.0))
+            np.where(both, 0.5 * (up[2] + down[2]), either[2]) / np.sqrt(3.0),
+            np.where(both, 0.5 * (up[3] + down[3]), np.where(np.isfinite(up[3]), up[3], down[3])))
 
 
 def load_grid(load_n: FloatArray, step_n: float | None = None) -> FloatArray:
@@ -246,6 +259,7 @@ def with_no_load(points: Points) -> Points:
         elif first[i] > LIFTED_STRAIN or points.pressure_gauge_pa[i] > EDGE_PA:
             doubt[i] = (most - first[i]) / np.sqrt(3.0)
             continue
+        doubt[i] = np.hypot(doubt[i], points.reading[i, 0])
         most = min(most, extrapolated[i] + 2.0 * doubt[i])
     return _replaced(points, np.concatenate([[0.0], load]), (extrapolated, doubt))
 

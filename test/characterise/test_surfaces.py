@@ -14,9 +14,14 @@
 
 """Surfaces from recordings: right, honest about their uncertainty, and refused where senseless."""
 
+from dataclasses import replace
+
 import numpy as np
 from pam_sim import load_rig
 from pam_sim.characterise import against_rig, characterise_runs, Dimensions
+from pam_sim.characterise import characterise
+from pam_sim.characterise.fixed_load import fixed_load
+from pam_sim.characterise.points import points_of, with_no_load
 from pam_sim.errors import InputError
 from pam_sim.muscle.registry import make_law
 import pytest
@@ -143,6 +148,44 @@ def test_one_branch_is_enough_and_said():
     assert any('one branch only' in line for line in found.remarks)
     truth = against_rig(found.surfaces, load_rig('dmsp_5_300_hanging_mass'))
     assert truth['rms_percent'] < 0.01
+
+
+def without_settling(one, *levels_pa):
+    """Return a FixedLoad of which the holds at some levels had not settled."""
+    lost = [hold for hold in one.holds
+            if min(abs(hold.pressure_gauge_pa - level) for level in levels_pa) < 3e3]
+    return replace(one, holds=[hold for hold in one.holds if hold not in lost], unsettled=lost)
+
+
+def test_a_load_that_did_not_settle_costs_no_pressure():
+    loads = [fixed_load(run, LENGTH_M) for run in series_of_runs([0.0, 30.0, 60.0, 90.0, 120.0])]
+    whole = points_of(loads)
+    found = points_of([without_settling(loads[0], 200e3, 250e3), *loads[1:]])
+    assert np.array_equal(found.pressure_gauge_pa, whole.pressure_gauge_pa)
+    assert np.array_equal(found.strain[:, 1:], whole.strain[:, 1:])
+    lost = np.isin(found.pressure_gauge_pa, (200e3, 250e3))
+    assert np.all(found.reading[lost, 0] > 1e-4) and np.all(found.reading[~lost] == 0.0)
+    assert np.all(np.abs(found.strain - whole.strain)[lost, 0] < found.reading[lost, 0])
+    # An extrapolation from such a number knows no more than it.
+    runs = [fixed_load(run, LENGTH_M) for run in series_of_runs([5.0, 30.0, 60.0, 90.0])]
+    lifted = with_no_load(points_of([without_settling(runs[0], 200e3), *runs[1:]]))
+    at = int(np.flatnonzero(np.isclose(lifted.pressure_gauge_pa, 200e3))[0])
+    assert lifted.reading[at, 0] > lifted.reading[at, 1] > 1e-3
+    # A pressure at which few loads settled is none of the table.
+    few = points_of([*(without_settling(one, 200e3) for one in loads[:3]), *loads[3:]])
+    assert 200e3 not in few.pressure_gauge_pa
+
+
+def test_the_pressures_that_did_not_settle_are_named(monkeypatch):
+    def lost(run, length_m, *rest):
+        one = fixed_load(run, length_m, *rest)
+        return without_settling(one, 200e3, *([400e3] if one.load_n > 40.0 else [])) if (
+            one.load_n < 10.0 or one.load_n > 40.0) else one
+    monkeypatch.setattr(characterise, 'fixed_load', lost)
+    said = ' '.join(characterise_runs(
+        series_of_runs([0.0, 30.0, 35.0, 40.0, 60.0]), MUSCLE).remarks)
+    assert '0.00 N had no settled hold at 200 kPa: its contraction there is read between' in said
+    assert '60.00 N had no settled hold at 200, 400 kPa: its contraction' in said
 
 
 def test_repetitions_of_a_load_are_put_together():
