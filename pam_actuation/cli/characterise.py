@@ -15,6 +15,7 @@
 """``pam characterise``: lookup surfaces from recordings or tables of static points."""
 
 import argparse
+import math
 from typing import Any, TYPE_CHECKING
 
 from pam_actuation.cli.common import (
@@ -64,6 +65,9 @@ def add_arguments(parser: Parser) -> None:
                         help='length of the muscle at rest, where no rig says it')
     parser.add_argument('--bore-m', type=number(1e-4, 0.2, 'm'), default=None, metavar='M',
                         help='inner diameter at rest, where no rig says it')
+    parser.add_argument('--angle-deg', type=number(6.0, 51.0, 'degrees'), default=None,
+                        metavar='DEG', help='angle between thread and axis at rest, for the air '
+                        'in the muscle (default: of the rig, else 28.6)')
     parser.add_argument('--dead-volume-m3', type=number(0.0, 1.0, 'm^3'), default=None,
                         metavar='M3',
                         help='air beside the muscle (default: of the rig, else 0)')
@@ -160,7 +164,8 @@ def _dimensions(args: argparse.Namespace, runs: 'list[RecordedRun]') -> 'Dimensi
     from pam_sim.characterise import Dimensions
     from pam_sim.errors import InputError
     given = {'length_m': args.length_m, 'bore_m': args.bore_m,
-             'dead_volume_m3': args.dead_volume_m3}
+             'dead_volume_m3': args.dead_volume_m3, 'braid_angle_rad': (
+                 None if args.angle_deg is None else round(math.radians(args.angle_deg), 12))}
     given = {name: value for name, value in given.items() if value is not None}
     text = next((run.metadata['rig'] for run in runs if run.metadata.get('rig')), None)
     if text is not None:

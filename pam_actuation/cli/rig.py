@@ -54,6 +54,9 @@ def add_arguments(parser: Parser) -> None:
                         help='inner diameter at rest')
     parser.add_argument('--angle-deg', type=number(6.0, 51.0, 'degrees'), default=None,
                         metavar='DEG', help='angle between thread and axis at rest')
+    parser.add_argument('--max-strain', type=number(0.05, 0.5), default=None, metavar='SHARE',
+                        help='largest contraction, as a share of the length at rest (default: '
+                        '0.25; with another --angle-deg what the braid allows)')
     parser.add_argument('--force-map', type=source, default=None, metavar='FILE.csv',
                         help='static table of the muscle, as "pam characterise" writes it, or '
                         'force over pressure and length as others measure it')
@@ -109,7 +112,7 @@ def _new(args: argparse.Namespace) -> int:
     described = _described(args)
     if _nothing_said(args) and not args.json and sys.stdin.isatty() and sys.stdout.isatty():
         described = ask_description(read_line, print)
-    with _force_map(args) as (table, remarks):
+    with _force_map(args, described) as (table, remarks):
         described.force_map = table or described.force_map
         if table is not None:
             described.force_map_off = off_in_table(table)
@@ -127,16 +130,14 @@ def _new(args: argparse.Namespace) -> int:
     return EXIT_DONE
 
 
-def _force_map(args: argparse.Namespace
+def _force_map(args: argparse.Namespace, described: 'Description'
                ) -> 'AbstractContextManager[tuple[str | None, list[str]]]':
     """Return the context of (table of the force map or None, what a reader should know)."""
     from contextlib import nullcontext
     from pam_actuation.rig_files.force_map import force_map_of
     if args.force_map is None:
         return nullcontext((None, []))
-    length_m, bore_m = (None if mm is None else round(1e-3 * mm, 12)
-                        for mm in (args.length_mm, args.bore_mm))
-    return force_map_of(args.force_map, length_m, bore_m, args.out, args.overwrite)
+    return force_map_of(args.force_map, described.dimensions, args.out, args.overwrite)
 
 
 def _following(rig: 'Rig', out: str) -> str:
@@ -147,8 +148,8 @@ def _following(rig: 'Rig', out: str) -> str:
 
 
 def _nothing_said(args: argparse.Namespace) -> bool:
-    said = (args.muscle, args.length_mm, args.bore_mm, args.angle_deg, args.force_map,
-            args.regulator, args.regulator_volts, args.regulator_kpa)
+    said = (args.muscle, args.length_mm, args.bore_mm, args.angle_deg, args.max_strain,
+            args.force_map, args.regulator, args.regulator_volts, args.regulator_kpa)
     return (all(one is None for one in said) and not (args.known or args.about or args.unknown)
             and args.load == 'hanging_mass' and args.valve == 'ppr')
 
@@ -166,7 +167,8 @@ def _described(args: argparse.Namespace) -> 'Description':
     if args.muscle is not None:
         get_muscle(args.muscle)
     for name, value, factor in (('length_m', args.length_mm, 1e-3), ('bore_m', args.bore_mm, 1e-3),
-                                ('braid_angle_rad', args.angle_deg, math.pi / 180.0)):
+                                ('braid_angle_rad', args.angle_deg, math.pi / 180.0),
+                                ('max_strain', args.max_strain, 1.0)):
         if value is not None:
             found.dimensions[name] = round(value * factor, 12)
     found.force_map = args.force_map

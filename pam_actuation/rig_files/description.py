@@ -20,7 +20,8 @@ from typing import Any
 
 from pam_actuation.rig_files.numbers import Stated
 from pam_sim.errors import InputError
-from pam_sim.muscle.geometry import BORE_M as NOMINAL_BORE_M
+from pam_sim.muscle.geometry import (
+    BORE_M as NOMINAL_BORE_M, BRAID_ANGLE_RAD, most_strain)
 from pam_sim.muscle.muscle import DIMENSIONS, get_muscle, muscle_names
 from pam_sim.parameters import Parameter
 from pam_sim.rig_parameters import rig_parameters
@@ -102,6 +103,9 @@ class Description:
             A dimension or number out of range, or one that was said twice.
 
         """
+        angle_rad = self.dimensions.get('braid_angle_rad')
+        if angle_rad is not None and angle_rad != BRAID_ANGLE_RAD:
+            self.dimensions.setdefault('max_strain', round(most_strain(angle_rad), 3))
         for dimension in DIMENSIONS:
             if dimension.name in self.dimensions:
                 dimension.check(self.dimensions[dimension.name], 'muscle')

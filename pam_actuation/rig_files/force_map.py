@@ -14,32 +14,40 @@
 
 """The table of a force map for a rig file: as it is, or made from what others measured."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+import math
 import os
 import re
 
 from pam_actuation.tables.separated import rows_of_text
 from pam_sim.errors import InputError
 from pam_sim.files import check_file
+from pam_sim.muscle.geometry import BRAID_ANGLE_RAD
 from pam_sim.muscle.lookup_table import COLUMNS, read_commented_csv, read_table
 
 
 _SIZE = re.compile(r'^muscle of length (\d+(?:\.\d+)?) mm(?:, bore (\d+(?:\.\d+)?) mm)?', re.M)
 
 _OFF = re.compile(r'^force of the table off at the measured points: ([\d.e+-]+) %', re.M)
+_ANGLE = re.compile(r'inextensible braid of (\d+(?:\.\d+)?) degrees')
+
 _UNKNOWN = re.compile(r'^not known: (.+)$', re.M)
 
 
 def size_in_table(path: str) -> dict[str, float]:
     """
-    Return ``length_m`` and ``bore_m`` of the muscle as far as the comments of a table say them.
+    Return length, bore and angle of the muscle as far as the comments of a table say them.
 
     ``pam characterise`` writes them; a table of another source gives an empty dict.
     """
-    found = _SIZE.search(read_commented_csv(path)[1])
+    source = read_commented_csv(path)[1]
+    found, angle = _SIZE.search(source), _ANGLE.search(source)
     sizes = zip(('length_m', 'bore_m'), found.groups() if found else ())
-    return {name: round(1e-3 * float(mm), 12) for name, mm in sizes if mm is not None}
+    size = {name: round(1e-3 * float(mm), 12) for name, mm in sizes if mm is not None}
+    if angle is not None and abs(float(angle[1]) - math.degrees(BRAID_ANGLE_RAD)) > 0.05:
+        size['braid_angle_rad'] = round(math.radians(float(angle[1])), 12)
+    return size
 
 
 def off_in_table(path: str) -> float:
@@ -58,8 +66,8 @@ def unknown_in_table(path: str) -> list[str]:
 
 
 @contextmanager
-def force_map_of(path: str, length_m: float | None, bore_m: float | None, out: str,
-                 overwrite: bool) -> Iterator[tuple[str, list[str]]]:
+def force_map_of(path: str, size: Mapping[str, float], out: str, overwrite: bool
+                 ) -> Iterator[tuple[str, list[str]]]:
     """
     Give (path of the table the muscle law ``lookup`` reads, what a reader should know of it).
 
@@ -70,8 +78,8 @@ def force_map_of(path: str, length_m: float | None, bore_m: float | None, out: s
     ----------
     path : str
         A table of ``pam characterise``, or one measured by others.
-    length_m, bore_m : float or None
-        Size of the muscle at rest; the length is needed for a table measured by others.
+    size : dict of str to float
+        Dimensions that are stated; length and bore are needed for a table measured by others.
     out : str
         The rig file.
     overwrite : bool
@@ -93,12 +101,13 @@ def force_map_of(path: str, length_m: float | None, bore_m: float | None, out: s
     from pam_sim.characterise.dimensions import Dimensions
     from pam_sim.characterise.tables import read_measured_table
     measured = read_measured_table(path, rows_of_text)
-    if length_m is None or bore_m is None:
+    if not {'length_m', 'bore_m'} <= size.keys():
         raise InputError('a table measured by others needs --length-mm and --bore-mm, the size of '
                          'the muscle at rest', path)
     table_path = f'{os.path.splitext(out)[0]}_force_map.csv'
     check_file(table_path, overwrite)
-    found = characterise_table(measured, Dimensions(length_m, bore_m))
+    found = characterise_table(measured, Dimensions(**{
+        name: value for name, value in size.items() if name != 'max_strain'}))
     there = os.path.exists(table_path)
     found.table().write_csv(check_file(table_path, overwrite))
     try:

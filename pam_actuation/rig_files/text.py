@@ -25,7 +25,7 @@ from pam_sim.load import LOADS
 from pam_sim.located_yaml import load_yaml
 from pam_sim.model_file import load_rig
 from pam_sim.muscle.law import ExtrapolationWarning
-from pam_sim.muscle.muscle import get_muscle, MUSCLE_PARAMETERS
+from pam_sim.muscle.muscle import DIMENSIONS, get_muscle, MUSCLE_PARAMETERS
 from pam_sim.parameters import Parameter
 from pam_sim.sensors import SENSOR_PARAMETERS, ZEROS
 from pam_sim.tolerance import AbsoluteSd, Tolerance, UNKNOWN, WORD
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from pam_sim.rig import Rig
 
 WIDTH = 96
+END = next(one for one in DIMENSIONS if one.name == 'max_strain')
 HEAD = """\
 A rig: SI units, pressures absolute unless the name says gauge. A line that begins with `#`
 before a name holds the nominal number; remove the `#` to state another.
@@ -111,6 +112,8 @@ def _muscle(described: Description, force_map: str) -> list[str]:
         lines.append('muscle:')
         lines += [f'  {key}: {value!r}' if isinstance(value, float) else f'  {key}: {value}'
                   for key, value in data.items()]
+        if END.name not in data:
+            lines.append(_line(END, END.default, True))
     if force_map:
         lines += ['# Force map measured by `pam characterise`; the path counts from this file.',
                   *(row for text in described.force_map_unknown for row in _comment(text)),

@@ -38,6 +38,11 @@ def braid(length_m: float = LENGTH_M, bore_m: float = BORE_M,
             length_m * math.tan(angle_rad) / (math.pi * bore_m))
 
 
+def most_strain(angle_rad: float) -> float:
+    """Return the contraction (fraction) at which the volume is largest and no pressure pulls."""
+    return 1.0 - 1.0 / (math.sqrt(3.0) * math.cos(angle_rad))
+
+
 def volume_of(contraction_m: Number, length_m: float, thread_squared_m2: float,
               inverse_4_pi_n2: float) -> Number:
     """

@@ -15,6 +15,7 @@
 """``pam rig``: a described rig becomes a file that loads, simulates and says what is known."""
 
 import json
+import math
 import os
 import pty
 import re
@@ -185,6 +186,33 @@ def test_the_strength_is_known_no_better_than_the_table_holds_its_points(folder,
     stated = new('--force-map', 'rough/lookup.csv', '--about', 'force_map_gain=1±1%',
                  '--overwrite')
     assert stated.tolerance['force_map_gain'] == 0.01
+
+
+def test_a_braid_of_another_angle_shortens_by_more(capsys):
+    rig = new('--length-mm', '400', '--bore-mm', '20', '--angle-deg', '25')
+    assert rig.muscle.max_strain == pytest.approx(0.363)
+    stated = new('--length-mm', '400', '--bore-mm', '20', '--angle-deg', '25', '--max-strain',
+                 '0.3', '--overwrite')
+    assert stated.muscle.stroke_m == pytest.approx(0.12)
+    assert new('--length-mm', '400', '--overwrite').muscle.max_strain == 0.25
+    assert '# max_strain: 0.25' in open('made.yaml', encoding='utf-8').read()
+
+
+def test_the_angle_of_the_braid_goes_into_table_and_rig(folder, capsys):
+    lines = ['pressure_kpa,load_n,contraction_mm']
+    for load_n in (0, 100, 200, 300):
+        lines += [f'{kpa},{load_n},{max(0.0, 0.2 * (kpa - load_n / 2.0)):.2f}'
+                  for kpa in range(0, 401, 25)]
+    (folder / 'lifted.csv').write_text('\n'.join(lines) + '\n')
+    assert main(['characterise', 'lifted.csv', '--length-m', '0.4', '--bore-m', '0.02',
+                 '--angle-deg', '25', '--out', 'surfaces', '--json']) == 0
+    assert 'braid of 25.0 degrees' in capsys.readouterr().out
+    rig = new('--force-map', 'surfaces/lookup.csv')
+    assert rig.muscle.braid_angle_rad == pytest.approx(math.radians(25.0))
+    # What others measured is characterised with the angle that is stated.
+    rig = new('--force-map', 'lifted.csv', '--length-mm', '400', '--bore-mm', '20',
+              '--angle-deg', '25', '--overwrite')
+    assert 'braid of 25.0 degrees' in open('made_force_map.csv', encoding='utf-8').read()
 
 
 def test_a_table_says_what_it_does_not_know(folder, capsys):
