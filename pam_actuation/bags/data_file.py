@@ -131,6 +131,24 @@ class DataFile:
         self._synced = self.mcap.offset
         return os.dup(self._stream.fileno())
 
+    @property
+    def removed(self) -> bool:
+        """Tell whether somebody deleted the file: what is in it goes when it is closed."""
+        return not self._stream.closed and os.fstat(self._stream.fileno()).st_nlink == 0
+
+    @property
+    def loss(self) -> str:
+        """Return what happened to a file that is not in its place any more, else ''."""
+        if self.removed:
+            return 'the file was removed while it was recorded, and all in it is lost'
+        try:
+            os.stat(self.path)
+        except (FileNotFoundError, NotADirectoryError):
+            return 'the file was moved while it was recorded, and ends early where it is now'
+        except OSError:
+            pass                    # it may be there, and can be written
+        return ''
+
     def finish(self) -> None:
         """Write the index and close."""
         self.mcap.finish()
@@ -143,7 +161,7 @@ class DataFile:
             self._truncate()
             self.mcap.close_chunk()
         self._truncate()
-        in_file = self.mcap.counts
+        in_file = {} if self.removed else self.mcap.counts
         self.count = sum(in_file.values())
         self.start_ns, self.end_ns = self.mcap.span_ns
         return {name: in_file.get(channel, 0) for name, channel in self._channels.items()}

@@ -14,6 +14,7 @@
 
 """What a recorder asks of the operating system: whole writes, a lock, data on the disk."""
 
+import errno
 import os
 from typing import BinaryIO
 
@@ -23,6 +24,8 @@ try:
     import fcntl
 except ImportError:             # not on Windows: there only offline bags are written
     fcntl = None    # type: ignore[assignment]  # a module that Windows lacks
+
+FULL = (errno.ENOSPC, errno.EDQUOT)         # where more room helps
 
 
 def write_all(stream: BinaryIO, data: bytes) -> None:

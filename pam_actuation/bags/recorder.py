@@ -309,6 +309,7 @@ class RecorderCore:
         self._ended.set()
         self._syncing.join()
         try:
+            self._look()
             if self.write_error:
                 self._count_what_is_kept()
             self._count_what_never_came()
@@ -328,12 +329,21 @@ class RecorderCore:
             str(self._writer.directory), self.counts, self.write_error)
         return self._summary
 
+    def _look(self) -> None:
+        """Fail where somebody removed or moved the bag: the system goes on writing."""
+        loss = self._writer.loss
+        if loss and not self.write_error:
+            self.write_error = f'{self._writer.directory}: {loss}'
+
     def _fail(self, error: Exception) -> None:
+        """Note the first error; the caller has the writer for itself."""
+        self._look()
         if not self.write_error:
             reason = getattr(error, 'strerror', None) or error
-            self.write_error = (
-                f'{self._writer.directory}: writing failed ({reason}); the bag ends early, free '
-                'some space or record elsewhere')
+            advice = ', free some space or record elsewhere' * (
+                getattr(error, 'errno', None) in disk.FULL)
+            self.write_error = (f'{self._writer.directory}: writing failed ({reason}); '
+                                f'the bag ends early{advice}')
 
     def _count_what_is_kept(self) -> None:
         """Take back what was half written; only what is in the file counts as written."""
@@ -375,15 +385,21 @@ class RecorderCore:
             self._write(batch, flush)
 
     def _sync(self) -> None:
-        """Bring what was written onto the disk; a slow one must not hold up the writing."""
+        """
+        Bring what was written onto the disk, and look whether it is still there.
+
+        A slow disk must not hold up the writing.
+        """
         while not self._ended.wait(self._flush_every_s):
             with self._disk:
+                self._look()
                 handle = self._writer.handle_to_sync()
             if handle is not None:
                 try:
                     disk.sync(handle)
                 except OSError as error:
-                    self._fail(error)
+                    with self._disk:
+                        self._fail(error)
                 finally:
                     os.close(handle)
 

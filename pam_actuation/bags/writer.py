@@ -222,6 +222,11 @@ class BagWriter:
         """
         return None if self._current is None else self._current.handle_to_sync()
 
+    @property
+    def loss(self) -> str:
+        """Return what happened to an open file that is not in its place any more, else ''."""
+        return '' if self._current is None else self._current.loss
+
     def replace_nothing(self) -> None:
         """Leave a former bag where it is: this one, not whole, gets another ``directory``."""
         self._whole = False
@@ -256,8 +261,10 @@ class BagWriter:
         if self._closed or self._current is None:
             return
         in_file = self._current.cut()
+        all_lost = self._current.removed and not self._place.folder.exists()
+        before = {} if all_lost else self._in_former_files
         for name, facts in self._topics.items():
-            facts['count'] = self._in_former_files.get(name, 0) + in_file.get(name, 0)
+            facts['count'] = before.get(name, 0) + in_file.get(name, 0)
 
     def abandon(self) -> None:
         """Close the file without an index, after a write error; what is in it stays readable."""

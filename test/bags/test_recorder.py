@@ -16,6 +16,7 @@
 
 import errno
 import io
+import shutil
 import threading
 import time
 
@@ -160,6 +161,73 @@ def test_error_at_close_is_reported(tmp_path, monkeypatch):
     assert 'Input/output error' in summary.write_error
     assert summary.counts[TOPIC].received == 1 == summary.written and not summary.complete
     assert core.receive(TOPIC, payload(1), START_NS, START_NS, 2) is False
+
+
+def written_to(core, number):
+    """Hand messages over until the recorder has written this many, or fails."""
+    deadline, i = time.monotonic() + 20.0, 0
+    while core.counts[TOPIC].written < number:
+        core.receive(TOPIC, payload(i), START_NS + i, START_NS + i, i + 1)
+        time.sleep(0.002)
+        i += 1
+        assert time.monotonic() < deadline
+
+
+def noticed(core):
+    """Return what the recorder says of itself, at the latest after some seconds."""
+    deadline = time.monotonic() + 20.0
+    while not core.write_error and time.monotonic() < deadline:
+        time.sleep(0.01)
+    return core.write_error
+
+
+def test_a_bag_that_is_removed_while_recording_is_noticed(tmp_path):
+    core = recorder_on(BagWriter(tmp_path / 'run', METADATA), flush_every_s=0.02)
+    written_to(core, 20)
+    shutil.rmtree(tmp_path / 'run')
+    assert noticed(core) == (
+        f'{tmp_path / "run"}: the file was removed while it was recorded, and all in it is lost')
+    summary = core.close()
+    assert (summary.written, summary.dropped) == (0, summary.received)
+    assert not (tmp_path / 'run').exists()
+
+
+def test_a_bag_that_is_renamed_while_recording_is_noticed(tmp_path):
+    core = recorder_on(BagWriter(tmp_path / 'run', METADATA), flush_every_s=0.02)
+    written_to(core, 20)
+    (tmp_path / 'run').rename(tmp_path / 'other')
+    assert noticed(core) == (
+        f'{tmp_path / "run"}: the file was moved while it was recorded, and ends early where it '
+        'is now')
+    summary = core.close()
+    assert summary.written >= 20 == len(read_bag(tmp_path / 'other').topics[TOPIC].payloads[:20])
+    assert not (tmp_path / 'run').exists()
+
+
+def test_a_bag_that_is_removed_at_the_last_moment_is_lost(tmp_path):
+    core = recorder_on(BagWriter(tmp_path / 'run', METADATA), flush_every_s=60.0)
+    written_to(core, 20)
+    shutil.rmtree(tmp_path / 'run')
+    summary = core.close()
+    assert 'was removed while it was recorded' in summary.write_error
+    assert summary.written == 0 and not summary.complete
+
+
+def test_room_is_advised_on_a_full_disk_only(tmp_path, monkeypatch):
+    advice = 'free some space or record elsewhere'
+    FullDiskWriter.room = 0
+    core = recorder_on(FullDiskWriter(tmp_path / 'full', METADATA))
+    core.receive(TOPIC, payload(0), START_NS, START_NS, 1)
+    assert core.close().write_error.endswith(advice)
+    writer = BagWriter(tmp_path / 'broken', METADATA)
+    core = recorder_on(writer)
+
+    def refuse(*_):
+        raise OSError(errno.EIO, 'Input/output error')
+
+    monkeypatch.setattr(writer, 'write', refuse)
+    core.receive(TOPIC, payload(0), START_NS, START_NS, 1)
+    assert core.close().write_error.endswith('(Input/output error); the bag ends early')
 
 
 def test_gaps_are_lost_messages(tmp_path):
