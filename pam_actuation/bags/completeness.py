@@ -14,7 +14,7 @@
 
 """How many messages of each topic of a bag are missing, for ``bag_info``."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING
 
 from pam_actuation.bags.losses import (
@@ -42,8 +42,13 @@ def reported_counts(bag: Bag) -> PublishedCounts:
 
 
 def add_counts(info: 'TopicInfo', topic: TopicData, recording: Mapping[str, str],
-               reports: PublishedCounts) -> None:
-    """Enter what recorder and nodes have counted of a topic, and what is lost by that."""
+               reports: PublishedCounts, namespaces: Collection[str]) -> None:
+    """
+    Enter what recorder and nodes have counted of a topic, and what is lost by that.
+
+    Nodes outside the namespaces of the bag, of another bench, come and go as they like: what they
+    said before is nothing that is missing.
+    """
     def recorded(key: str) -> int | None:
         return count_of(recording.get(f'{topic.recorded_name}.{key}', ''))
 
@@ -51,6 +56,8 @@ def add_counts(info: 'TopicInfo', topic: TopicData, recording: Mapping[str, str]
     missed = recorded('missed_at_start')
     if missed is not None:
         info.sent_before = recorded('sent_before') or 0
+        if topic.name == DIAGNOSTICS:
+            info.sent_before = missed - min(missed, reports.missed_reports(namespaces) or 0)
         info.missed_at_start = missed - info.sent_before
     info.published, sent_ns = reports.of(topic.recorded_name)
     info.lost = missing_messages(

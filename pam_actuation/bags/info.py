@@ -34,6 +34,7 @@ from pam_actuation.bags.completeness import (
 from pam_actuation.bags.ending import Ending, ending_of
 from pam_actuation.bags.facts import recorded_rig_title
 from pam_actuation.bags.info_text import render_text
+from pam_actuation.bags.losses import DIAGNOSTICS
 from pam_actuation.bags.markers import markers_of
 from pam_actuation.bags.recorder import RECORDING_RECORD
 from pam_actuation.bags.recover import RECOVERY_RECORD
@@ -203,10 +204,11 @@ def _topic_infos(bag: Bag, remarks: list[str]) -> list[TopicInfo]:
     # Of any other bag nobody knows that it began with the nodes.
     simulated = bool(experiment) and experiment.get('origin') != 'live'
     length_m = cache(lambda: plausibility.recorded_length_m(experiment))
+    places = {name.rpartition('/')[0] for name in bag.topics if name != DIAGNOSTICS}
     infos = []
     for _, topic in sorted(bag.topics.items()):
         info, stamp_ns, values = topic_info(topic, remarks)
-        add_counts(info, topic, recording, published)
+        add_counts(info, topic, recording, published, places)
         if not recording and not simulated:
             count_from_first_report(info, topic, published)
         remarks += loss_remarks(info)

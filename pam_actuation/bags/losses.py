@@ -22,7 +22,7 @@ begin long after the nodes: then the first report of a node in the bag is what c
 """
 
 from array import array
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 from pam_actuation.topics.codec import decode
 from pam_sim.errors import InputError
@@ -107,15 +107,17 @@ class PublishedCounts:
                         self._first.setdefault(status.name, number)
         return topics
 
-    def missed_reports(self) -> int | None:
+    def missed_reports(self, namespaces: Collection[str] = ()) -> int | None:
         """
         Return how many reports on /diagnostics came before the first one of their node.
 
-        A report counts itself. None where nobody counts them.
+        Of the nodes in these namespaces; none given: of all. A report counts itself. None where
+        nobody counts them.
         """
         if not self._first:
             return None
-        return sum(max(number - 1, 0) for number in self._first.values())
+        return sum(max(number - 1, 0) for name, number in self._first.items()
+                   if not namespaces or name.rpartition('/')[0] in namespaces)
 
     def of(self, topic: str) -> tuple[int | None, int]:
         """Return (published, send time of the last report), (None, 0) where nobody reports."""

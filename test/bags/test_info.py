@@ -240,6 +240,28 @@ def test_reports_before_the_recorder_are_told_from_lost_ones(tmp_path):
         assert (counts.lost, counts.missed_at_start) == (1, 3)
 
 
+@pytest.mark.parametrize('node, own', [
+    ('/other/driver', 0), ('/muscle_2/driver', 0), ('/muscle/driver', 400)])
+def test_reports_of_another_bench_before_the_recorder_are_no_loss(tmp_path, node, own):
+    core = RecorderCore(BagWriter(tmp_path / 'run', METADATA))
+    for short in ('pressure', 'diagnostics'):
+        core.add_topic(full_name(short), RECORDED[short].type_name)
+    for i in range(10):
+        now_ns = START_NS + i * STEP_NS
+        core.receive(full_name('pressure'), codec.encode(
+            'pressure', example_messages(i)['pressure']), now_ns, now_ns, i + 1)
+        for name, number in (('/muscle/plant', i + 1), (node, i + 401)):
+            status = messages.Status(now_ns, 0, name, 'ok', (
+                ('published./diagnostics', str(number)),
+                *([('published./muscle/pressure', str(number))] if 'plant' in name else [])))
+            core.receive('/diagnostics', codec.encode('diagnostics', [status]), now_ns, now_ns)
+    core.close()
+    info = bag_info(tmp_path / 'run')
+    assert (info.lost, info.missed_at_start) == (0, own)
+    assert info.complete is (own == 0) and info.topic('/diagnostics').sent_before == 400 - own
+    assert ('400 messages were published before this bag begins.' in info.notes) == (own == 0)
+
+
 @pytest.mark.parametrize('metadata', [{}, {**METADATA, 'origin': 'live'}])
 @pytest.mark.parametrize('lost', [(), (150, 151, 299)])
 def test_a_logger_that_began_after_the_nodes_has_lost_what_is_missing_since(
