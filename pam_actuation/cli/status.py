@@ -75,7 +75,7 @@ def _rows(opened: 'list[Operator]', wait_s: float, asked: str | None) -> list[di
     known = set(executables())
 
     def there(operator: 'Operator') -> set[str]:
-        found = {name for name in operator.statuses if operator.concerns(name)}
+        found = set(operator.statuses)
         found |= {name for name in operator.nodes() if name.rpartition('/')[2] in known}
         return {name for name in found if asked is None or _is_called(name, asked)}
 

@@ -14,7 +14,8 @@
 
 """The session's own ROS node: lifecycle requests out, diagnostics in."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections import deque
+from collections.abc import Callable, Collection, Iterable, Sequence
 from functools import partial
 import os
 import time
@@ -23,6 +24,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import ChangeState, GetState
+from pam_actuation.messages import LEVEL_ERROR
 from pam_actuation.topics.codec import Reader
 from pam_actuation.topics.quality import USUAL
 from pam_actuation.transport import prepare_middleware, RANGE
@@ -43,6 +45,10 @@ LEADS_TO = {'configure': State.PRIMARY_STATE_INACTIVE, 'activate': State.PRIMARY
 # After that the node is asked for its state. An answer is sent once, and is lost where the node
 # does not yet know of its receiver, as on a busy machine.
 LATE_ANSWER_S = 3.0
+# Of each node, and of all; a status may flap for days.
+MOST_CHANGES, MOST_FAULTS = 100, 1000
+
+Change = tuple[float, str, int, str]
 
 
 def local_context(domain_id: int, arguments: Sequence[str] = ()) -> rclpy.Context:
@@ -137,6 +143,8 @@ class RigClient:
         ROS domain; only this machine is looked at.
     name : str
         Of the node, and of its enclave.
+    namespaces : collection of str
+        Only nodes in these are listened to; none given: to all.
 
     Attributes
     ----------
@@ -144,12 +152,14 @@ class RigClient:
         Full node name to (level, message, values) of its last diagnostic status.
     heard_s : dict
         Full node name to the steady time of its last status [s].
-    changes : list of (float, str, int, str)
-        Steady time [s], full node name, level, message of every change.
+    faults : dict
+        ``NODE: MESSAGE`` of the first ``MOST_FAULTS`` errors to the steady time when it was
+        first heard [s].
 
     """
 
-    def __init__(self, domain_id: int, name: str = NAME) -> None:
+    def __init__(self, domain_id: int, name: str = NAME,
+                 namespaces: Collection[str] = ()) -> None:
         context = self.open_context(domain_id, ['--ros-args', '--enclave', f'/{name}'])
         self.node = Node(name, context=context, use_global_arguments=False, enable_rosout=False,
                          start_parameter_services=False)
@@ -158,7 +168,9 @@ class RigClient:
         self._clients: dict[str, Any] = {}
         self.statuses: dict[str, tuple[int, str, dict[str, str]]] = {}
         self.heard_s: dict[str, float] = {}
-        self.changes: list[tuple[float, str, int, str]] = []
+        self.faults: dict[str, float] = {}
+        self._changes: dict[str, deque[Change]] = {}
+        self._namespaces = namespaces
         self._read = Reader('diagnostics')
         # A bare depth is a reliable, volatile subscription to rclpy, as of all topics of the rig.
         self.node.create_subscription(
@@ -168,14 +180,32 @@ class RigClient:
         """Return an open context for the node."""
         return local_context(domain_id, arguments)
 
+    def concerns(self, full_name: str) -> bool:
+        """Tell whether a node is listened to."""
+        return not self._namespaces or full_name.rpartition('/')[0] in self._namespaces
+
     def _on_diagnostics(self, raw: bytes) -> None:
         for status in self._read(raw) or ():
-            known = self.statuses.get(status.name)
-            self.heard_s[status.name] = time.monotonic()
-            if known is None or known[:2] != (status.level, status.message):
-                self.changes.append(
-                    (time.monotonic(), status.name, status.level, status.message))
-            self.statuses[status.name] = (status.level, status.message, dict(status.values))
+            name, level, message = status.name, status.level, status.message
+            if not self.concerns(name):
+                continue
+            now_s, known = time.monotonic(), self.statuses.get(name)
+            self.heard_s[name] = now_s
+            if known is None or known[:2] != (level, message):
+                self._changes.setdefault(name, deque(maxlen=MOST_CHANGES)).append(
+                    (now_s, name, level, message))
+                if level >= LEVEL_ERROR and len(self.faults) < MOST_FAULTS:
+                    self.faults.setdefault(f'{name}: {message}', now_s)
+            self.statuses[name] = (level, message, dict(status.values))
+
+    def changes_since(self, time_s: float) -> list[Change]:
+        """
+        Return what changed in the statuses after a steady time [s], in order.
+
+        Steady time [s], full node name, level and message. The newest ``MOST_CHANGES`` of each
+        node are known.
+        """
+        return sorted(one for kept in self._changes.values() for one in kept if one[0] > time_s)
 
     def spin(self, duration_s: float) -> None:
         """Handle messages for a while."""

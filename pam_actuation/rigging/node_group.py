@@ -22,6 +22,7 @@ still run.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 import shutil
 import tempfile
@@ -85,7 +86,8 @@ class NodeGroup:
             from pam_actuation.rigging.client import RigClient
         except ImportError as error:
             raise InputError(ros_missing(error.name or 'rclpy')) from None
-        self._new_client = RigClient
+        self._new_client = partial(RigClient, namespaces={
+            node.namespace.rstrip('/') for node in nodes.values()})
         self._nodes = dict(sorted(nodes.items(), key=lambda item: ORDER.index(item[1].name)))
         self._folder, self._own_folder = folder, folder is None
         self._lock = DomainLock(domain_id)

@@ -281,9 +281,8 @@ class RigSession:
         result.exit_codes = {name: p.exit_code for name, p in self.processes.items()}
         result.cpu_share = {name: round(share, 3) for name, share in self._cpu.items()
                             if share is not None}
-        result.findings += [
-            f'{name}: {message}' for when, name, level, message in client.changes
-            if level >= LEVEL_ERROR and self.ended_at is not None and when < self.ended_at]
+        result.findings += [text for text, heard_s in client.faults.items()
+                            if self.ended_at is not None and heard_s < self.ended_at]
 
 
 def recorded_counts(bag: StrPath) -> dict[str, int]:

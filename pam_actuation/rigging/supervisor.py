@@ -63,7 +63,7 @@ class Supervisor:
         self._silent: set[str] = set()
         self._unwatched: set[str] = set()       # drivers of which that was told
         self._from_start: set[str] = set()      # not well yet when the nodes became active
-        self._heard = 0
+        self._heard_s = 0.0
 
     def __enter__(self) -> Self:
         """Return the supervisor."""
@@ -114,7 +114,7 @@ class Supervisor:
         silence, looked = Silence(self._group.started.heard_s), begun
         # A driver is not well before the first command; what lasts is told after a second.
         started = self._group.started
-        self._heard = len(started.changes)
+        self._heard_s = begun
         self._from_start = {name for name, (level, *_) in started.statuses.items()
                             if level >= LEVEL_ERROR}
         while deadline is None or time.monotonic() < deadline:
@@ -132,9 +132,10 @@ class Supervisor:
 
     def _hear(self, tell: Callable[[str], None], settled: bool) -> None:
         """Tell which nodes found a fault, or lost it; before ``settled`` only what is new."""
-        statuses, changes = self._group.started.statuses, self._group.started.changes
-        told = [(name, level, message) for _, name, level, message in changes[self._heard:]]
-        self._heard = len(changes)
+        statuses = self._group.started.statuses
+        changes = self._group.started.changes_since(self._heard_s)
+        self._heard_s = changes[-1][0] if changes else self._heard_s
+        told = [(name, level, message) for _, name, level, message in changes]
         if settled:
             told += [(name, *statuses[name][:2]) for name in self._from_start & statuses.keys()]
             self._from_start = set()
@@ -198,8 +199,8 @@ class Supervisor:
 
     def _has_vented(self, name: str) -> bool:
         client = self._group.started
-        said = [message for when, node, _, message in client.changes
-                if node == _watchdog(name) and when > client.heard_s.get(name, 0.0)]
+        said = [message for _, node, _, message in client.changes_since(
+            client.heard_s.get(name, 0.0)) if node == _watchdog(name)]
         return has_vented(self.processes[name], client.statuses.get(name, (0, '', {})),
                           next(filter(None, said), ''))
 

@@ -1,0 +1,110 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a session makes of the health of the nodes on its domain, without any process."""
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from pam_actuation.messages import START_NS, Status                         # noqa: E402, I100
+from pam_actuation.rigging.client import MOST_CHANGES, MOST_FAULTS, RigClient   # noqa: E402
+from pam_actuation.rigging.domain import DomainLock                         # noqa: E402
+from pam_actuation.rigging.node_spec import NodeSpec                        # noqa: E402
+from pam_actuation.rigging.supervisor import Supervisor                     # noqa: E402
+from pam_actuation.topics import codec                                      # noqa: E402
+
+pytestmark = [pytest.mark.ros, pytest.mark.shared]
+
+DRIVER, CONTROLLER = '/left/valve_driver', '/left/sofc_controller'
+
+
+class Rig:
+    """A supervisor of a driver and a controller that were never started, and what it says."""
+
+    def __init__(self):
+        lock = DomainLock()
+        domain_id = lock.domain_id
+        lock.release()
+        self.supervisor = Supervisor(
+            [NodeSpec(name.rpartition('/')[2], '/left', {}) for name in (DRIVER, CONTROLLER)],
+            domain_id)
+        self.group = self.supervisor._group
+        self.client = self.group.client = self.group._new_client(domain_id)
+        self.told = []
+
+    def hear(self, name, level, message, **values):
+        """Take one status from the wire."""
+        self.client._on_diagnostics(codec.encode('diagnostics', [
+            Status(START_NS, level, name, message, tuple(values.items()))]))
+
+    def tell(self):
+        """Return what the supervisor tells of what it heard since."""
+        self.told.clear()
+        self.supervisor._hear(self.told.append, True)
+        return list(self.told)
+
+
+@pytest.fixture
+def rig():
+    found = Rig()
+    yield found
+    found.supervisor.__exit__()
+
+
+def test_faults_of_other_benches_are_neither_told_nor_findings(rig):
+    for other in ('/right/valve_driver', '/left2/valve_driver', '/valve_driver'):
+        rig.hear(other, 2, 'vented because of something')
+    assert rig.tell() == [] == rig.supervisor.faults
+    rig.hear(DRIVER, 2, 'vented because of something')
+    rig.hear('/left/own_program', 2, 'broken')      # in place of a node that was left out
+    assert rig.tell() == rig.supervisor.faults == [
+        f'{DRIVER}: vented because of something', '/left/own_program: broken']
+    rig.hear(DRIVER, 0, 'following the pressure command')
+    assert rig.tell() == [f'{DRIVER} is well again: following the pressure command']
+
+
+def test_messages_of_other_benches_are_not_counted(rig):
+    for name in ('/right/plant_simulator', '/left/plant_simulator'):
+        rig.hear(name, 0, 'ok', **{f'published.{name}': '7'})
+    assert rig.client.published() == {'/left/plant_simulator': 7}
+
+
+def test_what_is_kept_of_a_status_that_flaps_for_days_is_bounded(rig):
+    rig.hear('/left/valve_watchdog', 2, 'vents')
+    for number in range(2 * MOST_FAULTS):
+        rig.hear(DRIVER, 0, 'resuming')
+        rig.hear(DRIVER, 2, f'vented for reason {number}')
+    rig.hear('/left/valve_watchdog', 0, 'hears the driver')
+    kept = rig.client.changes_since(0.0)
+    assert len(kept) == MOST_CHANGES + 2 and kept == sorted(kept)
+    assert [one[1:] for one in kept][-1] == ('/left/valve_watchdog', 0, 'hears the driver')
+    assert (kept[0][1], kept[-2][3]) == (
+        '/left/valve_watchdog', f'vented for reason {2 * MOST_FAULTS - 1}')
+    assert rig.client.changes_since(kept[-2][0]) == kept[-1:]
+    assert len(rig.client.faults) == MOST_FAULTS
+    assert list(rig.client.faults)[:2] == [
+        '/left/valve_watchdog: vents', f'{DRIVER}: vented for reason 0']
+
+
+def test_a_client_of_no_namespaces_listens_to_all():
+    lock = DomainLock()
+    client = RigClient(lock.domain_id)
+    try:
+        client._on_diagnostics(codec.encode('diagnostics', [
+            Status(START_NS, 0, '/any/node', 'ok', ())]))
+        assert set(client.statuses) == {'/any/node'}
+    finally:
+        client.close()
+        lock.release()
