@@ -23,9 +23,12 @@ came to their end.
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+import json
+from pathlib import Path
 from typing import Any
 
 from pam_actuation.messages import LEVEL_ERROR, Status
+from pam_sim.files import StrPath, write_text
 from pam_sim.joint.parameters import SIDES
 from pam_sim.run import Run
 
@@ -88,6 +91,11 @@ class Ending:
                  ENDED: self.ended, BECAUSE: ' '.join(self.because.split()),
                  VENTS: ' '.join(self.vents.split())}
         return {key: text for key, text in found.items() if text}
+
+
+def tell_recorder(folder: StrPath, ended: str, because: str) -> None:
+    """Write down for the recorder, in its ``notes_folder``, why a run ended early."""
+    write_text(Path(folder) / ENDED_FILE, json.dumps({'ended': ended, 'because': because}))
 
 
 def ending_of(metadata: Mapping[str, str] | None) -> Ending:

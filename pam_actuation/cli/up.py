@@ -118,7 +118,7 @@ def run(args: argparse.Namespace) -> int:
         except KeyboardInterrupt:
             pass
         with undisturbed():
-            problems = supervisor.finish()
+            problems = supervisor.finish(failure)
             faults = list(dict.fromkeys(supervisor.faults))
             codes = {name: process.exit_code for name, process in supervisor.processes.items()}
     if not is_up and not failure:

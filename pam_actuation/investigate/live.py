@@ -141,7 +141,7 @@ class LiveRecorder(Recorder):
                     failure = str(error)
                 finally:
                     with undisturbed():
-                        problems = supervisor.finish()
+                        problems = supervisor.finish(failure)
         if failure or problems:
             raise RecordingFailed('; '.join(filter(None, [failure, *problems])))
 

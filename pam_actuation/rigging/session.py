@@ -30,7 +30,8 @@ from pathlib import Path
 import time
 from typing import Self, TYPE_CHECKING
 
-from pam_actuation.bags.ending import ENDED_FILE, ERROR, FINISHED, INTERRUPTED, RECORDED_FILE
+from pam_actuation.bags.ending import (
+    ERROR, FINISHED, INTERRUPTED, RECORDED_FILE, tell_recorder)
 from pam_actuation.drivers.watchdog import VENTS
 from pam_actuation.interrupts import undisturbed
 from pam_actuation.messages import LEVEL_ERROR
@@ -40,7 +41,7 @@ from pam_actuation.rigging.node_spec import NodeSpec
 from pam_actuation.rigging.plan import make_plan, RECORDER, REFERENCE, RigPlan
 from pam_actuation.rigging.transitions import SessionFailed, termination_as_interrupt
 from pam_sim.errors import InputError
-from pam_sim.files import StrPath, write_text
+from pam_sim.files import StrPath
 import yaml
 
 if TYPE_CHECKING:
@@ -248,8 +249,7 @@ class RigSession:
     def _tell_recorder(self, ended: str, because: str) -> None:
         """Write down why the run ended, for the bag; without a word the recorder judges."""
         if ended:
-            write_text(self.plan.folder / ENDED_FILE,
-                       json.dumps({'ended': ended, 'because': because}))
+            tell_recorder(self.plan.folder, ended, because)
 
     def _note_cpu(self) -> None:
         if self._active_since is None:

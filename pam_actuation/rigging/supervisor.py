@@ -17,14 +17,16 @@
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 import os
+import tempfile
 import time
 from typing import Self, TYPE_CHECKING
 
+from pam_actuation.bags.ending import ERROR, FINISHED, tell_recorder
 from pam_actuation.drivers.decision import EMERGENCY_STOP
 from pam_actuation.messages import LEVEL_ERROR
 from pam_actuation.namespaces import node_name_of
 from pam_actuation.rigging.node_group import NodeGroup
-from pam_actuation.rigging.plan import DRIVER, WATCHDOG
+from pam_actuation.rigging.plan import DRIVER, RECORDER, REFERENCE, WATCHDOG
 from pam_actuation.rigging.transitions import SessionFailed
 from pam_actuation.rigging.venting import has_vented, MAY_HOLD, NOT_KNOWN, Silence
 
@@ -54,9 +56,12 @@ class Supervisor:
                  realtime_priority: int = 0) -> None:
         if domain_id is None:
             domain_id = int(os.environ.get('ROS_DOMAIN_ID', '0'))
+        self._notes = tempfile.TemporaryDirectory(prefix='pam_notes_')
         self._group = NodeGroup({
             node_name_of(node.name, node.namespace): replace(node, parameters={
-                'realtime_priority': realtime_priority, **node.parameters, 'autostart': False})
+                'realtime_priority': realtime_priority,
+                **({'notes_folder': self._notes.name} if node.name == RECORDER else {}),
+                **node.parameters, 'autostart': False})
             for node in nodes}, domain_id=domain_id)
         self.faults: list[str] = []
         self._faulty: set[str] = set()
@@ -72,6 +77,7 @@ class Supervisor:
     def __exit__(self, *why: object) -> None:
         """End all processes."""
         self._group.__exit__(*why)
+        self._notes.cleanup()
 
     @property
     def processes(self) -> 'dict[str, NodeProcess]':
@@ -179,9 +185,14 @@ class Supervisor:
             self._unwatched.add(name)
             tell(f'{name}: watchdog of the device: {why}')
 
-    def finish(self) -> list[str]:
+    def finish(self, failure: str = '') -> list[str]:
         """
         Take the nodes down, the last one to come first.
+
+        Parameters
+        ----------
+        failure : str
+            Why the rig does not go on, for the bag; '' where that is the user's wish.
 
         Returns
         -------
@@ -189,13 +200,20 @@ class Supervisor:
             What did not go as it should.
 
         """
-        problems = self._group.stop()
+        problems = self._group.stop(lambda: self._tell_recorder(failure))
         ended = {one.how_it_ended() for one in self.processes.values()}
         return [one for one in problems if one not in ended] + [
             self._how_it_ended(name) for name, one in self.processes.items()
             if one.exit_code != 0] + [
             f'{name}: {NOT_KNOWN}' for name in self._group.of_kind(DRIVER)
             if self._group.was_asked(name) and not self._has_vented(name)]
+
+    def _tell_recorder(self, failure: str) -> None:
+        """Say why the run ended early; not where the experiment is over."""
+        said = [message for name, (_, message, _) in self._group.started.statuses.items()
+                if name.endswith(f'/{REFERENCE}')]
+        if failure and not (said and all(one.startswith(FINISHED) for one in said)):
+            tell_recorder(self._notes.name, ERROR, failure)
 
     def _has_vented(self, name: str) -> bool:
         client = self._group.started

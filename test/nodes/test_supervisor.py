@@ -12,7 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a session makes of the health of the nodes on its domain, without any process."""
+"""What a supervisor makes of the nodes on its domain, without any process."""
+
+import json
+from pathlib import Path
 
 import pytest
 
@@ -27,18 +30,19 @@ from pam_actuation.topics import codec                                      # no
 
 pytestmark = [pytest.mark.ros, pytest.mark.shared]
 
-DRIVER, CONTROLLER = '/left/valve_driver', '/left/sofc_controller'
+DRIVER = '/left/valve_driver'
 
 
 class Rig:
-    """A supervisor of a driver and a controller that were never started, and what it says."""
+    """A supervisor of nodes that were never started, and what it says."""
 
     def __init__(self):
         lock = DomainLock()
         domain_id = lock.domain_id
         lock.release()
         self.supervisor = Supervisor(
-            [NodeSpec(name.rpartition('/')[2], '/left', {}) for name in (DRIVER, CONTROLLER)],
+            [NodeSpec(name, '/left', {}) for name in (
+                'experiment_recorder', 'valve_driver', 'sofc_controller', 'reference_generator')],
             domain_id)
         self.group = self.supervisor._group
         self.client = self.group.client = self.group._new_client(domain_id)
@@ -108,3 +112,18 @@ def test_a_client_of_no_namespaces_listens_to_all():
     finally:
         client.close()
         lock.release()
+
+
+@pytest.mark.parametrize('failure, reference, told', [
+    ('/left/valve_driver: was ended by SIGKILL', 'playing sine', 'error'),
+    ('/left/valve_driver: was ended by SIGKILL', 'finished sine', None),
+    ('', 'playing sine', None)])
+def test_the_recorder_is_told_why_the_rig_failed(rig, monkeypatch, failure, reference, told):
+    notes = Path(rig.group._nodes['/left/experiment_recorder'].parameters['notes_folder'])
+    monkeypatch.setattr(rig.group, 'stop', lambda before_recorder: before_recorder() or [])
+    rig.hear('/left/reference_generator', 0, reference)
+    assert rig.supervisor.finish(failure) == []
+    found = {file.name: json.loads(file.read_text()) for file in notes.iterdir()}
+    assert found == ({'ended.json': {'ended': told, 'because': failure}} if told else {})
+    rig.supervisor.__exit__()
+    assert not notes.exists()
