@@ -195,6 +195,13 @@ class ControllerState:
 LEVEL_OK, LEVEL_WARN, LEVEL_ERROR, LEVEL_STALE = 0, 1, 2, 3      # of a status
 # Of a status: a node that waits to be activated, and one that has not ticked since.
 CONFIGURED, ACTIVE, DEACTIVATED = 'configured, not active', 'active', 'deactivated'
+# Of a controller that followed somebody who fell silent.
+REFERENCE_LOST, EFFORT_LOST = 'reference lost, muscle vented', 'wanted torque lost, muscles vented'
+
+
+def is_fault(level: int, message: str) -> bool:
+    """Tell whether a status is an error, or a controller vented since its reference is lost."""
+    return level >= LEVEL_ERROR or message.startswith((REFERENCE_LOST, EFFORT_LOST))
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,17 +20,17 @@ from typing import Any, TYPE_CHECKING
 from pam_actuation.cli.common import emit, EXIT_DONE, EXIT_FINDING
 from pam_actuation.cli.live import add_live_options, nobody, operators
 from pam_actuation.cli.options import Parser, source
+from pam_actuation.messages import is_fault
 
 if TYPE_CHECKING:
     from pam_actuation.nodes.operator import Operator
 
 HELP = """Show how the running nodes are: level, reason, lost messages; of one node, all values.
 
-Exit code 1: a node reports an error (a driver that vents, for instance), lost a message or
-sent no status."""
+Exit code 1: a node reports an error (a driver that vents, for instance), a controller vented since
+its reference is lost, a node lost a message or sent no status."""
 EXAMPLE = 'pam status valve_driver'
 LEVELS = ('ok', 'WARN', 'ERROR', 'STALE', 'silent')
-WELL = LEVELS[:2]
 SILENT: tuple[int, str, dict[str, str]] = (
     LEVELS.index('silent'), 'sent no status: not active yet, or stopped', {})
 
@@ -64,8 +64,9 @@ def run(args: argparse.Namespace) -> int:
         if args.name is not None:
             text += [f'  {key}: {value}' for key, value in row['values'].items()]
     emit(args, {'schema': 1, 'nodes': rows}, '\n'.join(text))
-    well = all(row['level'] in WELL and not row['lost'] for row in rows)
-    return EXIT_DONE if well else EXIT_FINDING
+    found = any(row['lost'] or is_fault(LEVELS.index(row['level']), row['message'])
+                for row in rows)
+    return EXIT_FINDING if found else EXIT_DONE
 
 
 def _rows(opened: 'list[Operator]', wait_s: float, asked: str | None) -> list[dict[str, Any]]:

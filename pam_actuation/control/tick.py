@@ -25,6 +25,7 @@ from dataclasses import dataclass
 import math
 from typing import Any, NamedTuple, Protocol
 
+from pam_actuation import messages
 from pam_actuation.control.inputs import MAX_AGE_S
 from pam_actuation.control.modes.tracked import JOINT, Tracked, tracked_by
 from pam_actuation.control.reference_buffer import MAX_AHEAD_NS
@@ -49,7 +50,7 @@ REASONS = (
     'contraction is not a finite number',
     'contraction is outside what the muscle can do',
     'no reference yet',
-    'reference lost, muscle vented',
+    messages.REFERENCE_LOST,
     'reference lost, holding its last position',
     'no force measured yet',
     f'force {_OLD}',
@@ -61,7 +62,7 @@ REASONS = (
     f'joint angle {_AHEAD}',
     'joint angle is not a finite number',
     'joint angle is outside what the joint can do',
-    'wanted torque lost, muscles vented',
+    messages.EFFORT_LOST,
     'contraction stands still although the pressure changed: sensor frozen or muscle blocked',
     'force stands still although the pressure changed: sensor frozen',
     'joint angle stands still although the pressures changed: sensor frozen or joint blocked',

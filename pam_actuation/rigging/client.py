@@ -24,7 +24,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import ChangeState, GetState
-from pam_actuation.messages import LEVEL_ERROR
+from pam_actuation.messages import is_fault
 from pam_actuation.topics.codec import Reader
 from pam_actuation.topics.quality import USUAL
 from pam_actuation.transport import prepare_middleware, RANGE
@@ -153,7 +153,7 @@ class RigClient:
     heard_s : dict
         Full node name to the steady time of its last status [s].
     faults : dict
-        ``NODE: MESSAGE`` of the first ``MOST_FAULTS`` errors to the steady time when it was
+        ``NODE: MESSAGE`` of the first ``MOST_FAULTS`` faults to the steady time when it was
         first heard [s].
 
     """
@@ -194,7 +194,7 @@ class RigClient:
             if known is None or known[:2] != (level, message):
                 self._changes.setdefault(name, deque(maxlen=MOST_CHANGES)).append(
                     (now_s, name, level, message))
-                if level >= LEVEL_ERROR and len(self.faults) < MOST_FAULTS:
+                if is_fault(level, message) and len(self.faults) < MOST_FAULTS:
                     self.faults.setdefault(f'{name}: {message}', now_s)
             self.statuses[name] = (level, message, dict(status.values))
 

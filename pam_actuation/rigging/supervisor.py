@@ -23,7 +23,7 @@ from typing import Self, TYPE_CHECKING
 
 from pam_actuation.bags.ending import ERROR, FINISHED, tell_recorder
 from pam_actuation.drivers.decision import EMERGENCY_STOP
-from pam_actuation.messages import LEVEL_ERROR
+from pam_actuation.messages import is_fault
 from pam_actuation.namespaces import node_name_of
 from pam_actuation.rigging.node_group import NodeGroup
 from pam_actuation.rigging.plan import DRIVER, RECORDER, REFERENCE, WATCHDOG
@@ -121,8 +121,8 @@ class Supervisor:
         # A driver is not well before the first command; what lasts is told after a second.
         started = self._group.started
         self._heard_s = begun
-        self._from_start = {name for name, (level, *_) in started.statuses.items()
-                            if level >= LEVEL_ERROR}
+        self._from_start = {name for name, said in started.statuses.items()
+                            if is_fault(*said[:2])}
         while deadline is None or time.monotonic() < deadline:
             started.spin(0.05)
             self._hear(tell, time.monotonic() > begun + SETTLED_S)
@@ -146,12 +146,13 @@ class Supervisor:
             told += [(name, *statuses[name][:2]) for name in self._from_start & statuses.keys()]
             self._from_start = set()
         for name, level, message in told:
-            if name in self._from_start and level >= LEVEL_ERROR:
+            faulty = is_fault(level, message)
+            if name in self._from_start and faulty:
                 continue
             self._from_start.discard(name)
-            if (level >= LEVEL_ERROR) == (name in self._faulty):
+            if faulty == (name in self._faulty):
                 continue
-            if level >= LEVEL_ERROR:
+            if faulty:
                 self._faulty.add(name)
                 tell(f'{name}: {message}')
                 # An emergency stop is somebody's wish.

@@ -91,7 +91,8 @@ class Terminal:
         os.killpg(self._process.pid, signal.SIGINT)
         self._wait(_ENDS_WITHIN_S)
         assert_printed(self.command, f'{self.shown}\n{shown_then}'.rstrip(), self.printed())
-        self._assert_code(self._process.returncode in _INTERRUPTED)
+        finding_is_shown = self._process.returncode == 1 and 'finding: ' in shown_then
+        self._assert_code(finding_is_shown or self._process.returncode in _INTERRUPTED)
 
     def kill(self):
         """End the command with force, but let it vent first."""

@@ -14,6 +14,7 @@
 
 """What the verbs of an operator say of drivers that refuse, hang, or are not there."""
 
+import contextlib
 import json
 import threading
 
@@ -21,7 +22,8 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from pam_actuation.cli.main import main                                     # noqa: E402, I100
+from pam_actuation.cli import status                                        # noqa: E402, I100
+from pam_actuation.cli.main import main                                     # noqa: E402
 from pam_actuation.nodes import operator                                    # noqa: E402
 from pam_actuation.rigging.client import local_context                      # noqa: E402
 from pam_actuation.rigging.domain import DomainLock, domains_in_use         # noqa: E402
@@ -92,6 +94,18 @@ def test_a_node_without_a_status_is_named(domain, capsys):
     code, said = _pam(capsys, 'status', '--domain-id', str(domain))
     assert code == 1 and {one['level'] for one in said['nodes']} == {'silent'}
     assert len(said['nodes']) == 3
+
+
+@pytest.mark.parametrize('level, message, code', [
+    ('WARN', 'reference lost, muscle vented', 1), ('WARN', 'no reference yet', 0), ('ok', '', 0),
+    ('ERROR', 'vented because', 1), ('STALE', '', 1)])
+def test_a_lost_reference_that_vents_is_a_finding_of_the_status(
+        capsys, monkeypatch, level, message, code):
+    row = {'node': '/left/sofc_controller', 'domain_id': 0, 'level': level, 'message': message,
+           'lost': 0, 'values': {}}
+    monkeypatch.setattr(status, 'operators', lambda args: contextlib.nullcontext([]))
+    monkeypatch.setattr(status, '_rows', lambda *_: [row])
+    assert main(['status']) == code
 
 
 @pytest.mark.parametrize('words', [

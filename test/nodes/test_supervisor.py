@@ -79,6 +79,25 @@ def test_faults_of_other_benches_are_neither_told_nor_findings(rig):
     assert rig.tell() == [f'{DRIVER} is well again: following the pressure command']
 
 
+@pytest.mark.parametrize('name, lost, held', [
+    ('/left/sofc_controller', 'reference lost, muscle vented',
+     'reference lost, holding its last position'),
+    ('/left/joint_controller', 'wanted torque lost, muscles vented', 'following')])
+def test_a_lost_reference_that_vents_is_told_and_a_finding(rig, name, lost, held):
+    rig.hear(name, 1, held)
+    assert rig.tell() == []
+    rig.hear(name, 1, f'{lost}; /a and /b send one topic')
+    finding = f'{name}: {lost}; /a and /b send one topic'
+    assert rig.tell() == [finding] == rig.supervisor.faults == list(rig.client.faults)
+    rig.hear(name, 0, 'tracking')
+    assert rig.tell() == [f'{name} is well again: tracking']
+
+
+def test_a_rig_that_waits_for_its_first_reference_is_well(rig):
+    rig.hear('/left/sofc_controller', 1, 'no reference yet')
+    assert rig.tell() == [] == rig.supervisor.faults
+
+
 def test_messages_of_other_benches_are_not_counted(rig):
     for name in ('/right/plant_simulator', '/left/plant_simulator'):
         rig.hear(name, 0, 'ok', **{f'published.{name}': '7'})
