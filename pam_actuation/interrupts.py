@@ -45,6 +45,10 @@ AGAIN_S = 0.005             # until the end of an import
 # Where an exception from outside leaves something half done that is told of later, or never.
 IMPORTING = '<frozen importlib._bootstrap>'
 OWNERS_OF_MEMORY = f'{os.sep}llvmlite{os.sep}'
+# For the way out once everything is safe and told. Fast DDS now and then never comes back from
+# taking its tables down, with the lock of the interpreter held: only the system can end that.
+# https://github.com/eProsima/Fast-DDS/issues/6193
+LEAVE_S = 3.5
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)     # what a node is ended by
 
 
@@ -59,6 +63,53 @@ def leave_at_once(program: str, exit_code: int = EXIT_INTERRUPTED,
 
     for number in numbers:
         signal.signal(number, leave)
+
+
+def leave_within(limit_s: float = LEAVE_S) -> None:
+    """Have the system end this process by SIGALRM after a time; 0: no more."""
+    signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    signal.setitimer(signal.ITIMER_REAL, limit_s)
+
+
+class Closing:
+    """
+    What a program closes last, since that may hang: once its result is told, within ``LEAVE_S``.
+
+    It belongs to the one process that has called ``wait``. Elsewhere, as in a program of somebody
+    else, everything is closed at once.
+    """
+
+    def __init__(self) -> None:
+        self._pid = 0
+        self._waiting: list[Callable[[], object]] = []
+
+    def wait(self) -> None:
+        """Keep what is to be closed until ``end``."""
+        self._pid = os.getpid()
+
+    def close(self, close: Callable[[], object]) -> None:
+        """Close something, now or at the end."""
+        if self._pid == os.getpid():
+            self._waiting.append(close)
+        else:
+            close()
+
+    def now(self) -> None:
+        """Close what waits."""
+        while self._waiting:
+            self._waiting.pop()()
+
+    def end(self) -> None:
+        """Close what waits; the system ends this process where that hangs."""
+        self._pid = 0
+        if self._waiting:
+            atexit.register(leave_within)
+            leave_within()
+            self.now()
+            leave_within(0.0)
+
+
+closing = Closing()
 
 
 def ignore(numbers: Iterable[int] = (signal.SIGINT,)) -> None:

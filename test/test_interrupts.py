@@ -106,6 +106,26 @@ interrupts.end_interrupted()
     assert run(code, tmp_path) == (130, ['cleaned up', 'interrupted'], '')
 
 
+def test_what_may_hang_is_closed_once_the_result_is_told(tmp_path):
+    code = BEGIN + """
+def close(text): interrupts.closing.close(lambda: print(text, flush=True))
+close('at once')
+interrupts.closing.wait()
+if not os.fork():
+    close('in a child')
+    os._exit(0)
+os.wait()
+close('before the next')
+interrupts.closing.now()
+close('last')
+print('result', flush=True)
+interrupts.closing.end()
+close('at once')
+"""
+    assert run(code, tmp_path) == (
+        0, ['at once', 'in a child', 'before the next', 'result', 'last', 'at once'], '')
+
+
 def test_what_was_asked_too_late_does_not_end_the_process(tmp_path):
     """The interpreter gives SIGALRM its deadly default back while it ends."""
     code = BEGIN + """

@@ -75,6 +75,7 @@ def main(argv: list[str] | None = None) -> int:
     if argv is not None:
         return _run_verb(argv)
     interrupts.leave_at_once('pam')
+    interrupts.closing.wait()
     # Modules are no garbage: to look for some while they are imported takes a tenth of the time.
     gc.set_threshold(*GC_THRESHOLD)
     try:
@@ -84,6 +85,8 @@ def main(argv: list[str] | None = None) -> int:
             interrupts.ignore()
     except KeyboardInterrupt:       # while the verb said its last words
         code = interrupts.EXIT_INTERRUPTED
+    finally:
+        interrupts.closing.end()    # the result is out
     if code == interrupts.EXIT_INTERRUPTED:
         interrupts.end_interrupted()
     return code

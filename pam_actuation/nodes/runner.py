@@ -32,6 +32,7 @@ import traceback
 from typing import Any
 
 from pam_actuation import interrupts
+from pam_actuation.interrupts import leave_within
 from pam_actuation.nodes import arguments
 from pam_actuation.nodes.diagnostics import WARN
 from pam_actuation.nodes.managed import ManagedNode
@@ -48,10 +49,6 @@ SAFE_STOP_S = 1.0           # for a device that may hang as the main thread does
 SERVICE_WAIT_S = 0.5        # longest sleep of the thread that answers services
 SERVICE_END_S = 3.0         # for a service that is still being answered at the end
 LONGEST_START_S = 60.0      # compiling at the first start cannot be interrupted
-# For the way out once everything is safe and sent. Fast DDS now and then never comes back from
-# taking its tables down, with the lock of the interpreter held: only the system can end that.
-# https://github.com/eProsima/Fast-DDS/issues/6193
-LEAVE_S = 3.5
 
 
 class _Stopper(threading.Thread):
@@ -101,12 +98,6 @@ def _noted(number: int, frame: object) -> None:
     """Stand in for the default action of a signal; the thread above does the work."""
 
 
-def _leave_within(limit_s: float) -> None:
-    """Have the system end this process by SIGALRM after a time; 0: no more."""
-    signal.signal(signal.SIGALRM, signal.SIG_DFL)
-    signal.setitimer(signal.ITIMER_REAL, limit_s)
-
-
 def run(node_class: type[ManagedNode], args: Sequence[str] | None = None) -> int:
     """
     Run one node as a process.
@@ -127,7 +118,7 @@ def run(node_class: type[ManagedNode], args: Sequence[str] | None = None) -> int
     answered = arguments.answer(node_class.NAME, sys.argv[1:]) if args is None else None
     if answered is not None:
         return answered
-    atexit.register(_leave_within, LEAVE_S)     # what comes after may hang as well
+    atexit.register(leave_within)       # what comes after may hang as well
     stopper = _Stopper()
     try:
         return _run(node_class, args, stopper)
@@ -172,7 +163,7 @@ def _run(node_class: type[ManagedNode], args: Sequence[str] | None, stopper: '_S
         node.finish(why)
         stopper.safe.set()
         code = node.exit_code or node.result_code
-        _leave_within(LEAVE_S)
+        leave_within()
         ended.set()
         executor.wake()
         serving.join(timeout=SERVICE_END_S)
@@ -186,7 +177,7 @@ def _run(node_class: type[ManagedNode], args: Sequence[str] | None, stopper: '_S
         executor.shutdown()
         node.destroy_node()
         rclpy.try_shutdown()
-        _leave_within(0.0)
+        leave_within(0.0)
     return code
 
 

@@ -24,6 +24,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import ChangeState, GetState
+from pam_actuation.interrupts import closing
 from pam_actuation.messages import is_fault
 from pam_actuation.topics.codec import Reader
 from pam_actuation.topics.quality import USUAL
@@ -160,6 +161,7 @@ class RigClient:
 
     def __init__(self, domain_id: int, name: str = NAME,
                  namespaces: Collection[str] = ()) -> None:
+        closing.now()       # of a session before this one
         context = self.open_context(domain_id, ['--ros-args', '--enclave', f'/{name}'])
         self.node = Node(name, context=context, use_global_arguments=False, enable_rosout=False,
                          start_parameter_services=False)
@@ -272,7 +274,10 @@ class RigClient:
         return counts
 
     def close(self) -> None:
-        """Leave the graph."""
+        """Leave the graph; ``pam`` does so once its result is told."""
+        closing.close(self._leave)
+
+    def _leave(self) -> None:
         self.executor.shutdown(timeout_sec=1.0)
         self.node.destroy_node()
         rclpy.try_shutdown(context=self.node.context)

@@ -91,6 +91,29 @@ def test_a_node_ends_in_order_though_the_middleware_hangs(tmp_path):
         lock.release()
 
 
+HANGING_PAM = """
+import ctypes, sys
+import rclpy
+from pam_actuation.cli.main import main
+
+rclpy.try_shutdown = lambda context: ctypes.PyDLL(None).sleep(600)
+sys.exit(main())
+"""
+
+
+def test_pam_tells_its_result_and_leaves_though_the_middleware_hangs(tmp_path):
+    lock = DomainLock()
+    try:
+        done = subprocess.run(
+            [sys.executable, '-c', HANGING_PAM, 'status', '--domain-id', str(lock.domain_id),
+             '--wait', '0.1'], env=node_environment(lock.domain_id, tmp_path),
+            capture_output=True, text=True, timeout=120)
+    finally:
+        lock.release()
+    assert f'no node of a rig found in ROS domain {lock.domain_id}' in done.stderr
+    assert done.returncode == -signal.SIGALRM
+
+
 # As ros2 launch does, which leaves its nodes behind when SIGTERM or SIGKILL ends it.
 LAUNCHER = """
 import subprocess, sys, time
