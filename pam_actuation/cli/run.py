@@ -22,6 +22,7 @@ import time
 
 from pam_actuation.cli.common import (
     add_experiment_options, emit, EXIT_DONE, EXIT_FINDING, load_setup, progress, tell_remarks)
+from pam_actuation.cli.lasting import lasting_output
 from pam_actuation.cli.options import count, EXIT_INTERRUPTED, out_path, Parser
 from pam_actuation.cli.viewed import add_view_option, viewed
 
@@ -43,6 +44,7 @@ def add_arguments(parser: Parser) -> None:
     add_view_option(parser)
 
 
+@lasting_output()
 def run(args: argparse.Namespace) -> int:
     """Run, then say what was recorded; exit code 1 if it did not end as planned."""
     from pam_actuation.rigging.node_template import prepare_template

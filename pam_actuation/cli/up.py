@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 
 from pam_actuation.cli.common import (
     add_other_rig_option, add_overwrite_option, emit, EXIT_DONE, EXIT_FINDING, tell_remarks)
+from pam_actuation.cli.lasting import lasting_output
 from pam_actuation.cli.options import count, number, out_path, Parser, source
 from pam_actuation.cli.viewed import add_view_option, viewed
 from pam_sim.errors import InputError
@@ -73,6 +74,7 @@ def add_arguments(parser: Parser) -> None:
         parser, 'the bag that is there, once the new one is whole; of --policy the file')
 
 
+@lasting_output()
 def run(args: argparse.Namespace) -> int:
     """
     Bring up, watch, take down.
