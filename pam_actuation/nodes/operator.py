@@ -101,13 +101,6 @@ class Operator(RigClient):
         opened = local_context if self._local else context_by_environment
         return opened(domain_id, arguments)
 
-    def nodes(self) -> list[str]:
-        """Return the full names of all nodes known by now, without this one, sorted."""
-        own = self.node.get_fully_qualified_name()
-        names = {f'{namespace.rstrip("/")}/{name}'
-                 for name, namespace in self.node.get_node_names_and_namespaces()}
-        return sorted(name for name in names - {own} if self.concerns(name))
-
     def serving(self, service: str, type_name: str = TRIGGER) -> list[str]:
         """Return the full names of the nodes known to offer a service ``~/service``, sorted."""
         return serving(self.node, self.namespace, service, type_name)

@@ -161,7 +161,6 @@ class RigClient:
 
     def __init__(self, domain_id: int, name: str = NAME,
                  namespaces: Collection[str] = ()) -> None:
-        closing.now()       # of a session before this one
         context = self.open_context(domain_id, ['--ros-args', '--enclave', f'/{name}'])
         self.node = Node(name, context=context, use_global_arguments=False, enable_rosout=False,
                          start_parameter_services=False)
@@ -185,6 +184,13 @@ class RigClient:
     def concerns(self, full_name: str) -> bool:
         """Tell whether a node is listened to."""
         return not self._namespaces or full_name.rpartition('/')[0] in self._namespaces
+
+    def nodes(self) -> list[str]:
+        """Return the full names of all nodes known by now, without this one, sorted."""
+        own = self.node.get_fully_qualified_name()
+        names = {f'{namespace.rstrip("/")}/{name}'
+                 for name, namespace in self.node.get_node_names_and_namespaces()}
+        return sorted(name for name in names - {own} if self.concerns(name))
 
     def _on_diagnostics(self, raw: bytes) -> None:
         for status in self._read(raw) or ():

@@ -25,6 +25,7 @@ from pam_sim.errors import InputError
 
 LOWEST, HIGHEST = 1, 100       # higher ones collide with the ports Linux hands out itself
 PORT_BASE, PORTS_PER_DOMAIN, FIRST_PARTICIPANT = 7400, 250, 10
+PORTS_EACH, PARTICIPANTS = 2, 20        # the first ones may have left
 
 
 class DomainLock:
@@ -65,7 +66,7 @@ class DomainLock:
         handle = _locked(candidate)
         if handle is None:
             return False
-        if not _silent(candidate):
+        if not is_silent(candidate):
             handle.close()
             return False
         self._file = handle
@@ -113,12 +114,13 @@ def domains_in_use() -> list[int]:
     return sorted(found)
 
 
-def _silent(domain_id: int) -> bool:
-    """Tell whether the port that the first participant of a domain listens on is free."""
-    port = PORT_BASE + PORTS_PER_DOMAIN * domain_id + FIRST_PARTICIPANT
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        try:
-            probe.bind(('', port))
-        except OSError:
-            return False
+def is_silent(domain_id: int) -> bool:
+    """Tell whether the ports that participants of a domain listen on first are free."""
+    first = PORT_BASE + PORTS_PER_DOMAIN * domain_id + FIRST_PARTICIPANT
+    for port in range(first, first + PORTS_EACH * PARTICIPANTS, PORTS_EACH):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            try:
+                probe.bind(('', port))
+            except OSError:
+                return False
     return True

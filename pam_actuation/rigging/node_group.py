@@ -30,10 +30,11 @@ import time
 from typing import Self, TYPE_CHECKING
 
 from pam_actuation.control.tick import NOT_MEASURED
-from pam_actuation.interrupts import held, undisturbed
+from pam_actuation.interrupts import closing, held, undisturbed
 from pam_actuation.messages import ACTIVE, CONFIGURED
+from pam_actuation.namespaces import node_name_of
 from pam_actuation.rigging.compile_ahead import compile_ahead
-from pam_actuation.rigging.domain import DomainLock
+from pam_actuation.rigging.domain import DomainLock, is_silent
 from pam_actuation.rigging.node_spec import NodeSpec, ORDER
 from pam_actuation.rigging.node_template import template_for
 from pam_actuation.rigging.plan import DRIVER, RECORDER, REFERENCE
@@ -49,6 +50,7 @@ if TYPE_CHECKING:
 
 INPUTS_TIMEOUT_S = 5.0        # DDS tells of a node again every 3 s
 START_TIMEOUT_S = 150.0       # the first start compiles: two minutes on a small machine
+NAMESAKES_S = 3.5             # participants announce themselves every 3 s
 VENT_S = 0.8                  # for the air, before watchdogs and plant stop
 
 
@@ -90,7 +92,9 @@ class NodeGroup:
             node.namespace.rstrip('/') for node in nodes.values()})
         self._nodes = dict(sorted(nodes.items(), key=lambda item: ORDER.index(item[1].name)))
         self._folder, self._own_folder = folder, folder is None
+        closing.now()       # of a group before this one
         self._lock = DomainLock(domain_id)
+        self._is_shared = not is_silent(self._lock.domain_id)
         self._asked: set[str] = set()           # to become active
         self._uncertain: set[str] = set()       # those that have not answered yet
         self.domain_id = self._lock.domain_id
@@ -147,6 +151,8 @@ class NodeGroup:
         ------
         SessionFailed
             A node ended or refused.
+        InputError
+            A node of the same name runs in the domain.
 
         """
         folder = self._folder or Path(tempfile.mkdtemp(prefix='pam_nodes_'))
@@ -158,6 +164,7 @@ class NodeGroup:
                 template.compile_ahead(compiled)
             # Meanwhile: from here on this process has threads, and leaves forking to the template.
             self.client = self._new_client(self.domain_id)
+            self._refuse_namesakes()
             template.wait_until_compiled(tell)      # what is wrong, the nodes say
             template.wait_until_ready()
         elif compiled:
@@ -185,6 +192,21 @@ class NodeGroup:
             self._uncertain.update(names)
             self.change(names, 'activate')
             self._uncertain.clear()
+
+    def _refuse_namesakes(self) -> None:
+        """
+        Raise InputError where a node of the same name runs.
+
+        Both would answer the same services, and each driver vents where the other one sends.
+        """
+        names = {node_name_of(node.name, node.namespace) for node in self._nodes.values()}
+        deadline = time.monotonic() + (NAMESAKES_S if self._is_shared else 0.0)
+        while time.monotonic() < deadline:
+            self.started.spin(0.1)
+            for name in self.started.nodes():
+                if name in names:
+                    raise InputError(f'is already running in ROS domain {self.domain_id}; end it, '
+                                     'or give another namespace or domain', name)
 
     def _await_inputs(self) -> None:
         """

@@ -25,6 +25,7 @@ pytest.importorskip('rclpy')
 from pam_actuation.cli import status                                        # noqa: E402, I100
 from pam_actuation.cli.main import main                                     # noqa: E402
 from pam_actuation.nodes import operator                                    # noqa: E402
+from pam_actuation.rigging import node_group                                # noqa: E402
 from pam_actuation.rigging.client import local_context                      # noqa: E402
 from pam_actuation.rigging.domain import DomainLock, domains_in_use         # noqa: E402
 import rclpy                                                                # noqa: E402
@@ -121,6 +122,15 @@ def test_where_nobody_is_there_it_is_one_sentence(domain, capsys, words):
 def test_a_node_nearly_right_is_told_with_the_right_one(domain, capsys):
     assert main(['param', 'get', 'valve_drver', 'backend', '--domain-id', str(domain)]) == 2
     assert '(did you mean `valve_driver`?)' in capsys.readouterr().err
+
+
+def test_a_rig_that_runs_already_is_refused_before_any_node_starts(domain, capsys, monkeypatch):
+    monkeypatch.setattr(node_group, 'NAMESAKES_S', 60.0)
+    monkeypatch.setattr(node_group, 'NodeProcess', None)
+    assert main(['up', 'rig', '--namespace', '/refuses', '--domain-id', str(domain)]) == 2
+    out, err = capsys.readouterr()
+    assert (out, err) == ('', f'pam up: /refuses/valve_driver: is already running in ROS domain '
+                          f'{domain}; end it, or give another namespace or domain\n')
 
 
 def test_words_that_are_missing_are_told(capsys):
