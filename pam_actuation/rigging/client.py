@@ -18,6 +18,7 @@ from collections import deque
 from collections.abc import Callable, Collection, Iterable, Sequence
 from functools import partial
 import os
+import re
 import time
 from typing import Any
 
@@ -29,6 +30,7 @@ from pam_actuation.messages import is_fault
 from pam_actuation.topics.codec import Reader
 from pam_actuation.topics.quality import USUAL
 from pam_actuation.transport import prepare_middleware, RANGE
+from pam_sim.errors import InputError
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -76,8 +78,15 @@ def context_by_environment(domain_id: int, arguments: Sequence[str] = ()) -> rcl
 
 def _open(context: rclpy.Context, domain_id: int, arguments: Sequence[str]) -> None:
     prepare_middleware()
-    rclpy.init(context=context, domain_id=domain_id, args=list(arguments),
-               signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        rclpy.init(context=context, domain_id=domain_id, args=list(arguments),
+                   signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as error:
+        refused = re.search("log directory '(.*?)'", str(error))
+        if refused is None:
+            raise
+        raise InputError('ROS cannot write its log files there; name another folder in '
+                         'ROS_LOG_DIR or ROS_HOME', refused[1]) from None
 
 
 class _Asked:

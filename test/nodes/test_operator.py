@@ -16,6 +16,9 @@
 
 import contextlib
 import json
+import os
+import subprocess
+import sys
 import threading
 
 import pytest
@@ -131,6 +134,17 @@ def test_a_rig_that_runs_already_is_refused_before_any_node_starts(domain, capsy
     out, err = capsys.readouterr()
     assert (out, err) == ('', f'pam up: /refuses/valve_driver: is already running in ROS domain '
                           f'{domain}; end it, or give another namespace or domain\n')
+
+
+def test_a_home_folder_that_cannot_be_written_is_one_sentence():
+    environment = {name: text for name, text in os.environ.items()
+                   if name not in ('ROS_LOG_DIR', 'ROS_HOME')}
+    done = subprocess.run(
+        [sys.executable, '-m', 'pam_actuation.cli.main', 'status', '--wait', '0.1'],
+        env={**environment, 'HOME': os.devnull}, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 2 and done.stderr == (
+        f'pam status: {os.devnull}/.ros/log: ROS cannot write its log files there; name another '
+        'folder in ROS_LOG_DIR or ROS_HOME\n')
 
 
 def test_words_that_are_missing_are_told(capsys):
