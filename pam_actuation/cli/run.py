@@ -49,6 +49,7 @@ def run(args: argparse.Namespace) -> int:
     """Run, then say what was recorded; exit code 1 if it did not end as planned."""
     from pam_actuation.rigging.node_template import prepare_template
     prepare_template()
+    from pam_actuation.bags.layout import METADATA_FILE
     from pam_actuation.bags.place import check_bag_target
     from pam_actuation.rigging.session import run_experiment
     from pam_sim.rig_text import rig_title
@@ -64,10 +65,11 @@ def run(args: argparse.Namespace) -> int:
             seed=args.seed, domain_id=domain_id, namespace=args.namespace,
             overwrite=args.overwrite, progress=lambda done, total: bar.update(done - bar.n),
             tell=lambda text: bar.write(f'pam run: {text}', file=sys.stderr))
-    published, recorded = sum(result.published.values()), sum(result.recorded.values())
     # A node that was killed could not report its last count.
-    counted = '' if result.failure else f', {published} published'
-    lines = [f'ran "{experiment.name}" on {rig_title(rig)}, {rig.valve}: {recorded} messages '
+    counted = '' if result.failure else f', {sum(result.published.values())} published'
+    recorded = sum(result.recorded.values())
+    number = 'an unknown number of' if result.bag and not result.recorded else recorded
+    lines = [f'ran "{experiment.name}" on {rig_title(rig)}, {rig.valve}: {number} messages '
              f'recorded{counted}']
     lines += [f'remark: {text}' for text in remarks]
     if result.failure:
@@ -75,8 +77,9 @@ def run(args: argparse.Namespace) -> int:
     lines += [f'finding: {text}' for text in result.findings]
     if result.bag:
         lines.insert(1, f'bag: {result.bag}')
-        lines.append(
-            f'next: pam {"view" if args.view else "report"} {shlex.quote(str(result.bag))}')
+        broke_off = not os.path.exists(os.path.join(result.bag, METADATA_FILE))
+        verb = 'info --recover' if broke_off else 'view' if args.view else 'report'
+        lines.append(f'next: pam {verb} {shlex.quote(str(result.bag))}')
     elif result.stopped:
         lines = ['nothing is recorded']
     emit(args, {

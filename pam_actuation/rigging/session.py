@@ -28,7 +28,7 @@ import json
 import os
 from pathlib import Path
 import time
-from typing import Self, TYPE_CHECKING
+from typing import Any, Self, TYPE_CHECKING
 
 from pam_actuation.bags.ending import (
     ERROR, FINISHED, INTERRUPTED, RECORDED_FILE, tell_recorder)
@@ -78,7 +78,7 @@ class Result:
     findings : list of str
         Errors the nodes reported on the way.
     published, recorded : dict
-        Full topic name to number of messages.
+        Full topic name to number of messages; ``recorded`` is {} of a recorder that was killed.
     exit_codes : dict
         Node to exit code (negative: ended by that signal), each by its place below the
         namespace, such as ``flexor/valve_driver``.
@@ -262,22 +262,26 @@ class RigSession:
             else:
                 self._cpu.pop(name, None)
 
-    def _bag(self, bag: str) -> str:
-        """Return where the recorder put the bag: not in the place of another if ended early."""
-        with contextlib.suppress(OSError, ValueError, KeyError):
-            return str(json.loads((self.plan.folder / RECORDED_FILE).read_text())['path'])
-        return bag
+    def _told_by_recorder(self) -> dict[str, Any]:
+        """Return what the recorder says of the bag, {} where it was killed."""
+        with contextlib.suppress(OSError, ValueError):
+            return dict(json.loads((self.plan.folder / RECORDED_FILE).read_text()))
+        return {}
 
     def fill(self, result: Result) -> None:
         """Enter counts, exit codes and findings into a Result."""
+        told = self._told_by_recorder()
+        result.bag = told.get('path', result.bag)   # of one that ended early, beside a former bag
         if not self.group.was_asked(RECORDER) or not os.path.isdir(result.bag):
             result.bag = ''         # there is none, or only that of an earlier run
         client = self.group.client
         if client is None:
             return
         result.published = client.published()
-        result.bag = self._bag(result.bag)
         result.recorded = recorded_counts(result.bag) if result.bag else {}
+        if not result.recorded:         # the disk refused the end of the bag
+            result.recorded = {name: counts['written']
+                               for name, counts in told.get('topics', {}).items()}
         result.exit_codes = {name: p.exit_code for name, p in self.processes.items()}
         result.cpu_share = {name: round(share, 3) for name, share in self._cpu.items()
                             if share is not None}

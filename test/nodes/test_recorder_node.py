@@ -232,6 +232,7 @@ def test_a_disk_that_refuses_ends_the_experiment_safely_and_keeps_the_record(tmp
     assert driver[1] == 'deactivated'           # with the signal that vents
     recover_bag(bag)
     info = bag_info(bag)
+    assert sum(result.recorded.values()) == info.message_count
     assert info.message_count > 500 and info.complete is False
     for counts in independent_readers(bag).values():
         assert sum(counts.values()) == info.message_count

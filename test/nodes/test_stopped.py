@@ -22,7 +22,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 from pam_actuation.bags.load import load_run                                # noqa: E402, I100
-from pam_actuation.rigging import node_group, session, supervisor           # noqa: E402
+from pam_actuation.rigging import node_group, node_template, session, supervisor    # noqa: E402
 
 pytestmark = pytest.mark.ros
 
@@ -50,6 +50,24 @@ def test_a_run_that_is_stopped_later_names_its_bag(tmp_path, monkeypatch, capsys
     assert err == 'pam run: stopped\n' and 'not completed: stopped by the user' in out
     bag = next(line for line in out.splitlines() if line.startswith('bag: ')).split()[1]
     assert Path(bag) == tmp_path / 'bag' and load_run(bag).topics
+
+
+@pytest.mark.parametrize('recorded, whole, number, verb', [
+    ({}, False, 'an unknown number of', 'info --recover'),
+    ({'/a': 3}, False, '3', 'info --recover'), ({'/a': 3}, True, '3', 'report')])
+def test_a_run_whose_recorder_failed_says_how_much_is_there(
+        recorded, whole, number, verb, tmp_path, monkeypatch, capsys):
+    bag = tmp_path / 'bag'
+    bag.mkdir()
+    if whole:
+        (bag / 'metadata.yaml').touch()
+    monkeypatch.setattr(node_template, 'prepare_template', lambda: None)
+    monkeypatch.setattr(session, 'run_experiment', lambda *_, **__: session.Result(
+        str(bag), failure='experiment_recorder ended', recorded=recorded))
+    assert main(['run', 'short_sine', '--out', str(tmp_path / 'new')]) == 1
+    first, *_, last = capsys.readouterr().out.splitlines()
+    assert first.endswith(f': {number} messages recorded')
+    assert last == f'next: pam {verb} {bag}'
 
 
 def test_to_bring_nodes_up_is_interrupted_and_to_keep_them_up_is_ended(monkeypatch, capsys):
