@@ -52,6 +52,10 @@ _RECOVER = ('or keep that beginning: `pam info --recover` repairs the bag, and i
             'recover=True reads it as it is')
 
 
+class BrokenOff(InputError):
+    """A recording ended early or is damaged; ``recover`` reads what is there."""
+
+
 def _no_times() -> IntArray:
     return np.zeros(0, dtype=np.int64)
 
@@ -242,12 +246,13 @@ def _read_files(path: Path, files: Sequence[Path], storage: str, how: _How,
 
 
 def _scan_mcap(file: Path, plain: Path, keep: Wanted | None, recover: bool) -> McapContent:
-    """Return what a file holds, from its unpacked copy; InputError where it is damaged."""
+    """Return what a file holds, from its unpacked copy; BrokenOff where it is damaged."""
     with open(plain, 'rb') as stream:
         _refuse_foreign(stream.read(len(MAGIC)), file)
         content = scan(stream, keep)
     if content.damage is not None and not (content.message_count and recover):
-        raise InputError(_damage_sentence(content, plain.stat().st_size), file)
+        kind = BrokenOff if content.message_count else InputError
+        raise kind(_damage_sentence(content, plain.stat().st_size), file)
     return content
 
 

@@ -44,13 +44,23 @@ def add_arguments(parser: Parser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print the facts; exit code 1 where messages were lost or remarks were made."""
+    """
+    Print the facts; exit code 1 where messages were lost or remarks were made.
+
+    Of a recording that broke off these are the facts of what is there.
+    """
     from pam_actuation.bags.info import bag_info, render_text
+    from pam_actuation.bags.source import BrokenOff
     recovery = None
     if args.recover and _is_mcap(Path(args.bag)):
         from pam_actuation.bags.recover import recover_bag
         recovery = recover_bag(args.bag)
-    info = bag_info(args.bag, args.recover, args.namespace, args.renamed)
+    try:
+        info = bag_info(args.bag, args.recover, args.namespace, args.renamed)
+    except BrokenOff:
+        info = bag_info(args.bag, True, args.namespace, args.renamed)
+        info.notes.append('Most verbs read this recording once "pam info --recover" has repaired '
+                          'it, or with --recover of their own.')
     types = {topic.name: topic.type_name for topic in info.topics}      # of the whole bag
     if args.namespace is not None:
         from pam_actuation.bags.in_namespace import in_namespace

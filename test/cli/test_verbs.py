@@ -229,9 +229,16 @@ def test_a_mistake_ends_the_process_with_exit_code_2(what, bags, tmp_path):
 def test_a_broken_off_recording_can_still_be_read(bags, tmp_path, capsys):
     whole = next((bags / 'ppr').glob('*.mcap')).read_bytes()
     (tmp_path / 'cut.mcap').write_bytes(whole[:2 * len(whole) // 3])
+    before = (tmp_path / 'cut.mcap').read_bytes()
+    assert pam_here('info', tmp_path / 'cut.mcap', '--json') == 1
+    as_it_is = json.loads(capsys.readouterr().out)
+    assert any('pam info --recover' in note for note in as_it_is['notes'])
+    assert any('cut.mcap ended early' in remark for remark in as_it_is['remarks'])
+    assert (tmp_path / 'cut.mcap').read_bytes() == before
     assert pam_here('info', tmp_path / 'cut.mcap', '--recover', '--json') == 1
     said = json.loads(capsys.readouterr().out)
     assert sum(t['count'] for t in said['topics']) > 500
+    assert [t['count'] for t in as_it_is['topics']] == [t['count'] for t in said['topics']]
 
 
 @pytest.mark.ros
