@@ -25,6 +25,8 @@ from pam_sim.rig import Rig
 from pam_sim.run import Run
 from pam_sim.tolerance import UNKNOWN
 
+FITTED_LATER = 'the look for what is missing fits the force law along with the effects'
+
 
 def numbers_first(runs: Sequence[Run], rig: Rig, holds_certify: bool, seed: int = 0,
                   progress: Callable[[float], object] = lambda done: None
@@ -55,8 +57,8 @@ def numbers_first(runs: Sequence[Run], rig: Rig, holds_certify: bool, seed: int 
     if not others or not all(check_for(run, rig).usable for run in runs):
         return rig, None, []
     try:
-        found = identify_beside(law, [without_dead(run) for run in runs], rig, seed=seed,
-                                progress=progress, spare_certify=holds_certify)
+        found = identify_beside(law, FITTED_LATER, [without_dead(run) for run in runs], rig,
+                                seed=seed, progress=progress, spare_certify=holds_certify)
     except InputError as error:
         return rig, None, [f'The unknown numbers ({", ".join(others)}) were not identified '
                            f'first: {error}.']

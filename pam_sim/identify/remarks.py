@@ -25,6 +25,8 @@ from pam_sim.identify.possible import counted_in
 from pam_sim.identify.result import Found
 from pam_sim.rig import Rig
 
+ANOTHER_LAW = ('muscle and load leave a clear gap with the stated force law. If it was measured '
+               'on another muscle, state it as unknown: pam rig new --unknown law')
 # (problem, signal, mean square in noise floors) of every signal.
 Squares = list[tuple[SubsystemProblem, str, float]]
 
@@ -88,8 +90,7 @@ def of_another_law(rig: Rig, left: Squares) -> list[str]:
     clear = any(p.subsystem == 'muscle' and square > CRITERIA.clear_rest for p, _, square in left)
     if not clear or rig.unknown_of_law:
         return []
-    return ['muscle and load leave a clear gap with the stated force law. If it was measured on '
-            'another muscle, state it as unknown: pam rig new --unknown law']
+    return [ANOTHER_LAW]
 
 
 def _what_shows(number: Number) -> str:

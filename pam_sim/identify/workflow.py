@@ -36,7 +36,7 @@ from pam_sim.identify.possible import (
     in_other_forms, is_incomplete, possible_effects, SEEN_FLOORS2)
 from pam_sim.identify.profile import Interval, profile
 from pam_sim.identify.records import offers_of, problems_of
-from pam_sim.identify.remarks import of_one_scale, remarks_on, Squares
+from pam_sim.identify.remarks import ANOTHER_LAW, of_one_scale, remarks_on, Squares
 from pam_sim.identify.result import Found, half_width, Identification
 from pam_sim.identify.secant import settle, solve_from
 from pam_sim.identify.settled import beside_settled_zero, with_settled_zero
@@ -122,11 +122,10 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
             raise InputError(f'{LAW_AND_EFFECT}; record a force, or let pam gap fit both',
                              'force law')
         found = identify_beside(
-            law, runs, rig, unknown=[name for name in unknown if name not in law],
-            added_kg=added_kg, seed=seed, advise=advise, progress=progress,
-            spare_certify=spare_certify)
-        found.remarks = [*remarks, *found.remarks, f'{", ".join(law)}: as in the model. '
-                         f'{LAW_AND_EFFECT}; pam gap fits both']
+            law, f'{LAW_AND_EFFECT}; pam gap fits both', runs, rig,
+            unknown=[name for name in unknown if name not in law], added_kg=added_kg, seed=seed,
+            advise=advise, progress=progress, spare_certify=spare_certify)
+        found.remarks = [*remarks, *found.remarks]
         return found
     forms: FloatArray = np.zeros(len(acting))       # doubt by the formulation, in coordinates
     if incomplete:
@@ -187,11 +186,18 @@ def _part(progress: Progress, begin: float, end: float) -> Progress:
     return lambda done: progress(begin + (end - begin) * done)
 
 
-def identify_beside(law: Sequence[str], runs: Sequence[Run], rig: Rig, **options: Any
+def identify_beside(law: Sequence[str], why: str, runs: Sequence[Run], rig: Rig, **options: Any
                     ) -> Identification:
-    """Identify the other numbers with coefficients ``law`` as in the model; unknown they stay."""
+    """
+    Identify the other numbers with coefficients ``law`` as in the model; unknown they stay.
+
+    A remark names these coefficients and tells ``why``.
+    """
     found = identify(runs, rig.with_(tolerance=dict.fromkeys(law, 0.0)), **options)
     found.rig = found.rig.with_(tolerance=dict.fromkeys(law, UNKNOWN))
+    if law:
+        found.remarks = [*(one for one in found.remarks if one != ANOTHER_LAW),
+                         f'{", ".join(law)}: as in the model. {why}']
     return found
 
 

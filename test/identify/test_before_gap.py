@@ -53,3 +53,17 @@ def test_without_an_unknown_number_or_with_a_bag_that_cannot_be_used_nothing_is_
     unknown = RIG.with_(tolerance={'mass_kg': UNKNOWN})
     rig, found, remarks = numbers_first([run], unknown, True)
     assert rig == unknown and found is None and remarks == []
+
+
+def test_an_unknown_law_is_held_at_first_and_nobody_is_asked_to_state_it_as_unknown():
+    """The stated law is of another muscle: it leaves a clear gap while it is held."""
+    other = RIG.with_(parameters={'law.a3': 1.5 * RIG.number('law.a3')})
+    run = record(other)
+    given = RIG.with_(tolerance={'law.a3': UNKNOWN, 'spring_n_per_m': UNKNOWN})
+    rig, found, _ = numbers_first([run], given, True)
+    assert [one.number.name for one in found.found] == ['spring_n_per_m']
+    assert 'law.a3' in rig.unknown and not any('--unknown law' in one for one in found.remarks)
+    (held,) = [one for one in found.remarks if one.startswith('law.a3: as in the model')]
+    assert 'fits the force law' in held
+    _, found, _ = numbers_first([run], given.with_(tolerance={'law.a3': 0.0}), True)
+    assert any('--unknown law' in one for one in found.remarks)
