@@ -68,6 +68,9 @@ def test_a_load_on_its_stop_is_one_sentence(real):
     health = check_for(run, nominal())
     assert health.usable and rest.text() in health.remarks
     assert 'the load rests on a stop: the load cell reads 0.1 N of 49.0 N' in rest.text()
+    carried_on = rest_of(run, UNKNOWN_MASS)
+    assert carried_on.weight_n == pytest.approx(53.0, abs=0.5)
+    assert 'reads 0.1 N of about 53 N, by a line through the force' in carried_on.text()
 
 
 @pytest.mark.parametrize('rig', [nominal(), UNKNOWN_MASS])

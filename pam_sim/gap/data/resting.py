@@ -48,6 +48,9 @@ class Rest:
         What the load cell reads there (median), and what the load weighs.
     stamp_ns : numpy.ndarray of int
         Stamps of these samples.
+    is_known : bool
+        Whether the weight is that of a known mass. Else it is the force of the moving load,
+        carried on to zero contraction by a straight line.
 
     """
 
@@ -55,12 +58,15 @@ class Rest:
     force_n: float
     weight_n: float
     stamp_ns: IntArray
+    is_known: bool = True
 
     def text(self) -> str:
         """Return it as a sentence."""
         percent = 100.0 * self.share
+        of = f'{self.weight_n:.1f} N' if self.is_known else (
+            f'about {self.weight_n:.0f} N, by a line through the force of the moving load')
         return (f'in {percent:.{0 if percent >= 1.0 else 1}f} % of the time the load rests on a '
-                f'stop: the load cell reads {self.force_n:.1f} N of {self.weight_n:.1f} N; these '
+                f'stop: the load cell reads {self.force_n:.1f} N of {of}; these '
                 'samples are left out of the force')
 
 
@@ -109,7 +115,7 @@ def rest_of(run: Run, rig: Rig, criteria: Criteria = CRITERIA, added_kg: float =
         return None
     weight = (rig.parameters[MASS] + added_kg) * GRAVITY_M_PER_S2 if known else float(line or 0.0)
     return Rest(float(np.mean(resting)), float(np.median(force[resting])), weight,
-                stamp[resting])
+                stamp[resting], known)
 
 
 def _weight_n(rig: Rig, added_kg: float, criteria: Criteria) -> float | None:
