@@ -31,7 +31,7 @@ from pam_actuation.control.config import load_controller
 from pam_actuation.control.modes.files import preset_for
 from pam_actuation.experiments.experiment import Experiment, load_experiment
 from pam_actuation.experiments.separating import (
-    HIGHEST_GAUGE_PA, LOWEST_GAUGE_PA, sensors_for, simulated)
+    HIGHEST_GAUGE_PA, lowest_gauge_pa, sensors_for, simulated, within_reach)
 from pam_sim.errors import InputError
 from pam_sim.gap.data.health import check_for
 from pam_sim.gap.data.recording import Recording
@@ -188,7 +188,7 @@ def plan(rig: Rig, experiments: Sequence[Experiment] = (), with_force: bool = Tr
     judged = [_judged(e.to_dict(), _some(looked(e.to_dict())), materiality)
               for e in experiments]
     looks = {}
-    for name, segments in pieces(rig.valve).items():
+    for name, segments in pieces(rig.valve, within_reach(rig)).items():
         try:
             looks[name] = looked(_experiment([name], segments, rig, with_force))
         except InputError:
@@ -197,7 +197,7 @@ def plan(rig: Rig, experiments: Sequence[Experiment] = (), with_force: bool = Tr
         raise InputError('can do none of the candidate protocols', rig.name)
     first = _some(next(iter(looks.values())))
     chosen, tried = _best(looks, rig.valve, materiality)
-    plain = _experiment(chosen, _joined(chosen, rig.valve), rig, with_force)
+    plain = _experiment(chosen, _joined(chosen, rig), rig, with_force)
     judged.append(_judged(plain, looked(plain), materiality))
     progress(1.0)
     return Plan(rig, first.signals, {s: noise[s] for s in first.signals}, materiality, judged,
@@ -217,9 +217,9 @@ def _best(looks: Mapping[str, Sensitivities], valve: str,
     return found[ranked.index(max(ranked))], len(found)
 
 
-def pieces(valve: str) -> dict[str, Segments]:
-    """Return name -> segments of the pieces that protocols are made of."""
-    low, high = P_ATM_PA + LOWEST_GAUGE_PA, P_ATM_PA + HIGHEST_GAUGE_PA
+def pieces(valve: str, highest_pa: float = HIGHEST_GAUGE_PA) -> dict[str, Segments]:
+    """Return name -> segments of the pieces that protocols are made of, up to a gauge pressure."""
+    low, high = P_ATM_PA + lowest_gauge_pa(highest_pa), P_ATM_PA + highest_pa
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     band = {'low_pa': low, 'high_pa': high}
     found: dict[str, Segments] = {
@@ -265,11 +265,13 @@ def _length(name: str, valve: str) -> float:
     return load_experiment(dump_yaml(_plain('piece', '', segments, ()))).duration_s
 
 
-def _joined(names: Iterable[str], valve: str) -> Segments:
-    low = P_ATM_PA + LOWEST_GAUGE_PA
+def _joined(names: Iterable[str], rig: Rig) -> Segments:
+    highest_pa = within_reach(rig)
+    low = P_ATM_PA + lowest_gauge_pa(highest_pa)
     found: Segments = []
     for name in names:
-        found += pieces(valve)[name] + [{'ramp': {'to_pa': low, 'duration_s': BETWEEN_S}}]
+        found += [*pieces(rig.valve, highest_pa)[name],
+                  {'ramp': {'to_pa': low, 'duration_s': BETWEEN_S}}]
     return found
 
 
@@ -279,7 +281,8 @@ def _experiment(names: Iterable[str], segments: Segments, rig: Rig,
              *(['force'] if with_force else [])]
     start: Segments = [
         {'rest': {'duration_s': 1.0}},
-        {'ramp': {'to_pa': P_ATM_PA + LOWEST_GAUGE_PA, 'duration_s': START_S - 1.0}}]
+        {'ramp': {'to_pa': P_ATM_PA + lowest_gauge_pa(within_reach(rig)),
+                  'duration_s': START_S - 1.0}}]
     return _plain(NAME, f'Planned for {rig.name} with {rig.valve}: {", ".join(names)}',
                   start + segments, needs)
 

@@ -24,6 +24,7 @@ asked for where none was there and the rivals stay together without it.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+import math
 from pathlib import Path
 import tempfile
 from typing import Any, NamedTuple
@@ -33,6 +34,7 @@ import numpy as np
 from pam_actuation.bags.load import load_run, RecordedRun
 from pam_actuation.control.config import Controller
 from pam_actuation.experiments.experiment import load_experiment
+from pam_actuation.experiments.limits import highest_gauge_pa
 from pam_actuation.experiments.offline import simulate_experiment
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
@@ -53,7 +55,7 @@ from pam_sim.units import P_ATM_PA
 Menu = dict[str, tuple[str, list[dict[str, dict[str, float]]]]]
 Rival = tuple[str, Rig, Hypothesis, FloatArray]     # name, fitted model, hypothesis, parameters
 
-HIGHEST_GAUGE_PA = 550e3     # below the pressure limit of the driver
+HIGHEST_GAUGE_PA = 550e3     # of what a rig gives and recordings held; below the driver's limit
 LOWEST_GAUGE_PA = 200e3      # a hanging mass of 5 kg has left its stop
 NOISE = {'pressure': 300.0, 'contraction': 1e-5, 'force': 0.1}     # where nothing is recorded
 SENSOR_NOISE = {'pressure': 'pressure_noise_pa', 'contraction': 'contraction_noise_m',
@@ -64,9 +66,34 @@ SURE_T = 4.0                 # of a test on simulated data; the rig's own forms 
 SURE_SHARE = 10.0 * CRITERIA.same_form_share
 
 
-def menu(valve: str) -> Menu:
-    """Return name -> (what it shows, segments) of the menu for a valve; all begin at rest."""
-    low, high = P_ATM_PA + LOWEST_GAUGE_PA, P_ATM_PA + HIGHEST_GAUGE_PA
+def lowest_gauge_pa(highest_pa: float) -> float:
+    """Return the lowest pressure [Pa gauge] between moves up to a highest one."""
+    return min(LOWEST_GAUGE_PA, 0.5 * highest_pa)
+
+
+def within_reach(*rigs: Rig, recorded_pa: float = HIGHEST_GAUGE_PA) -> float:
+    """
+    Return the highest pressure [Pa gauge] that a proposed experiment asks for, in whole kPa.
+
+    Parameters
+    ----------
+    rigs : pam_sim.Rig
+        What is known of the rig. Driver, regulator and supply of each must give the pressure.
+    recorded_pa : float
+        The highest that recordings held, Pa gauge; nobody knows whether a muscle bears more.
+
+    """
+    return 1e3 * math.floor(1e-3 * min(
+        HIGHEST_GAUGE_PA, recorded_pa, *(highest_gauge_pa(rig) for rig in rigs)))
+
+
+def menu(valve: str, highest_pa: float = HIGHEST_GAUGE_PA) -> Menu:
+    """
+    Return name -> (what it shows, segments) of the menu for a valve; all begin at rest.
+
+    No piece asks for more than ``highest_pa`` [Pa gauge].
+    """
+    low, high = P_ATM_PA + lowest_gauge_pa(highest_pa), P_ATM_PA + highest_pa
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     band = {'low_pa': low, 'high_pa': high}
     found: Menu = {
@@ -100,7 +127,8 @@ def next_experiment(
         rig: Rig, rivals: Sequence[Rival], recorded: Collection[str],
         noise: Mapping[str, float],
         out_of_time: Callable[[], bool] = lambda: False,
-        pieces: Collection[str] = (), may_add_cell: bool = True) -> dict[str, Any] | None:
+        pieces: Collection[str] = (), may_add_cell: bool = True,
+        recorded_pa: float = HIGHEST_GAUGE_PA) -> dict[str, Any] | None:
     """
     Return the experiment that separates rivals best, as gap.json states it, or None.
 
@@ -120,22 +148,26 @@ def next_experiment(
         What of the menu is tried; all by default.
     may_add_cell : bool
         Whether a load cell that was not recorded may be asked for.
+    recorded_pa : float
+        The highest pressure that the recordings held, Pa gauge; the experiment stays below it.
 
     """
-    known = menu(rig.valve)
+    highest_pa = within_reach(rig, rivals[0][1], recorded_pa=recorded_pa)
+    known = menu(rig.valve, highest_pa)
     found = _tried(rig, rivals, {name: known[name] for name in pieces or known}, recorded, noise,
-                   out_of_time, may_add_cell)
+                   out_of_time, may_add_cell, highest_pa)
     if not found:
         return None
     best = max(found)
     # The rig's own forms blur a part of what is told: the next best piece follows.
     others = [one for one in found if one.name != best.name and one.with_cell == best.with_cell]
-    plain = _experiment(known, [best.name, *([max(others).name] if others else [])])
+    plain = _experiment(
+        known, [best.name, *([max(others).name] if others else [])], highest_pa)
     needs = ['pressure', 'contraction', *(['force'] if best.with_cell else [])]
     names = [rival[0] for rival in rivals]
     text = (f'{plain["description"]}. Run with {names[0]} as the truth, the first part leaves '
             f'{" and ".join(names[1:])} off by {best.sigma:.2g} noise floors per sample after '
-            'refit.')
+            f'refit. The pressure rises to {1e-3 * highest_pa:.0f} kPa gauge at most.')
     if best.with_cell:
         text += ' It needs a load cell, which the recording does not have.'
     return {'name': plain['name'], 'why': text, 'separation_sigma': best.sigma,
@@ -153,8 +185,8 @@ class _Tried(NamedTuple):
 
 
 def _tried(rig: Rig, rivals: Sequence[Rival], pieces: Menu, recorded: Collection[str],
-           noise: Mapping[str, float], out_of_time: Callable[[], bool], may_add_cell: bool
-           ) -> list[_Tried]:
+           noise: Mapping[str, float], out_of_time: Callable[[], bool], may_add_cell: bool,
+           highest_pa: float) -> list[_Tried]:
     """Return how well each piece separates the rivals; one that cannot run is left out."""
     truth = rivals[0][1].with_(sensors=_sensors(noise))
     runs: dict[str, RecordedRun] = {}
@@ -168,7 +200,7 @@ def _tried(rig: Rig, rivals: Sequence[Rival], pieces: Menu, recorded: Collection
                 break
             try:
                 if name not in runs:
-                    runs[name] = simulated(_experiment(pieces, [name]), truth)
+                    runs[name] = simulated(_experiment(pieces, [name], highest_pa), truth)
                 sigma, sure = separation(
                     runs[name], rig, rivals, with_cell or 'force' in recorded)
             except InputError:
@@ -195,9 +227,9 @@ def not_played(valve: str, names: Collection[str]) -> tuple[str, ...]:
     return tuple(piece for piece in menu(valve) if piece not in shown)
 
 
-def _experiment(pieces: Menu, names: Sequence[str]) -> dict[str, Any]:
+def _experiment(pieces: Menu, names: Sequence[str], highest_pa: float) -> dict[str, Any]:
     """Return an experiment as plain data: rest, then pieces of the menu, each from below."""
-    low = {'ramp': {'to_pa': P_ATM_PA + LOWEST_GAUGE_PA, 'duration_s': 1.5}}
+    low = {'ramp': {'to_pa': P_ATM_PA + lowest_gauge_pa(highest_pa), 'duration_s': 1.5}}
     segments: list[dict[str, dict[str, float]]] = [{'rest': {'duration_s': 1.0}}]
     for name in names:
         segments += [low, *pieces[name][1]]

@@ -49,8 +49,9 @@ from pam_sim.files import check_folder, StrPath, whole_files, write_json, write_
 from pam_sim.gap import find_gap
 from pam_sim.gap.data.commanded import all_commanded, commanded
 from pam_sim.gap.data.health import check_for, dead_signals
+from pam_sim.gap.data.pressed import recorded_gauge_pa
 from pam_sim.gap.data.recording import Recording
-from pam_sim.gap.data.signals import recorded_valve
+from pam_sim.gap.data.signals import FIELD, recorded_valve
 from pam_sim.gap.propose.proposal import EFFECT_FILE, MODEL_FILE
 from pam_sim.gap.propose.surrogate import FILE as SURROGATE_FILE
 from pam_sim.gap.select.memory import memories
@@ -141,7 +142,10 @@ def gap_of(runs: 'Sequence[Run]', model: 'StrPath | Rig', certify: 'Run | None' 
             pieces = ('speeds',)
         result.next_experiment = next_experiment(
             rig, result.rivals, tuple(result.signals), result.noise, pieces=pieces,
-            may_add_cell=not any(dead_signals(run) for run in runs) and may_have_cell(rig))
+            may_add_cell=not any(dead_signals(run) for run in runs) and may_have_cell(rig),
+            recorded_pa=recorded_gauge_pa(
+                run['pressure'][FIELD['pressure']]
+                for run in (*runs, *([certify] if certify else []))))
     result.remarks += early_sentences([*runs, *([certify] if certify else [])])
     return result
 

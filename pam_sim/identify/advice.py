@@ -15,13 +15,14 @@
 """Which experiment would determine what the recordings leave open: predicted, not guessed."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 from typing import Any
 
 import numpy as np
 from pam_sim.annotations import FloatArray
 from pam_sim.gap.data.noise import noise_sd
+from pam_sim.gap.data.pressed import recorded_gauge_pa
 from pam_sim.gap.data.signals import FIELD, UNIT
 from pam_sim.gap.subsystems.simulation import pressure_driven
 from pam_sim.gap.verify.uncertainty import NORMAL_95
@@ -33,9 +34,10 @@ from pam_sim.identify.records import Offer, offer_of, problems_of
 from pam_sim.rig import Rig
 from pam_sim.run import Run, Series
 from pam_sim.units import P_ATM_PA
-from pam_sim.valve.ppr import voltage_v
+from pam_sim.valve.ppr import set_point_of, voltage_v
 
 HIGH_PA, LOW_PA = 500e3, 50e3            # gauge
+SAME_HEIGHT = 0.98           # of a pressure; an experiment this near to it goes no higher
 RATE_HZ = 200.0
 TYPICAL_NOISE = {'pressure': 500.0, 'contraction': 2e-5, 'force': 0.2}
 # Neighbouring samples share their error; so many count as one.
@@ -74,11 +76,30 @@ class Proposal:
                 'segments': segments}
 
 
-def proposals(rig: Rig, has_force: bool) -> list[Proposal]:
-    """Return what could be measured on a rig, the least effort first."""
-    up = [LOW_PA + k / 4 * (HIGH_PA - LOW_PA) for k in range(5)]
+def proposals(rig: Rig, has_force: bool, recorded_pa: float) -> list[Proposal]:
+    """
+    Return what could be measured on a rig, the least effort first.
+
+    What goes above the highest pressure that was recorded, ``recorded_pa`` [Pa gauge], comes
+    last and says so. Nothing goes above what the rig gives.
+    """
+    reach_pa = min(HIGH_PA, set_point_of(math.inf, rig.parameters, 0.0) if rig.valve == 'ppr'
+                   else rig.parameters['supply_pa'] - P_ATM_PA)
+    within = _up_to(min(reach_pa, recorded_pa), rig, has_force)
+    if recorded_pa >= SAME_HEIGHT * reach_pa:
+        return within
+    beyond = f' up to {1e-3 * reach_pa:.0f} kPa gauge; the recordings stayed below ' \
+             f'{1e-3 * recorded_pa:.0f} kPa, so make sure that the rig bears it'
+    return within + [replace(one, why=one.why + beyond)
+                     for one in _up_to(reach_pa, rig, has_force)]
+
+
+def _up_to(high_pa: float, rig: Rig, has_force: bool) -> list[Proposal]:
+    """Return what could be measured on a rig up to a gauge pressure."""
+    low_pa = min(LOW_PA, 0.25 * high_pa)
+    up = [low_pa + k / 4 * (high_pa - low_pa) for k in range(5)]
     stairs = tuple((p, 1.5) for p in [*up, *up[-2::-1], 0.0])
-    quick = tuple((p, d) for d in (0.6, 0.3) for p in (LOW_PA, HIGH_PA, 0.5 * HIGH_PA) * 4)
+    quick = tuple((p, d) for d in (0.6, 0.3) for p in (low_pa, high_pa, 0.5 * high_pa) * 4)
     found = [Proposal('stairs', 'a pressure that climbs and falls in steps', stairs),
              Proposal('quick_steps', 'quick steps of the pressure', quick)]
     if not has_force:
@@ -162,7 +183,8 @@ def next_experiment(rig: Rig, wanted: Sequence[Number], acting: Sequence[Number]
     noise = _noise(offers)
     known_before = _narrow(rig, wanted, whole)
     best: tuple[int, Proposal, list[str]] | None = None
-    offered = proposals(rig, has_force)
+    offered = proposals(rig, has_force, recorded_gauge_pa(
+        one.recording.measured['pressure'] for one in offers))
     for done, proposal in enumerate(offered):
         progress(done / len(offered))
         after = _narrow(rig, wanted, whole + _information(rig, wanted, proposal, noise))

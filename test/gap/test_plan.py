@@ -117,7 +117,7 @@ def test_a_name_that_cannot_be_tried_is_told_and_alone_refused(tmp_path, capsys)
 
 def test_the_verb_writes_an_experiment_that_runs(monkeypatch, tmp_path, capsys):
     short, whole = short_experiment(tmp_path), protocols.pieces('ppr')
-    monkeypatch.setattr(protocols, 'pieces', lambda valve: {'slow': whole['slow']})
+    monkeypatch.setattr(protocols, 'pieces', lambda *of: {'slow': whole['slow']})
     done = main(['gap', '--plan', short, '--model', 'dmsp_5_300_hanging_mass',
                  '--effects', 'coulomb_friction,viscous_damping', '--out', str(tmp_path),
                  '--json'])

@@ -19,13 +19,16 @@ import warnings
 from gap_runs import assert_form, nominal, recorded, voltages
 import numpy as np
 from pam_actuation.cli import main as cli_main
-from pam_actuation.experiments import separating
+from pam_actuation.experiments import load_experiment, protocols, separating
 from pam_actuation.report import gap as gap_report
 from pam_sim import load_rig
 from pam_sim.gap import find_gap
 from pam_sim.gap.data.health import check_health, dead_signals, without_dead
+from pam_sim.gap.data.pressed import recorded_gauge_pa
 from pam_sim.gap.result import GapResult
 from pam_sim.gap.select.candidates import candidates, left_out
+from pam_sim.located_yaml import dump_yaml
+from pam_sim.units import P_ATM_PA
 import pytest
 
 NAMES = ['coulomb_friction', 'force_bias']
@@ -118,18 +121,61 @@ def test_the_next_experiment_needs_no_sensor_the_rig_has_not(monkeypatch, may):
     assert ('force' in found['experiment']['needs']) == may
 
 
+def highest_gauge_pa(plain):
+    return load_experiment(dump_yaml(plain)).chain.extremes()[1] - P_ATM_PA
+
+
+def weak():
+    """Return a rig whose regulator gives 500 kPa at most, 494 kPa by the fitted numbers."""
+    numbers = {'K_m': 50e3, 'ppr_highest_v': 10.0}
+    return nominal().with_(parameters=numbers), nominal().with_(
+        parameters={**numbers, 'ppr_zero_pa': -6e3})
+
+
+@pytest.mark.parametrize('rigs, recorded_pa, most_pa', [
+    ((nominal(), nominal()), 600e3, 550e3), ((nominal(), nominal()), 368.4e3, 368e3),
+    ((nominal(), nominal()), 90e3, 90e3), (weak(), 600e3, 494e3)])
+def test_the_next_experiment_stays_below_what_was_recorded_and_the_rig_gives(
+        monkeypatch, rigs, recorded_pa, most_pa):
+    monkeypatch.setattr(separating, 'simulated', lambda plain, rig: plain)
+    monkeypatch.setattr(separating, 'separation', lambda *given: (5.0, 2.0))
+    rivals = [(name, rigs[1], None, ()) for name in ('end_taper', 'bladder_stiffness')]
+    for piece in separating.menu('ppr'):
+        found = separating.next_experiment(rigs[0], rivals, ('pressure', 'contraction'), {},
+                                           pieces=[piece], recorded_pa=recorded_pa)
+        assert 0.9 * most_pa < highest_gauge_pa(found['experiment']) <= most_pa + 1e-6
+        assert f'The pressure rises to {1e-3 * most_pa:.0f} kPa gauge at most.' in found['why']
+
+
+def test_a_plan_stays_below_what_the_regulator_gives():
+    for name, segments in protocols.pieces('ppr', separating.within_reach(*weak())).items():
+        assert highest_gauge_pa({'name': name, 'domain': 'pressure', 'segments': [
+            {'rest': {'duration_s': 1.0}}, *segments]}) <= 494e3 + 1e-6
+    assert separating.within_reach(weak()[0]) == 500e3
+
+
+def test_the_highest_pressure_of_a_recording_is_no_spike(dead):
+    pressure = dead['pressure']['pressure_pa'].copy()
+    pressure[7] = 2e6
+    held = np.sort(pressure)[-10]
+    assert recorded_gauge_pa([pressure, pressure[100:200]]) == pytest.approx(
+        held - P_ATM_PA, abs=20e3)
+
+
 def test_who_asks_says_what_the_rig_has(monkeypatch, dead, tmp_path):
-    asked = []
+    asked, heights = [], set()
     monkeypatch.setattr(gap_report, 'find_gap', lambda runs, rig, certify, **more: GapResult(
         'ambiguous', '', rivals=['one', 'other']))
     monkeypatch.setattr(gap_report, 'next_experiment',
-                        lambda *given, **more: asked.append(more['may_add_cell']))
+                        lambda *given, **more: (asked.append(more['may_add_cell']),
+                                                heights.add(more['recorded_pa']))[-1])
     monkeypatch.setattr(gap_report, 'save_gap', lambda *given: None)
     plain = without_dead(dead)
     for run, rig in ((plain, nominal()), (dead, nominal()),
                      (plain, sensors(contraction_noise_m=1e-5))):
         gap_report.write_gap([run], rig, tmp_path)
     assert asked == [True, False, False]
+    assert heights == {recorded_gauge_pa([dead['pressure']['pressure_pa']])}
 
 
 def test_warnings_of_numpy_do_not_reach_people(monkeypatch):

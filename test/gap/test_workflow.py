@@ -293,7 +293,7 @@ def test_an_overlay_of_the_true_model_stays_near():
 def test_rivals_come_with_an_experiment_that_tells_them_apart(tmp_path, monkeypatch):
     from pam_actuation.experiments import load_experiment, separating
     pieces = separating.menu('ppr')
-    monkeypatch.setattr(separating, 'menu', lambda valve: {
+    monkeypatch.setattr(separating, 'menu', lambda *of: {
         n: pieces[n] for n in ('speeds', 'holds')})
     rig = nominal().with_(effects=[
         {'name': 'coulomb_friction', 'parameters': {'force_n': 1.5}}])

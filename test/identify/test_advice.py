@@ -16,11 +16,13 @@
 
 from made_records import RIG
 import numpy as np
-from pam_sim.identify.advice import where_open
+from pam_sim import load_rig
+from pam_sim.identify.advice import proposals, where_open
 from pam_sim.identify.judgement import DETERMINED, is_at_edge, TOGETHER, UNDETERMINED
 from pam_sim.identify.numbers import unknown_numbers
 from pam_sim.identify.profile import Interval
 from pam_sim.identify.result import Found
+from pam_sim.units import P_ATM_PA
 import pytest
 
 MASS, MAP, SPRING = unknown_numbers(RIG, ['mass_kg', 'force_map_gain', 'spring_n_per_m'])
@@ -43,6 +45,25 @@ def test_a_load_that_is_about_to_lift_tells_nothing_of_its_mass(status, low, hig
     # The other one is as little known as its curvature says: it stays.
     assert MAP.value(at[1]) == pytest.approx(GAIN) and seen[1, 1] == 4.0
     assert x[0] == MASS.coordinate(LIFTS) and information[0, 0] == 1e6
+
+
+@pytest.mark.parametrize('rig, recorded_pa, first_pa, last_pa', [
+    (RIG, 600e3, 500e3, 500e3), (RIG, 495e3, 495e3, 495e3), (RIG, 120e3, 120e3, 500e3),
+    (RIG.with_(parameters={'K_m': 50e3}), 600e3, 300e3, 300e3),
+    (load_rig('dmsp_5_300_hanging_mass', valve='hsv').with_(
+        parameters={'supply_pa': P_ATM_PA + 350e3}), 100e3, 100e3, 350e3)])
+def test_what_goes_above_the_recorded_pressure_comes_last_and_says_so(
+        rig, recorded_pa, first_pa, last_pa):
+    found = proposals(rig, False, recorded_pa)
+    highest = [max(pressure for pressure, _ in one.steps) for one in found]
+    assert highest == pytest.approx(sorted(highest)) and (
+        highest[0], highest[-1]) == pytest.approx((first_pa, last_pa))
+    for one, pa in zip(found, highest):
+        assert ('the recordings stayed below' in one.why) == (pa > first_pa + 1.0)
+        assert min(duration for _, duration in one.steps) > 0.0
+    if last_pa > first_pa:
+        assert f'up to {1e-3 * last_pa:.0f} kPa gauge; the recordings stayed below ' \
+               f'{1e-3 * recorded_pa:.0f} kPa' in found[-1].why
 
 
 @pytest.mark.parametrize('ends, said', [
