@@ -61,6 +61,7 @@ NOISE = {'pressure': 300.0, 'contraction': 1e-5, 'force': 0.1}     # where nothi
 SENSOR_NOISE = {'pressure': 'pressure_noise_pa', 'contraction': 'contraction_noise_m',
                 'force': 'force_noise_n'}
 PREFIX = 'tell_apart'
+LEAST = 0.05                 # floors per sample; rivals that differ by less give the same signals
 CLEAR = 1.0                  # floors per sample between rivals that need no further sensor
 SURE_T = 4.0                 # of a test on simulated data; the rig's own forms take a part of it
 SURE_SHARE = 10.0 * CRITERIA.same_form_share
@@ -132,6 +133,8 @@ def next_experiment(
     """
     Return the experiment that separates rivals best, as gap.json states it, or None.
 
+    It is None where the rivals give the same signals in every experiment of the menu.
+
     Parameters
     ----------
     rig : pam_sim.Rig
@@ -156,9 +159,9 @@ def next_experiment(
     known = menu(rig.valve, highest_pa)
     found = _tried(rig, rivals, {name: known[name] for name in pieces or known}, recorded, noise,
                    out_of_time, may_add_cell, highest_pa)
-    if not found:
+    best = max(found, default=None)
+    if best is None or best.sigma < LEAST:
         return None
-    best = max(found)
     # The rig's own forms blur a part of what is told: the next best piece follows.
     others = [one for one in found if one.name != best.name and one.with_cell == best.with_cell]
     plain = _experiment(
@@ -172,6 +175,15 @@ def next_experiment(
         text += ' It needs a load cell, which the recording does not have.'
     return {'name': plain['name'], 'why': text, 'separation_sigma': best.sigma,
             'needs': needs, 'experiment': {**plain, 'needs': needs}}
+
+
+def cell_would_tell(rig: Rig, rivals: Sequence[Rival], noise: Mapping[str, float],
+                    recorded_pa: float = HIGHEST_GAUGE_PA) -> bool:
+    """Return whether a load cell would tell rivals apart, by an experiment of the menu."""
+    highest_pa = within_reach(rig, rivals[0][1], recorded_pa=recorded_pa)
+    return any(one.is_clear for piece in menu(rig.valve, highest_pa).items()
+               for one in _tried(rig, rivals, dict([piece]), ('force',), noise, lambda: False,
+                                 False, highest_pa))
 
 
 class _Tried(NamedTuple):
@@ -265,7 +277,10 @@ def separation(run: Run, rig: Rig, rivals: Sequence[Rival],
     recording = Recording(type(run)(topics, run.metadata, run.namespace, run.path), rig.valve,
                           rig.is_driven)
     estimator = Estimator(rig, subsystem_problems(rig, [recording], holds_certify=False))
-    first, *others = (estimator.fit(hypothesis, theta) for _, _, hypothesis, theta in rivals)
+    # Those with the same parameters begin alike: where a fit ends must not tell them apart.
+    first, *others = (min((estimator.fit(hypothesis, theta) for _, _, like, theta in rivals
+                           if _parameters(like) == _parameters(hypothesis)), key=estimator.cost)
+                      for _, _, hypothesis, _ in rivals)
     for problem in estimator.problems:
         # As in the search: where the floor is careful, gaps would begin above what the truth left.
         s = problem.subsystem
@@ -273,11 +288,17 @@ def separation(run: Run, rig: Rig, rivals: Sequence[Rival],
             problem.chi2(f.errors[s], SELECT) for f in (first, *others)])
     nearest = decided = np.inf
     for other in others:
+        # What the first leaves too, where no fit reaches the floor, is no difference.
         nearest = min(nearest, np.sqrt(sum(
-            max(gap(c, other.errors[c.subsystem]), 0.0) for c in estimator.problems)))
+            max(gap(c, other.errors[c.subsystem]) - gap(c, first.errors[c.subsystem]), 0.0)
+            for c in estimator.problems)))
         decided = min(decided, max(_decided(estimator, c, first, other)
                                    for c in estimator.problems))
     return float(nearest), float(decided)
+
+
+def _parameters(hypothesis: Hypothesis) -> list[tuple[str, ...]]:
+    return [tuple(f.name for f in c.free) for c in hypothesis.effects]
 
 
 def _decided(estimator: Estimator, problem: SubsystemProblem, first: Fit,

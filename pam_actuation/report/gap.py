@@ -31,7 +31,7 @@ import numpy as np
 
 from pam_actuation.bags.ending import early_sentences
 from pam_actuation.bags.writer import BagWriter
-from pam_actuation.experiments.separating import next_experiment, not_played
+from pam_actuation.experiments.separating import cell_would_tell, next_experiment, not_played
 from pam_actuation.report.next_run import command_on_rig, is_of_muscle
 from pam_actuation.report.page import render
 from pam_actuation.report.pages import FOOTER
@@ -69,6 +69,8 @@ if TYPE_CHECKING:
 FILES = ('gap.json', 'model.yaml', 'next_experiment.yaml', 'compare.mcap', 'report.html',
          EFFECT_FILE, MODEL_FILE, SURROGATE_FILE)
 NUMBERS_SHARE = 0.3          # of the progress, where numbers are unknown
+INSEPARABLE = 'No experiment of the menu tells them apart with the sensors of this rig'
+A_CELL_WOULD = '; a load cell would.'
 FOLDERS = ('measured', 'simulated_before', 'simulated_refit', 'simulated_after',
            'residual_before', 'residual_after')
 
@@ -140,12 +142,17 @@ def gap_of(runs: 'Sequence[Run]', model: 'StrPath | Rig', certify: 'Run | None' 
         if result.at_one_speed and 'speeds' in pieces and set(memories()) <= {
                 rival[0] for rival in result.rivals}:
             pieces = ('speeds',)
+        recorded_pa = recorded_gauge_pa(
+            run['pressure'][FIELD['pressure']]
+            for run in (*runs, *([certify] if certify else [])))
         result.next_experiment = next_experiment(
             rig, result.rivals, tuple(result.signals), result.noise, pieces=pieces,
             may_add_cell=not any(dead_signals(run) for run in runs) and may_have_cell(rig),
-            recorded_pa=recorded_gauge_pa(
-                run['pressure'][FIELD['pressure']]
-                for run in (*runs, *([certify] if certify else []))))
+            recorded_pa=recorded_pa)
+        if result.next_experiment is None:
+            has_cell = 'force' in result.signals
+            result.remarks.append(INSEPARABLE + (A_CELL_WOULD if not has_cell and cell_would_tell(
+                rig, result.rivals, result.noise, recorded_pa) else '.'))
     result.remarks += early_sentences([*runs, *([certify] if certify else [])])
     return result
 

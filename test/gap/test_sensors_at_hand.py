@@ -16,6 +16,7 @@
 
 import warnings
 
+from gap_rivals import Blocks, errors
 from gap_runs import assert_form, nominal, recorded, voltages
 import numpy as np
 from pam_actuation.cli import main as cli_main
@@ -25,9 +26,11 @@ from pam_sim import load_rig
 from pam_sim.gap import find_gap
 from pam_sim.gap.data.health import check_health, dead_signals, without_dead
 from pam_sim.gap.data.pressed import recorded_gauge_pa
+from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
 from pam_sim.gap.result import GapResult
 from pam_sim.gap.select.candidates import candidates, left_out
 from pam_sim.located_yaml import dump_yaml
+from pam_sim.run import Run
 from pam_sim.units import P_ATM_PA
 import pytest
 
@@ -121,6 +124,62 @@ def test_the_next_experiment_needs_no_sensor_the_rig_has_not(monkeypatch, may):
     assert ('force' in found['experiment']['needs']) == may
 
 
+@pytest.mark.parametrize('cell_tells', [True, False])
+def test_rivals_that_give_the_same_signals_get_no_experiment_and_the_sensor_is_named(
+        monkeypatch, dead, cell_tells):
+    monkeypatch.setattr(separating, 'simulated', lambda plain, rig: plain)
+    monkeypatch.setattr(separating, 'separation', lambda run, rig, rivals, with_force: (
+        (9.0, 2.0) if with_force and cell_tells else (1e-4, 1e-5)))
+    rig = sensors(pressure_noise_pa=400.0)
+    rivals = [(name, rig, None, ()) for name in ('guide_friction', 'coulomb_friction')]
+    monkeypatch.setattr(gap_report, 'find_gap', lambda *given, **more: GapResult(
+        'ambiguous', '', rivals=rivals))
+    result = gap_report.gap_of([without_dead(dead)], rig)
+    assert result.next_experiment is None
+    told = 'No experiment of the menu tells them apart with the sensors of this rig'
+    assert [r for r in result.remarks if told in r] == [
+        told + ('; a load cell would.' if cell_tells else '.')]
+
+
+class Stops:
+    """An estimator that stops where it begins: 8 is the truth, what it is off by shows."""
+
+    noise = 1.0
+
+    def __init__(self, rig, problems):
+        self.problems = problems
+        self.base = self._left(Hypothesis(), (90.0,))
+
+    def cost(self, found):
+        return float(np.mean(found.errors['muscle'] ** 2))
+
+    def fit(self, hypothesis, theta, near=None):
+        return self._left(hypothesis, theta)
+
+    def _left(self, hypothesis, theta):
+        problem = self.problems[0]
+        off = np.full(60, abs(theta[0] - 8.0))
+        return Fit(hypothesis, np.array(theta), {}, {
+            'muscle': self.noise * errors(problem, 1, np.zeros(60)) + off[problem.block]}, {})
+
+
+@pytest.mark.parametrize('noise', [1.0, 1.4])        # below and above the floor
+@pytest.mark.parametrize('other, begins, apart', [
+    ('guide_friction', 8.0, 0.0), ('guide_friction', 5.0, 0.0), ('creep', 5.0, 3.0)])
+def test_what_the_best_leaves_too_and_where_a_fit_began_is_no_difference(
+        monkeypatch, noise, other, begins, apart):
+    monkeypatch.setattr(separating, 'Recording', lambda *given: None)
+    monkeypatch.setattr(separating, 'subsystem_problems', lambda *given, **more: [Blocks(60)])
+    monkeypatch.setattr(separating, 'Estimator', Stops)
+    monkeypatch.setattr(Stops, 'noise', noise)
+    rivals = [(name, nominal(), Hypothesis(tuple(
+        c for c in candidates(nominal(), ('pressure', 'contraction')) if c.effect == name)),
+        np.full(3, theta)) for name, theta in (('coulomb_friction', 8.0), (other, begins))]
+    sigma, sure = separating.separation(Run({}), nominal(), rivals, False)
+    assert sigma == pytest.approx(apart, abs=0.1 * apart + 1e-9)
+    assert (sure > 1e-6) == (apart > 0.0)
+
+
 def highest_gauge_pa(plain):
     return load_experiment(dump_yaml(plain)).chain.extremes()[1] - P_ATM_PA
 
@@ -168,7 +227,7 @@ def test_who_asks_says_what_the_rig_has(monkeypatch, dead, tmp_path):
         'ambiguous', '', rivals=['one', 'other']))
     monkeypatch.setattr(gap_report, 'next_experiment',
                         lambda *given, **more: (asked.append(more['may_add_cell']),
-                                                heights.add(more['recorded_pa']))[-1])
+                                                heights.add(more['recorded_pa']), {})[-1])
     monkeypatch.setattr(gap_report, 'save_gap', lambda *given: None)
     plain = without_dead(dead)
     for run, rig in ((plain, nominal()), (dead, nominal()),
