@@ -66,7 +66,8 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument('--effects', type=source, default=None, metavar='A,B',
                         help='names to try (default: all)')
     parser.add_argument('--seconds', type=number(1.0, None, 's'), default=SECONDS, metavar='N',
-                        help='time budget of the search (default: %(default)g)')
+                        help='time budget of unknown numbers and search; the validation comes on '
+                        'top (default: %(default)g)')
     parser.add_argument('--materiality', type=number(0.01, 1000.0), default=1.0, metavar='S',
                         help='an effect is named when it moves a signal by more than S standard '
                         'deviations of its sensor (default: %(default)g)')

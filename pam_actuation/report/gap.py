@@ -130,13 +130,11 @@ def gap_of(runs: 'Sequence[Run]', model: 'StrPath | Rig', certify: 'Run | None' 
     share = NUMBERS_SHARE if rig.unknown else 0.0
     rig, found, sayings = numbers_first(runs, rig, certify is None, options.get('seed', 0),
                                         lambda done: told(share * done))
-    spent = time.perf_counter() - began
-    result = find_gap(runs, rig, certify,
+    result = find_gap(runs, rig, certify, spent_s=time.perf_counter() - began,
                       progress=lambda done: told(share + (1.0 - share) * done), **options)
     result.remarks += remarks + sayings
     if found is not None:
         result.numbers_first, result.first_lines = numbers_block(found), numbers_text(found)
-        result.runtime_s += spent
     pieces = not_played(rig.valve, played)
     if len(result.rivals) > 1 and pieces:
         if result.at_one_speed and 'speeds' in pieces and set(memories()) <= {

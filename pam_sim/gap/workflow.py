@@ -53,6 +53,8 @@ SAME_EDGES = (
     'and does not show that other steps are followed; record other steps and give them as '
     '--certify')
 
+CUT_SHORT = (' The search was cut short: its {:g} s ran out before all was tried, and more time '
+             'may change this answer.')
 UNNAMED = ('term', 'surrogate')
 NOT_JUDGED = {'valve': 'the record has no valve command',
               'muscle': 'its contraction is given, and the record has no force'}
@@ -62,7 +64,8 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
              effects: Sequence[str] | None = None, seconds: float = 120.0,
              materiality: float = 1.0, seed: int = 0,
              progress: Callable[[float], object] = lambda done: None,
-             criteria: Criteria = CRITERIA, unnamed: Collection[str] = UNNAMED) -> GapResult:
+             criteria: Criteria = CRITERIA, unnamed: Collection[str] = UNNAMED,
+             spent_s: float = 0.0) -> GapResult:
     """
     Find what a model misses in recordings, add it, and prove it.
 
@@ -77,7 +80,7 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     effects : sequence of str, optional
         Names to try; all by default.
     seconds : float
-        Time budget of the search.
+        Time budget of the search. Validation and what follows come on top.
     materiality : float
         An effect is named when it moves some signal of the certify data by more than
         so many standard deviations of its sensor noise, the numbers of the model held.
@@ -89,6 +92,8 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
         Decision thresholds.
     unnamed : collection of str
         What is looked for where names leave much: a ``term``, a ``surrogate``.
+    spent_s : float
+        What the caller has spent of ``seconds``, as on unknown numbers.
 
     Returns
     -------
@@ -102,7 +107,7 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
         The recording for the validation is one of those that are searched.
 
     """
-    started = time.perf_counter()
+    started = time.perf_counter() - spent_s
     checked = checked_runs(runs, certify, rig, criteria)
     if checked.refusals:
         text = '; '.join(checked.refusals)
@@ -146,8 +151,6 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     result.remarks += unconfirmed
     if same_speed:
         outcome.named = as_sets(context, outcome.named, validation.final)
-    if not outcome.complete:
-        result.remarks.append(f'The time of {seconds:g} s ran out before the search had ended.')
     own_runs = decide(result, outcome, validation, materiality)
     validation = own_runs.validation
     result.at_one_speed = one_speed and set(memories()) <= set(result.ambiguity_set)
@@ -159,6 +162,8 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     result.fingerprint = fingerprint(estimator, validation.base, validation.final)
     result.minimum_detectable = least_sizes(outcome.screened, rig, materiality)
     result.reason = explain(result, outcome, harms)
+    if not outcome.complete:
+        result.reason += CUT_SHORT.format(seconds)
     result.simulations = sum(
         one.simulations for one in (estimator, validation, own_runs))
     if 'term' in unnamed:

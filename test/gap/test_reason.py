@@ -14,12 +14,14 @@
 
 """The sentences of a gap result never say what its numbers contradict."""
 
+import time
 from types import SimpleNamespace
 
 from gap_runs import nominal, recorded, voltages
 import numpy as np
 from pam_actuation.cli import gap as gap_verb
 from pam_actuation.cli.main import main
+from pam_actuation.report import gap as gap_report
 from pam_actuation.report.gap import next_command
 from pam_actuation.report.sections.gap import gap_section
 from pam_sim import load_rig
@@ -48,12 +50,14 @@ EFFECTS = {'valve_dead_time': effect('valve_dead_time', 'delay_s', 's'),
            'hysteresis': effect('hysteresis', 'loop_half_width_at_400kpa_n', 'N')}
 
 
-def said(verdict, signals, named=(), share=None, effects=(), parameters=(), **more):
+def said(verdict, signals, named=(), share=None, effects=(), parameters=(), complete=True,
+         **more):
     """Return what is said of a result with these numbers."""
     result = GapResult(verdict, '', signals=signals, effects=[EFFECTS[e] for e in effects],
                        parameters=list(parameters), **more)
     result.ambiguity_set = list(dict.fromkeys(n for w in named for n in w.names))
-    return explain(result, SimpleNamespace(named=list(named), share=share or {}, mistaken={}))
+    return explain(result, SimpleNamespace(
+        named=list(named), share=share or {}, mistaken={}, complete=complete))
 
 
 @pytest.mark.parametrize('name, words', [
@@ -63,6 +67,29 @@ def said(verdict, signals, named=(), share=None, effects=(), parameters=(), **mo
     ('gain_percent', 'gain percent'), ('force_at_500kpa_10mm', 'force at 500 kPa and 10 mm')])
 def test_a_quantity_in_words_has_no_unit(name, words):
     assert in_words(name) == words
+
+
+def test_a_search_that_was_cut_short_says_so_and_claims_nothing_of_what_was_not_tried():
+    assert 'no known effect explains it' in said('unknown', {'pressure': PRESSURE})
+    assert said('unknown', {'pressure': PRESSURE}, complete=False) == (
+        'The calibrated model misses 8 kPa of pressure and none of the effects that were tried '
+        'explains it.')
+    run, limit = recorded(nominal(), voltages(6.0)), {'effects': ['creep'], 'unnamed': ()}
+    whole = find_gap(run, nominal(), **limit)
+    spent = find_gap(run, nominal(), seconds=100.0, spent_s=100.0, **limit)
+    told = (' The search was cut short: its 100 s ran out before all was tried, and more time may '
+            'change this answer.')
+    assert spent.reason == whole.reason + told and spent.runtime_s > 100.0 > whole.runtime_s
+
+
+def test_the_time_for_unknown_numbers_counts(monkeypatch):
+    spent = []
+    monkeypatch.setattr(gap_report, 'numbers_first', lambda runs, rig, *given: (
+        rig, time.sleep(0.2), []))
+    monkeypatch.setattr(gap_report, 'find_gap', lambda *given, spent_s, **more: (
+        spent.append(spent_s), GapResult('no_gap', ''))[-1])
+    gap_report.gap_of([recorded(nominal(), voltages(6.0))], nominal())
+    assert 0.2 <= spent[0] < 5.0
 
 
 def test_what_grows_rises_and_what_stays_stays():

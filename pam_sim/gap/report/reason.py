@@ -161,10 +161,12 @@ def _nearest(result: GapResult, outcome: Outcome) -> str:
     shares = {s: share for s, share in outcome.share.items()
               if share >= LEAST_SHARE and s not in closed}
     parts = [f'{100 * share:.0f} % in the {s}' for s, share in shares.items()]
+    none = ' and no known effect explains it' if outcome.complete else (
+        ' and none of the effects that were tried explains it')
     if not parts:
-        return ' and no known effect explains it'
+        return none
     if max(shares.values()) < ENOUGH:
-        return f' and no known effect explains it: the best fit explains {join(parts)}'
+        return f'{none}: the best fit explains {join(parts)}'
     return (f'. A fit explains {join(parts)} of the data that were searched, but it does not '
             'hold: it needs numbers far from their nominal values, or fails on the data of '
             'the proof. So nothing is named')
