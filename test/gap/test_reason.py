@@ -99,6 +99,12 @@ def test_what_grows_rises_and_what_stays_stays():
     assert 'the gap in pressure falls from 8 to 0.4 kPa' in text
     same = SignalGap('N', 0.05, 0.5, 0.1861, 0.1859)
     assert 'the gap in force stays at 0.186 N' in said('effects', {'force': same}, named)
+    # Calibration alone made it worse: what is added counts from the given model.
+    for after, told in ((0.307e-3, 'falls'), (2.5e-3, 'rises')):
+        bent = SignalGap('m', 2e-5, 2.06e-3, 3.71e-3, after)
+        assert (f'the gap in contraction of the given model, which calibration alone raises to '
+                f'3.71 mm, {told} from 2.06 to {1e3 * after:.3g} mm') in said(
+                    'effects', {'contraction': bent}, named)
     # What was within noise and is no more is told as well.
     grown = SignalGap('N', 0.05, 0.05, 0.05, 0.5)
     assert 'rises from 0.05 to 0.5 N' in said('effects', {'force': grown}, named)
