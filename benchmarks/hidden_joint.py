@@ -69,10 +69,10 @@ class HiddenJointLoop(JointLoop):
         wanted = self._reference.rows(controller.lead_s).reshape(
             self.ticks, size_of(WANTED)).tolist()
         learns = learning_mask(controller, learn, self.ticks, self.rate_hz).tolist()
-        quanta, (steps, every, latency) = self._quantum.tolist(), self._timing
+        quanta = self._quantum.tolist()
+        laws, (steps, every, latency) = self._fresh_drivers(controller.driver)
         hsv = self._valve == 'hsv'
-        drives = [
-            driver_function(driver.fresh(controller.driver), hsv) for driver in self._drivers]
+        drives = [driver_function(law, hsv) for law in laws]
         signals = [(0.0, 0.0) if hsv else (0.0,)] * 2
         for tick in range(self.ticks):
             true = (plant.angle_rad, *plant.pressures_pa, *plant.forces_n)

@@ -20,7 +20,7 @@ controller on it. The same compiled steps as in the live nodes are used
 (controller, driver law, plant), only the clock differs.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 import importlib
 import math
@@ -30,7 +30,7 @@ import numpy as np
 import numpy.typing as npt
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.tuning.cost import tracking_cost
-from pam_actuation.tuning.loop_parts import DISTURBANCE
+from pam_actuation.tuning.loop_parts import DISTURBANCE, Driver
 from pam_actuation.tuning.loop_setup import (
     DriverLaw, first_periodic_tick, learning_mask, Learns, PHYSICS_S,
     sensor_noise, steps_per_tick)
@@ -162,8 +162,7 @@ class MuscleLoop:
             if course is not None:
                 disturbances[name] = [course(k * (1.0 / rate_hz)) for k in range(self.ticks)]
         self._driver = DriverLaw(rig, driver or driver_config(rig), rate_hz)
-        latency = min(int(round(latency_s / PHYSICS_S)), steps - 1)
-        self._timing = (steps, self._driver.every, latency)
+        self._steps = steps, min(int(round(latency_s / PHYSICS_S)), steps - 1)
 
     @property
     def reference_m(self) -> FloatArray:
@@ -174,6 +173,13 @@ class MuscleLoop:
     def start_tick(self) -> int:
         """First tick of the periodic part, of the whole where there is none."""
         return first_periodic_tick(self.experiment, self.rate_hz)
+
+    def _fresh_driver(
+            self, asked: Mapping[str, float] | None) -> tuple[Driver, tuple[int, int, int]]:
+        """Return the driver law at its start and ``timing``, as ``rollouts.sense`` has them."""
+        driver, every = self._driver.fresh(asked)
+        steps, latency = self._steps
+        return driver, (steps, every, latency)
 
     def _fresh_plant(
             self,
@@ -249,7 +255,7 @@ class ClosedLoop(MuscleLoop):
         log = np.empty(self.ticks * size_of(LOG))
         _rollout_of(controller.kind)(
             self.ticks, controller.compiled_arguments(), self._fresh_plant(), self.hsv,
-            self._driver.fresh(controller.driver), self._timing,
+            *self._fresh_driver(controller.driver),
             self._reference.rows(controller.lead_s), self._noise, self._quantum,
             self._disturbance, learning_mask(controller, learn, self.ticks, self.rate_hz),
             controller.input_array, log)

@@ -127,9 +127,8 @@ class ForceLoop(MuscleLoop):
         log = np.empty(self.ticks * size_of(mode_rollouts.FORCE_LOG))
         mode, law = controller.compiled_arguments()
         mode_rollouts.force_rollout(
-            self._fresh_plant(self._start_m), self.hsv, self._driver.fresh(controller.driver),
-            self._timing, self._reference.rows(controller.lead_s),
-            self._noise, self._quantum, self._way_m,
+            self._fresh_plant(self._start_m), self.hsv, *self._fresh_driver(controller.driver),
+            self._reference.rows(controller.lead_s), self._noise, self._quantum, self._way_m,
             learning_mask(controller, learn, self.ticks, self.rate_hz), mode,
             controller.static_inverse, law, controller.law.input_array, log)
         return log.view(mode_rollouts.FORCE_LOG)

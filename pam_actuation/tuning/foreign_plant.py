@@ -121,8 +121,8 @@ class ForeignLoop(ClosedLoop):
         supplies = disturbances['supply_pa'].tolist()
         learns = learning_mask(controller, learn, self.ticks, self.rate_hz).tolist()
         pressure_step, contraction_step, force_step = self._quantum.tolist()
-        steps, every, latency = self._timing
-        drive = driver_function(self._driver.fresh(controller.driver), self.hsv)
+        law, (steps, every, latency) = self._fresh_driver(controller.driver)
+        drive = driver_function(law, self.hsv)
         signal: tuple[float, ...] = (0.0, 0.0) if self.hsv else (0.0,)
         for tick in range(self.ticks):
             before, supply_pa = signal, plant.supply_pa

@@ -18,7 +18,7 @@ Closed-loop rollouts in joint mode: two muscles turn a limb, the angle is tracke
 The same compiled steps as in the controller, drivers and joint, as in ``closed_loop``.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 import math
 from typing import Any, TYPE_CHECKING
 
@@ -29,7 +29,7 @@ from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.tuning.closed_loop import Course
 from pam_actuation.tuning.cost import tracking_cost
 from pam_actuation.tuning.force_loop import check_controller
-from pam_actuation.tuning.loop_parts import JOINT_READINGS, READINGS
+from pam_actuation.tuning.loop_parts import Driver, JOINT_READINGS, READINGS
 from pam_actuation.tuning.loop_setup import (
     DriverLaw, first_periodic_tick, learning_mask, Learns, PHYSICS_S,
     sensor_noise, steps_per_tick)
@@ -116,13 +116,9 @@ class JointLoop:
         configs = drivers or [driver_config(rig) for rig in sides.values()]
         self._drivers = [DriverLaw(rig, config, rate_hz)
                          for rig, config in zip(sides.values(), configs)]
-        every, *others = {driver.every for driver in self._drivers}
-        if others:
-            raise InputError('flexor and extensor need valves of one kind and period',
-                             f'joint {joint.name}')
         self._plant = joint.plant(dt_s=PHYSICS_S)
-        latency = min(int(round(latency_s / PHYSICS_S)), steps - 1)
-        self._timing = (steps, every, latency)
+        self._steps = steps, min(int(round(latency_s / PHYSICS_S)), steps - 1)
+        self._fresh_drivers(None)       # refuses two kinds of valves
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle what it is made of: a cluster gets kilobytes, not the arrays."""
@@ -137,6 +133,16 @@ class JointLoop:
     def start_tick(self) -> int:
         """First tick of the periodic part, of the whole where there is none."""
         return first_periodic_tick(self.experiment, self.rate_hz)
+
+    def _fresh_drivers(self, asked: Mapping[str, float] | None
+                       ) -> tuple[tuple[Driver, ...], tuple[int, int, int]]:
+        """Return the driver laws at their start, and ``timing`` as of ``rollouts.sense``."""
+        laws, (every, *others) = zip(*(driver.fresh(asked) for driver in self._drivers))
+        if any(other != every for other in others):
+            raise InputError('flexor and extensor need valves of one kind and period',
+                             f'joint {self.joint.name}')
+        steps, latency = self._steps
+        return laws, (steps, every, latency)
 
     def tracked(self, controller: 'JointController'
                 ) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -191,7 +197,7 @@ class JointLoop:
         mode, law = controller.compiled_arguments()
         mode_rollouts.joint_rollout(
             plant, tuple(driver.hsv for driver in self._drivers),
-            tuple(driver.fresh(controller.driver) for driver in self._drivers), self._timing,
+            *self._fresh_drivers(controller.driver),
             self._reference.rows(controller.lead_s), self._noise,
             self._quantum, self._torque,
             learning_mask(controller, learn, self.ticks, self.rate_hz), mode, law,

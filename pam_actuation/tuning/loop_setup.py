@@ -22,7 +22,7 @@ import numpy as np
 from pam_actuation.drivers import hsv_kernel, ppr
 from pam_actuation.drivers.config import DriverConfig
 from pam_actuation.drivers.hsv import initial_state
-from pam_actuation.tuning.loop_parts import READINGS
+from pam_actuation.tuning.loop_parts import Driver, READINGS
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.records import zeros
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from pam_sim.rig import Rig
 
 PHYSICS_S = 0.001
+_PERIOD = 'hsv.period_s'
 # Noise and step of a sensor, by what it reads.
 _SENSORS = {'pressure_pa': ('pressure_noise_pa', 'pressure_step_pa'),
             'contraction_m': ('contraction_noise_m', 'contraction_step_m'),
@@ -97,7 +98,8 @@ class DriverLaw:
     """
     A driver law at a controller's rate.
 
-    Attributes: ``hsv`` tells which law it is, ``every`` the ticks per step of it.
+    Attribute ``hsv`` tells which law it is. A regulator is told of each command as it comes, a
+    pair of valves once a period.
     """
 
     def __init__(self, rig: 'Rig', config: DriverConfig, rate_hz: float) -> None:
@@ -105,13 +107,26 @@ class DriverLaw:
         self.hsv = rig.valve == 'hsv'
         self._config = config
         self._tick_s = 1.0 / rate_hz
-        self.every = max(1, round(config.hsv.period_s * rate_hz)) if self.hsv else 1
 
-    def fresh(self, asked: Mapping[str, float] | None = None
-              ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return new state, par, out; ``asked``: what a controller asks for, by name."""
+    def fresh(self, asked: Mapping[str, float] | None = None) -> tuple[Driver, int]:
+        """
+        Return (state, par, out), all new, and the ticks per step of the law.
+
+        ``asked``: what a controller asks for, by name.
+
+        Raises
+        ------
+        InputError
+            It asks for a period that is no whole number of ticks.
+
+        """
         config = DriverConfig.from_parameters(asked, self._config) if asked else self._config
-        if self.hsv:
-            return initial_state(), config.hsv.par(), zeros(hsv_kernel.OUTPUT)
-        law = replace(config.ppr, period_s=self._tick_s)
-        return zeros(ppr.STATE), law.par(), zeros(ppr.OUTPUT)
+        if not self.hsv:
+            law = replace(config.ppr, period_s=self._tick_s)
+            return (zeros(ppr.STATE), law.par(), zeros(ppr.OUTPUT)), 1
+        period_s = config.hsv.period_s
+        every = max(1, round(period_s / self._tick_s))
+        if asked and _PERIOD in asked and abs(every * self._tick_s - period_s) > 1e-9:
+            raise InputError(f'the controller asks for {period_s:g} s; a rollout needs a whole '
+                             f'number of its ticks of {self._tick_s:g} s', _PERIOD)
+        return (initial_state(), config.hsv.par(), zeros(hsv_kernel.OUTPUT)), every

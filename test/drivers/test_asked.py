@@ -24,8 +24,11 @@ from pam_actuation.rigging.layouts import rig as layout
 from pam_actuation.rigging.plan import make_plan
 from pam_actuation.tuning.closed_loop import ClosedLoop
 from pam_actuation.tuning.force_loop import ForceLoop
+from pam_actuation.tuning.foreign_plant import ForeignLoop
+from pam_actuation.tuning.joint_loop import JointLoop
 from pam_sim import load_rig
 from pam_sim.errors import InputError
+from pam_sim.joint import load_joint
 import pytest
 
 TEXT = """
@@ -48,6 +51,13 @@ segments:
   - rest: {duration_s: 0.2}
   - ramp: {to_m: 0.012, duration_s: 0.1}
   - hold: {duration_s: 0.5}
+"""
+TURN = """
+name: turn
+domain: joint_angle
+segments:
+  - ramp: {to_rad: 0.3, duration_s: 0.3}
+  - hold: {duration_s: 0.3}
 """
 FORCE = """
 name: force
@@ -105,6 +115,31 @@ def test_a_rollout_drives_a_regulator_as_asked(asked, largest_v):
         load_controller(f'controller: pid\n{asked}\n', rig))
     fastest = np.abs(np.diff(run.signal[:, 0])).max() * 200.0
     assert fastest > 10.0 if largest_v is None else fastest == pytest.approx(largest_v)
+
+
+@pytest.mark.parametrize('asked, every', [
+    ('', 2), ('driver: {hsv.period_s: 0.005}', 1), ('driver: {hsv.period_s: 0.01}', 2)])
+def test_a_rollout_drives_valves_as_often_as_asked(rig, asked, every):
+    """The duties change at each tick of 5 ms, or only at every second one."""
+    controller = load_controller(f'controller: pid\n{asked}\n', rig)
+    for loop in (ClosedLoop(rig, load_experiment(JUMP)),
+                 ForeignLoop(rig.plant, rig, load_experiment(JUMP))):
+        changes = np.flatnonzero(np.diff(loop.run(controller).signal, axis=0).any(axis=1)) + 1
+        assert len(changes) > 10 and (changes % every == 0).all()
+        assert every == 2 or (changes % 2 == 1).any()
+
+
+def test_a_rollout_of_a_joint_drives_valves_as_often_as_asked():
+    """Another period gives another motion; of one that does not fit the ticks there is none."""
+    joint = load_joint('joint_dmsp_5_300_realistic', valve='hsv')
+    loop, controller = JointLoop(joint, load_experiment(TURN)), load_controller(
+        'sofc_joint_hsv', joint)
+    usual, controller.driver = loop.run(controller, learn=False), {'hsv.period_s': 0.005}
+    other = loop.run(controller, learn=False)
+    assert np.abs(other.value - usual.value).max() > 1e-4
+    controller.driver = {'hsv.period_s': 0.008}
+    with pytest.raises(InputError, match='hsv.period_s.*0.008 s.*0.005 s'):
+        loop.run(controller)
 
 
 @pytest.mark.parametrize('valve, asked', [
