@@ -85,8 +85,9 @@ def tuning_report(out_path: StrPath, result: 'TuneResult',
     shown = SHOWN_UNIT[result.unit]
     numbers = [
         (f'{result.held_out_before:.3f}{shown}', 'held-out cost before', '', ''),
-        (f'{result.held_out_after:.3f}{shown}', 'held-out cost after', '',
-         'good' if result.improved else 'bad'),
+        (f'{result.held_out_after:.3f}{shown}', 'held-out cost after', '', 'good')
+        if result.improved else
+        (f'{result.held_out_found:.3f}{shown}', 'held-out cost of what was dropped', '', 'bad'),
         (f'{result.rollouts:,}', 'rollouts', result.ended, '')]
     lead = LEAD.format(unit='mm' if result.unit == 'mm' else 'degrees')
     write_text(out_path, render('pam_actuation: offline tuning', lead, sections, numbers, FOOTER))

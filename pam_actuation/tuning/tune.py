@@ -27,12 +27,13 @@ from pathlib import Path
 import time
 from typing import Any, TYPE_CHECKING
 
+import numpy as np
 from pam_actuation.control.controller_text import controller_to_yaml
 from pam_actuation.control.made_for import facts_of
 from pam_actuation.control.modes.tracked import JOINT, tracked_by
 from pam_actuation.tuning.initial_rules import initial_rules
 from pam_actuation.tuning.loops_of_rigs import loops_of
-from pam_actuation.tuning.problem import costs_of, Problem, rebuild
+from pam_actuation.tuning.problem import cost_on, costs_of, Problem, rebuild
 from pam_actuation.tuning.search import BUDGET_USED, default_members, minimise, SMALLEST
 from pam_actuation.tuning.space import Axis, check_axes, default_axes, from_unit, to_unit
 from pam_actuation.workers import Workers
@@ -51,6 +52,22 @@ HELD_OUT_SEED = 7919      # added to the seed for the noise the search never see
 SHOWN_UNIT = {'mm': ' mm', 'deg': '°'}      # of costs, as people read it
 
 
+@dataclass(frozen=True)
+class HeldOutRun:
+    """
+    Costs of one held-out run.
+
+    ``rig`` counts the rigs, 0 is the model; ``seed`` is that of the sensor noise; ``before``
+    and ``after`` are costs of the controllers from before and as written.
+    """
+
+    experiment: str
+    rig: int
+    seed: int
+    before: float
+    after: float
+
+
 @dataclass
 class TuneResult:
     """
@@ -65,11 +82,12 @@ class TuneResult:
     history : list of (int, float)
         Rollouts done and best training cost so far.
     cost_before, cost_after : float
-        Training cost, in ``unit``.
+        Training cost, in ``unit``, of ``start`` and of ``controller``.
     held_out_before, held_out_after : float
-        Cost on runs the search did not see.
+        The same on runs the search did not see.
     improved : bool
-        The held-out cost fell; otherwise ``controller`` has the settings from before.
+        The held-out cost fell; otherwise ``controller`` has the settings from before, and their
+        costs count as those after.
     rollouts : int
         Closed-loop runs simulated, the held-out ones included.
     simulated_s : float
@@ -90,6 +108,10 @@ class TuneResult:
         The closed loops of the search and of the held-out check.
     unit : str
         Of all costs: 'mm', of a joint 'deg'.
+    held_out_found : float
+        Held-out cost of what was found, also where that was dropped.
+    held_out_runs : list of HeldOutRun
+        The held-out costs one by one; their means are those above.
 
     """
 
@@ -112,6 +134,8 @@ class TuneResult:
     problem: Problem | None = field(default=None, repr=False)
     check: Problem | None = field(default=None, repr=False)
     unit: str = 'mm'
+    held_out_found: float = math.nan
+    held_out_runs: list[HeldOutRun] = field(default_factory=list, repr=False)
 
     def to_yaml(self) -> str:
         """Return the tuned controller as YAML text for ``load_controller``."""
@@ -145,6 +169,10 @@ class TuneResult:
             f'cost_after_{self.unit}': self.cost_after,
             f'held_out_before_{self.unit}': self.held_out_before,
             f'held_out_after_{self.unit}': self.held_out_after,
+            'held_out_runs': [
+                {'experiment': one.experiment, 'rig': one.rig, 'seed': one.seed,
+                 f'before_{self.unit}': one.before, f'after_{self.unit}': one.after}
+                for one in self.held_out_runs],
             'rollouts': self.rollouts, 'simulated_s': self.simulated_s, 'seconds': self.seconds,
             'ended': self.ended, 'initial_rules': self.rules, 'left_out': self.left_out,
             'changed': {name: {'before': before, 'after': after}
@@ -152,14 +180,24 @@ class TuneResult:
 
     def text(self) -> str:
         """Return the outcome for people."""
-        verdict = 'better' if self.improved else 'not better: settings left as they were'
+        shown = SHOWN_UNIT[self.unit]
+        verdict = f'-> {self.held_out_after:.3f}{shown}, better'
+        if not self.improved:
+            verdict = (f'before, {self.held_out_found:.3f}{shown} with what was found, '
+                       'not better: settings left as they were')
         if not self.improved and self.ended == BUDGET_USED:
             verdict += '; more --rollouts may find better ones'
         lines = [
             f'{self.rollouts} rollouts in {self.seconds:.1f} s '
             f'({self.simulated_s / max(self.seconds, 1e-9):,.0f} times real time), {self.ended}; '
-            f'cost on held-out runs {self.held_out_before:.3f} -> {self.held_out_after:.3f}'
-            f'{SHOWN_UNIT[self.unit]}, {verdict}']
+            f'cost on held-out runs {self.held_out_before:.3f}'
+            f'{"" if self.improved else shown} {verdict}']
+        names = list(dict.fromkeys(one.experiment for one in self.held_out_runs))
+        for name in names if len(names) > 1 else ():
+            before, after = (np.mean([
+                (one.before, one.after) for one in self.held_out_runs
+                if one.experiment == name], axis=0))
+            lines.append(f'  held-out {name}: {before:.3f} -> {after:.3f}{shown}')
         if self.rules:
             lines.append(f'  initial rules: {self.rules}')
         if self.left_out:
@@ -236,7 +274,8 @@ def tune(rig: 'Rig | JointRig | Sequence[Rig | JointRig]', controller: 'Law',
     rigs: list[Rig | JointRig] = _as_list(rig)
     experiments: list[Experiment] = _as_list(experiment)
     train, left_out = loops_of(rigs, experiments, seed, controller, rigs[0], preview_s)
-    test, _ = loops_of(held_out_rigs or rigs, _as_list(held_out or experiments),
+    tested = list(held_out_rigs or rigs)
+    test, _ = loops_of(tested, _as_list(held_out or experiments),
                        seed + HELD_OUT_SEED, controller, rigs[0], preview_s)
     members = population or default_members(budget // len(train))
     generations = budget // (members * len(train))
@@ -258,7 +297,12 @@ def tune(rig: 'Rig | JointRig | Sequence[Rig | JointRig]', controller: 'Law',
                 progress(min(done[0], budget))
             return costs
 
-        cost_before, held_before = (costs_of(workers, one, [{}])[0] for one in (problem, check))
+        def held_out_costs(of: Problem) -> list[float]:
+            return workers.map(cost_on, of, [({}, i) for i in range(len(test))])
+
+        cost_before = costs_of(workers, problem, [{}])[0]
+        costs_before = held_out_costs(check)
+        held_before = float(np.mean(costs_before))
         history.append((0, cost_before))
         found = minimise(
             of_generation, to_unit(axes, before), members, generations, seed, patience)
@@ -269,16 +313,22 @@ def tune(rig: 'Rig | JointRig | Sequence[Rig | JointRig]', controller: 'Law',
         if learn_rules and controller.rules is not None:
             (rules, table, cost_after), extra = initial_rules(workers, problem, after)
             tuned = rebuild(controller, after, table)
-        held_after = costs_of(workers, Problem(test, tuned), [{}])[0]
+        costs_after = held_out_costs(Problem(test, tuned))
+    held_after = held_found = float(np.mean(costs_after))
     improved = held_after < held_before
     if not improved:
         tuned, rules = rebuild(controller, {}), ''
+        cost_after, held_after, costs_after = cost_before, held_before, costs_before
     tuned.made_for, tuned.other_rig = facts_of(rigs[0]), ''
     changed = {name: (value, tuned.settings[name]) for name, value in before.items()
                if tuned.settings[name] != value}
     rollouts = done[0] + len(train) + 2 * len(test) + extra
     mean_s = sum(loop.experiment.duration_s for loop in train) / len(train)
+    numbers = {id(one): k for k, one in enumerate(tested)}
     return TuneResult(
         tuned, changed, history, cost_before, cost_after, held_before, held_after, improved,
         rollouts, rollouts * mean_s, time.perf_counter() - began, found.reason, rules, left_out,
-        axes, controller, problem, check, 'deg' if tracked_by(controller) == JOINT else 'mm')
+        axes, controller, problem, check, 'deg' if tracked_by(controller) == JOINT else 'mm',
+        held_found, [
+            HeldOutRun(loop.experiment.name, numbers[id(loop.rig)], seed + HELD_OUT_SEED, *costs)
+            for loop, *costs in zip(test, costs_before, costs_after)])

@@ -18,8 +18,11 @@ from dataclasses import replace
 
 import numpy as np
 from pam_actuation.control.config import load_controller
+from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.experiments.experiment import load_experiment
+from pam_actuation.tuning.closed_loop import ClosedLoop
 from pam_actuation.tuning.cost import tracking_cost
+from pam_actuation.tuning.random_rigs import random_rigs
 from pam_actuation.tuning.space import (
     Axis, default_axes, from_unit, PID_INVERSE_AXES, SOFC_AXES, to_unit)
 from pam_actuation.tuning.tune import tune
@@ -32,6 +35,12 @@ name: short_sine
 segments:
   - ramp: {to_m: 0.006, duration_s: 1.0}
   - sine: {center_m: 0.014, amplitude_m: 0.008, frequency_hz: 0.5, cycles: 3}
+"""
+HOLD = """
+name: hold
+segments:
+  - ramp: {to_m: 0.014, duration_s: 1.0}
+  - hold: {duration_s: 4.0}
 """
 AXES = (Axis('lead_s', 0.02, 0.2, log=False), Axis('proportional_pa_per_m', 1e5, 3e6))
 
@@ -67,6 +76,40 @@ def test_tuning_improves_held_out_runs_and_reports(rig, tmp_path):
     assert 'more --rollouts may find better' in replace(result, improved=False).text()
     patient = replace(result, improved=False, ended='no progress in 30 generations')
     assert 'not better' in patient.text() and '--rollouts' not in patient.text()
+
+
+def test_what_is_dropped_leaves_no_numbers(rig):
+    """Where nothing better is found, the costs are those of the controller that is written."""
+    stiff = (Axis('proportional_pa_per_m', 8e6, 1e7),)      # for a sine, not for a hold
+    result = tune(rig, load_controller('controller: pid\n', rig), load_experiment(SHORT_SINE),
+                  budget=20, axes=stiff, held_out=load_experiment(HOLD))
+    found = result.to_dict()
+    assert not result.improved and found['changed'] == {}
+    assert found['cost_after_mm'] == found['cost_before_mm']
+    assert found['held_out_after_mm'] == found['held_out_before_mm'] < (
+        result.held_out_found)
+    assert min(cost for _, cost in result.history) < result.cost_before
+    dropped = replace(result, held_out_found=7.125)
+    assert '7.125' in dropped.text() and '7.125' not in str(dropped.to_dict())
+
+
+def test_costs_of_held_out_runs_are_told_one_by_one(rig):
+    """Each has experiment, rig and seed; a closed loop gives the same cost to the bit."""
+    others = [rig, *random_rigs(rig, 1, seed=8)]
+    checks = [load_experiment(SHORT_SINE), load_experiment(
+        SHORT_SINE.replace('short_sine', 'quicker').replace('0.5', '0.7'))]
+    result = tune(rig, untuned(rig), load_experiment(SHORT_SINE), budget=20, seed=3, axes=AXES,
+                  held_out=checks, held_out_rigs=others)
+    runs = result.to_dict()['held_out_runs']
+    assert [(one['experiment'], one['rig']) for one in runs] == [
+        (check.name, k) for k in range(2) for check in checks]
+    for side in ('before', 'after'):
+        assert np.mean([one[f'{side}_mm'] for one in runs]) == getattr(
+            result, f'held_out_{side}')
+    one = runs[3]
+    loop = ClosedLoop(others[one['rig']], checks[1], one['seed'], driver=driver_config(rig))
+    assert loop.cost(load_controller(result.to_yaml(), rig)) == one['after_mm']
+    assert result.text().count('held-out') == 1 + len(checks)
 
 
 def test_same_seed_same_result_with_any_number_of_jobs(rig):

@@ -53,6 +53,10 @@ def tuning_section(result: 'TuneResult | dict[str, Any]', key: str = 'tuning',
     if changed:
         body += table(['setting', 'before', 'after'], [
             [name, _shown(c['before']), _shown(c['after'])] for name, c in changed.items()])
+    runs = data.get('held_out_runs') or []
+    if len(runs) > 1:
+        body += table([f'held-out {_words(name)}' for name in runs[0]], [
+            [_shown(value) for value in one.values()] for one in runs])
     unit = 'deg' if any(name.endswith('_deg') for name in data) else 'mm'
     history = data.get('history') or getattr(result, 'history', None) or []
     if len(history) > 1:
