@@ -56,11 +56,19 @@ class Problem:
         Return the cost [mm, of a joint degrees] of settings on every loop, shape (loops,).
 
         Settings without a controller (no solution of the Riccati equation) count as lost.
+
+        Raises
+        ------
+        InputError
+            The controller itself cannot be built again, without other settings.
+
         """
         costs = np.full(len(self.loops), LOST)
         try:
             controller = rebuild(self.controller, settings)
         except InputError:
+            if not settings:
+                raise
             return costs
         for i, loop in enumerate(self.loops):
             if i and controller.rules is not None:
@@ -71,6 +79,14 @@ class Problem:
     def cost_on(self, settings: dict[str, float], i: int) -> float:
         """Return the entry of ``costs`` for one loop."""
         return float(Problem([self.loops[i]], self.controller).costs(settings)[0])
+
+    def refusal(self, settings: dict[str, float]) -> str:
+        """Return why settings have no controller, '' where they have one."""
+        try:
+            rebuild(self.controller, settings)
+        except InputError as error:
+            return str(error)
+        return ''
 
     def cost(self, settings: dict[str, float]) -> float:
         """Return the mean cost [mm, of a joint degrees] of settings over the loops."""

@@ -31,6 +31,7 @@ import numpy as np
 from pam_actuation.control.controller_text import controller_to_yaml
 from pam_actuation.control.made_for import facts_of
 from pam_actuation.control.modes.tracked import JOINT, tracked_by
+from pam_actuation.tuning.cost import LOST
 from pam_actuation.tuning.initial_rules import initial_rules
 from pam_actuation.tuning.loops_of_rigs import loops_of
 from pam_actuation.tuning.problem import cost_on, costs_of, Problem, rebuild
@@ -112,6 +113,8 @@ class TuneResult:
         Held-out cost of what was found, also where that was dropped.
     held_out_runs : list of HeldOutRun
         The held-out costs one by one; their means are those above.
+    refused : list of str
+        Of every searched point that has no controller: why. It counted as lost.
 
     """
 
@@ -136,6 +139,7 @@ class TuneResult:
     unit: str = 'mm'
     held_out_found: float = math.nan
     held_out_runs: list[HeldOutRun] = field(default_factory=list, repr=False)
+    refused: list[str] = field(default_factory=list, repr=False)
 
     def to_yaml(self) -> str:
         """Return the tuned controller as YAML text for ``load_controller``."""
@@ -175,6 +179,7 @@ class TuneResult:
                 for one in self.held_out_runs],
             'rollouts': self.rollouts, 'simulated_s': self.simulated_s, 'seconds': self.seconds,
             'ended': self.ended, 'initial_rules': self.rules, 'left_out': self.left_out,
+            'without_controller': len(self.refused),
             'changed': {name: {'before': before, 'after': after}
                         for name, (before, after) in self.changed.items()}}
 
@@ -203,6 +208,9 @@ class TuneResult:
         if self.left_out:
             lines.append(f'  {self.left_out} pairs of rig and experiment left out: beyond what '
                          'the rig can reach')
+        if self.refused:
+            lines.append(f'  {len(self.refused)} searched points have no controller, such as: '
+                         f'{self.refused[0]}')
         lines += [f'  {name}: {before:g} -> {after:g}'
                   for name, (before, after) in self.changed.items()]
         return '\n'.join(lines)
@@ -287,11 +295,15 @@ def tune(rig: 'Rig | JointRig | Sequence[Rig | JointRig]', controller: 'Law',
     problem, check = Problem(train, controller), Problem(test, controller)
     done = [0]
     history: list[tuple[int, float]] = []
+    refused: list[str] = []         # why, of each point without a controller
 
     with Workers(jobs, cluster, modules=WARM) as workers:
         def of_generation(points: list[FloatArray]) -> list[float]:
             costs = costs_of(workers, problem, [from_unit(axes, p) for p in points])
             done[0] += len(points) * len(train)
+            refused.extend(filter(None, (
+                problem.refusal(from_unit(axes, point))
+                for point, cost in zip(points, costs) if cost == LOST)))
             history.append((done[0], min(costs + [cost for _, cost in history[-1:]])))
             if progress is not None:
                 progress(min(done[0], budget))
@@ -331,4 +343,4 @@ def tune(rig: 'Rig | JointRig | Sequence[Rig | JointRig]', controller: 'Law',
         axes, controller, problem, check, 'deg' if tracked_by(controller) == JOINT else 'mm',
         held_found, [
             HeldOutRun(loop.experiment.name, numbers[id(loop.rig)], seed + HELD_OUT_SEED, *costs)
-            for loop, *costs in zip(test, costs_before, costs_after)])
+            for loop, *costs in zip(test, costs_before, costs_after)], refused)

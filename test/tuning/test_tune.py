@@ -112,6 +112,21 @@ def test_costs_of_held_out_runs_are_told_one_by_one(rig):
     assert result.text().count('held-out') == 1 + len(checks)
 
 
+def test_points_without_a_controller_are_told(rig):
+    """They count as lost; a start without one ends the tuning with the reason."""
+    start, experiment = load_controller('controller: pid\n', rig), load_experiment(SHORT_SINE)
+    half = (Axis('proportional_pa_per_m', -1e6, 1e7, log=False),)
+    result = tune(rig, start, experiment, budget=30, axes=half)
+    told = result.to_dict()['without_controller']
+    assert 0 < told < 30
+    assert f'{told} searched points have no controller, such as: ' in result.text()
+    assert 'proportional_pa_per_m' in result.refused[0]
+    assert 'no controller' not in tune(rig, start, experiment, budget=20, axes=AXES[1:]).text()
+    start.settings['lead_s'] = -1.0
+    with pytest.raises(InputError, match='lead_s'):
+        tune(rig, start, experiment, budget=20, axes=AXES[1:])
+
+
 def test_same_seed_same_result_with_any_number_of_jobs(rig):
     one, two = (
         tune(rig, untuned(rig), load_experiment(SHORT_SINE), budget=30, seed=9, axes=AXES,
