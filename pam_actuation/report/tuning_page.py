@@ -40,8 +40,8 @@ if TYPE_CHECKING:
 
 LEAD = ('Settings and initial rules of the controller were searched on a model, in closed-loop '
         'rollouts of the compiled live code. The cost of a run is the root mean square error of '
-        'its last 30 %, plus a quarter of that of the whole run and a tenth of the worst late '
-        'error, in {unit}.')
+        'its last 30 %, plus a quarter of that of the whole and a tenth of the worst late error, '
+        'in {unit}. It counts from the first periodic part on, without one from the start.')
 
 
 def tuning_report(out_path: StrPath, result: 'TuneResult',

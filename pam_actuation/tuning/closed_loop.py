@@ -32,7 +32,7 @@ from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.tuning.cost import tracking_cost
 from pam_actuation.tuning.loop_parts import DISTURBANCE, Driver
 from pam_actuation.tuning.loop_setup import (
-    DriverLaw, first_periodic_tick, learning_mask, Learns, PHYSICS_S,
+    DriverLaw, first_periodic_tick, fresh_rise, learning_mask, Learns, PHYSICS_S,
     sensor_noise, steps_per_tick)
 from pam_actuation.tuning.sampled_reference import SampledReference
 from pam_actuation.tuning.tracking_errors import Cycles, TrackingErrors
@@ -121,6 +121,9 @@ class MuscleLoop:
         nominal rig where ``rig`` differs from what its model file says.
     preview_s : float
         How far ahead the controller is told the reference; without limit by default.
+    slow_start : bool
+        Whether commands rise slowly from the atmosphere at the start, as those of a real run;
+        by default the first one acts at once.
 
     Raises
     ------
@@ -134,10 +137,10 @@ class MuscleLoop:
     def __init__(self, rig: 'Rig', experiment: 'Experiment', seed: int = 0, rate_hz: float = 200.0,
                  latency_s: float = 0.003, external_force_n: Course | None = None,
                  driver: 'DriverConfig | None' = None, supply_pa: Course | None = None,
-                 preview_s: float = math.inf) -> None:
+                 preview_s: float = math.inf, slow_start: bool = False) -> None:
         self._arguments = (
             rig, experiment, seed, rate_hz, latency_s, external_force_n, driver, supply_pa,
-            preview_s)
+            preview_s, slow_start)
         if experiment.domain != self.DOMAIN:
             raise InputError(
                 f'experiment {experiment.name} is in {experiment.domain}; this loop tracks '
@@ -147,6 +150,7 @@ class MuscleLoop:
         self.rate_hz = rate_hz
         self.experiment = experiment
         self.hsv = rig.valve == 'hsv'
+        self.slow_start = slow_start
         self._state, self._par = rig.pack()
         refuse_terms(self._par)
         dt_s = fields(self._par, layout.PARAMETERS).dt_s
@@ -258,7 +262,7 @@ class ClosedLoop(MuscleLoop):
             *self._fresh_driver(controller.driver),
             self._reference.rows(controller.lead_s), self._noise, self._quantum,
             self._disturbance, learning_mask(controller, learn, self.ticks, self.rate_hz),
-            controller.input_array, log)
+            fresh_rise(self.slow_start, self.rate_hz), controller.input_array, log)
         return log.view(LOG)
 
 

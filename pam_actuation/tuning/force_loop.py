@@ -24,7 +24,7 @@ import numpy as np
 import numpy.typing as npt
 from pam_actuation.control.modes.tracked import FORCE, Tracked, tracked_by
 from pam_actuation.tuning.closed_loop import Course, MuscleLoop
-from pam_actuation.tuning.loop_setup import learning_mask, Learns
+from pam_actuation.tuning.loop_setup import fresh_rise, learning_mask, Learns
 from pam_actuation.tuning.mode_result import ModeResult
 from pam_sim.errors import InputError
 from pam_sim.load import LOADS
@@ -51,7 +51,7 @@ class ForceLoop(MuscleLoop):
         Contraction [m], possibly as a function of time [s] (driven load only); by default
         what an isometric rig states, 0 for a driven one.
     **others
-        ``seed``, ``rate_hz``, ``latency_s``, ``driver`` of ``ClosedLoop``.
+        ``seed``, ``rate_hz``, ``latency_s``, ``driver``, ``slow_start`` of ``ClosedLoop``.
 
     Raises
     ------
@@ -129,7 +129,8 @@ class ForceLoop(MuscleLoop):
         mode_rollouts.force_rollout(
             self._fresh_plant(self._start_m), self.hsv, *self._fresh_driver(controller.driver),
             self._reference.rows(controller.lead_s), self._noise, self._quantum, self._way_m,
-            learning_mask(controller, learn, self.ticks, self.rate_hz), mode,
+            learning_mask(controller, learn, self.ticks, self.rate_hz),
+            fresh_rise(self.slow_start, self.rate_hz), mode,
             controller.static_inverse, law, controller.law.input_array, log)
         return log.view(mode_rollouts.FORCE_LOG)
 

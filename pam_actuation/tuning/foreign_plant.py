@@ -26,7 +26,9 @@ from typing import Any, Protocol, TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
+from pam_actuation.control.following import FOLLOWS, LESS
 from pam_actuation.drivers import hsv_kernel, hsv_model, ppr
+from pam_actuation.slow_rise import SlowRise
 from pam_actuation.tuning.closed_loop import ClosedLoop, Course
 from pam_actuation.tuning.loop_parts import DISTURBANCE, READINGS, WANTED
 from pam_actuation.tuning.loop_setup import learning_mask, Learns, PHYSICS_S
@@ -123,6 +125,7 @@ class ForeignLoop(ClosedLoop):
         pressure_step, contraction_step, force_step = self._quantum.tolist()
         law, (steps, every, latency) = self._fresh_driver(controller.driver)
         drive = driver_function(law, self.hsv)
+        rise = SlowRise(active=self.slow_start)
         signal: tuple[float, ...] = (0.0, 0.0) if self.hsv else (0.0,)
         for tick in range(self.ticks):
             before, supply_pa = signal, plant.supply_pa
@@ -133,9 +136,10 @@ class ForeignLoop(ClosedLoop):
             measured_pa = quantised(true_pa + pressure_noise, pressure_step)
             measured_m = quantised(true_m + contraction_noise, contraction_step)
             reference, rate, lead, lead_rate = wanted[tick]
-            command_pa = controller.step(
+            command_pa = rise.limited(controller.step(
                 measured_m, reference, rate, lead, lead_rate, learns[tick] > 0.0,
-                pressure_pa=measured_pa, force_n=quantised(true_n + force_noise, force_step))
+                pressure_pa=measured_pa, force_n=quantised(true_n + force_noise, force_step),
+                held_back=LESS if rise.limiting else FOLLOWS), 1.0 / self.rate_hz)
             if tick % every == 0:
                 signal = drive(command_pa, measured_pa, supply_pa, measured_m)
             if latency:

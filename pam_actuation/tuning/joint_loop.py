@@ -31,7 +31,7 @@ from pam_actuation.tuning.cost import tracking_cost
 from pam_actuation.tuning.force_loop import check_controller
 from pam_actuation.tuning.loop_parts import Driver, JOINT_READINGS, READINGS
 from pam_actuation.tuning.loop_setup import (
-    DriverLaw, first_periodic_tick, learning_mask, Learns, PHYSICS_S,
+    DriverLaw, first_periodic_tick, fresh_rise, learning_mask, Learns, PHYSICS_S,
     sensor_noise, steps_per_tick)
 from pam_actuation.tuning.mode_result import ModeResult
 from pam_actuation.tuning.sampled_reference import SampledReference
@@ -73,6 +73,8 @@ class JointLoop:
         Numbers a controller asks for come on top.
     preview_s : float
         How far ahead the controller is told the reference; without limit by default.
+    slow_start : bool
+        As of ``closed_loop.MuscleLoop``.
 
     Raises
     ------
@@ -87,7 +89,7 @@ class JointLoop:
                  external_torque_n_m: Course | None = None,
                  angle_noise_rad: float = ANGLE_NOISE_RAD, angle_step_rad: float = ANGLE_STEP_RAD,
                  drivers: 'Sequence[DriverConfig] | None' = None,
-                 preview_s: float = math.inf) -> None:
+                 preview_s: float = math.inf, slow_start: bool = False) -> None:
         if experiment.domain != JOINT.topic:
             raise InputError(
                 f'experiment {experiment.name} is in {experiment.domain}; this loop tracks '
@@ -95,6 +97,7 @@ class JointLoop:
         experiment.check_reachable(joint)
         steps = steps_per_tick(rate_hz)
         self.joint, self.experiment, self.rate_hz = joint, experiment, rate_hz
+        self.slow_start = slow_start
         self._reference = SampledReference(experiment, rate_hz, preview_s)
         self.ticks = self._reference.ticks
         sides = {'flexor': joint.flexor, 'extensor': joint.extensor}
@@ -112,7 +115,7 @@ class JointLoop:
         if external_torque_n_m is not None:
             self._torque[:] = [external_torque_n_m(k / rate_hz) for k in range(self.ticks)]
         self._arguments = (joint, experiment, seed, rate_hz, latency_s, external_torque_n_m,
-                           angle_noise_rad, angle_step_rad, drivers, preview_s)
+                           angle_noise_rad, angle_step_rad, drivers, preview_s, slow_start)
         configs = drivers or [driver_config(rig) for rig in sides.values()]
         self._drivers = [DriverLaw(rig, config, rate_hz)
                          for rig, config in zip(sides.values(), configs)]
@@ -200,6 +203,7 @@ class JointLoop:
             *self._fresh_drivers(controller.driver),
             self._reference.rows(controller.lead_s), self._noise,
             self._quantum, self._torque,
-            learning_mask(controller, learn, self.ticks, self.rate_hz), mode, law,
+            learning_mask(controller, learn, self.ticks, self.rate_hz),
+            tuple(fresh_rise(self.slow_start, self.rate_hz) for _ in self._drivers), mode, law,
             controller.law.input_array, log)
         return log.view(mode_rollouts.JOINT_LOG)

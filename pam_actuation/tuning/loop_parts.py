@@ -20,6 +20,8 @@ import numpy as np
 from pam_actuation.drivers import hsv_kernel, hsv_model, ppr
 from pam_actuation.drivers.hsv_kernel import hsv_step
 from pam_actuation.drivers.ppr import ppr_step
+from pam_actuation.slow_rise import (
+    NEARLY_PA, RISE_PA_PER_S, UNDER_PRESSURE_PA, UNTIL_FOLLOWED_S)
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import compiled
 from pam_sim.records import part, record
@@ -38,6 +40,8 @@ JOINT_READINGS = record(
 WANTED = record('reference', 'rate', 'lead', 'lead_rate')
 # What acts on a muscle from outside.
 DISTURBANCE = record('external_force_n', 'supply_pa')
+# The slow rise of the commands of a controller that begins; all 0 for none.
+RISE = record('active', 'limiting', 'allowed_pa', 'followed_s', 'period_s')
 
 
 @compiled
@@ -54,6 +58,23 @@ def look_up(values: FloatArray, place: float) -> float:
     whole = min(int(place), values.shape[0] - 2)
     share = min(place - whole, 1.0)
     return (1.0 - share) * values[whole] + share * values[whole + 1]
+
+
+@compiled
+def risen(rise: np.record, command_pa: float) -> float:
+    """Return what a command may be now: ``SlowRise`` of a controller, as compiled code."""
+    if rise.active == 0.0:
+        return command_pa
+    reach_pa = rise.allowed_pa + RISE_PA_PER_S * rise.period_s
+    allowed_pa = min(command_pa, reach_pa)
+    rise.allowed_pa = allowed_pa
+    rise.limiting = 1.0 if command_pa > reach_pa + NEARLY_PA else 0.0
+    if rise.limiting == 0.0 and command_pa > UNDER_PRESSURE_PA:
+        followed_s = rise.followed_s + rise.period_s
+        rise.followed_s = followed_s
+        if followed_s >= UNTIL_FOLLOWED_S:
+            rise.active = 0.0
+    return allowed_pa
 
 
 @compiled

@@ -22,10 +22,12 @@ import numpy as np
 from pam_actuation.drivers import hsv_kernel, ppr
 from pam_actuation.drivers.config import DriverConfig
 from pam_actuation.drivers.hsv import initial_state
-from pam_actuation.tuning.loop_parts import Driver, READINGS
+from pam_actuation.slow_rise import LONGEST_STEP_S
+from pam_actuation.tuning.loop_parts import Driver, READINGS, RISE
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
-from pam_sim.records import zeros
+from pam_sim.records import fields, zeros
+from pam_sim.units import P_ATM_PA
 
 if TYPE_CHECKING:
     from pam_actuation.control.compiled_controller import CompiledController
@@ -58,6 +60,16 @@ def steps_per_tick(rate_hz: float) -> int:
         raise InputError(
             f'{rate_hz:g} Hz is no whole number of {PHYSICS_S * 1e3:g} ms steps per period')
     return steps
+
+
+def fresh_rise(slow_start: bool, rate_hz: float) -> FloatArray:
+    """Return the ``RISE`` of a controller that begins; it limits nothing without slow start."""
+    rise = zeros(RISE)
+    if slow_start:
+        start = fields(rise, RISE)
+        start.active, start.allowed_pa = 1.0, P_ATM_PA
+        start.period_s = min(1.0 / rate_hz, LONGEST_STEP_S)
+    return rise
 
 
 def first_periodic_tick(experiment: 'Experiment', rate_hz: float) -> int:

@@ -58,7 +58,7 @@ def loops_of(rigs: 'Sequence[Rig | JointRig]', experiments: 'Sequence[Experiment
     Return the closed loops of all pairs that can be reached, and how many cannot.
 
     The valve drivers know the data sheet of the ``nominal`` rig, the controllers the reference
-    ``preview_s`` ahead.
+    ``preview_s`` ahead. Where the cost counts the start, that is the one of a real run.
 
     Raises
     ------
@@ -82,9 +82,9 @@ def loops_of(rigs: 'Sequence[Rig | JointRig]', experiments: 'Sequence[Experiment
     drivers = [driver_config(muscle) for muscle in nominal.muscles.values()]
     loops: 'list[Loop]' = [
         JointLoop(rig, experiment, seed, controller.rate_hz, drivers=drivers,
-                  preview_s=preview_s)
+                  preview_s=preview_s, slow_start=experiment.cycles is None)
         if isinstance(rig, JointRig) else
         ClosedLoop(rig, experiment, seed, controller.rate_hz, driver=drivers[0],
-                   preview_s=preview_s)
+                   preview_s=preview_s, slow_start=experiment.cycles is None)
         for rig, experiment in kept]
     return loops, len(pairs) - len(kept)

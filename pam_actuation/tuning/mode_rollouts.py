@@ -22,12 +22,13 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from pam_actuation.control.following import FOLLOWS, UNKNOWN
 from pam_actuation.control.modes.force import FORCE_INPUT, force_inputs
 from pam_actuation.control.modes.joint import (
     COMMANDS, JOINT_INPUT, joint_inputs, joint_outputs)
 from pam_actuation.control.sofc.step import sofc_step
 from pam_actuation.tuning.loop_parts import (
-    drive, Driver, JOINT_READINGS, look_up, Plant, read, READINGS, WANTED)
+    drive, Driver, JOINT_READINGS, look_up, Plant, read, READINGS, RISE, risen, WANTED)
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import allocating_entry_point, source_key
 from pam_sim.joint import layout as joint_layout
@@ -51,14 +52,14 @@ def _entries(key: int) -> tuple[Callable[..., None], ...]:
     def force_rollout(
             plant: Plant, hsv: bool, driver: Driver, timing: tuple[int, int, int],
             reference: FloatArray, noise: FloatArray, quantum: FloatArray, way_m: FloatArray,
-            learn: FloatArray, mode: tuple[FloatArray, FloatArray, FloatArray],
+            learn: FloatArray, rise: FloatArray, mode: tuple[FloatArray, FloatArray, FloatArray],
             inverse: FloatArray, law: Any, inputs: FloatArray, log: FloatArray) -> None:
         """
         Track a force; the rules of the law change in place.
 
         Parameters
         ----------
-        plant, hsv, driver, timing, reference, noise, quantum, learn
+        plant, hsv, driver, timing, reference, noise, quantum, learn, rise
             As of ``rollouts.sense``, the reference in N and N/s.
         way_m : float64[:]
             Contraction of the driven or isometric load at every tick and at the end (N + 1);
@@ -84,6 +85,7 @@ def _entries(key: int) -> tuple[Callable[..., None], ...]:
         steps_of = part(quantum, 0, READINGS)
         raw_array = np.zeros(_FORCE_INPUT_SIZE)
         raw = part(raw_array, 0, FORCE_INPUT)
+        start = part(rise, 0, RISE)
         signal_0, signal_1 = acting.signal_0, acting.signal_1
         for tick in range(rows.shape[0]):
             row, off = rows[tick], noises[tick]
@@ -101,8 +103,9 @@ def _entries(key: int) -> tuple[Callable[..., None], ...]:
             raw.lead_rate_n_per_s = wanted[tick].lead_rate
             raw.learning = learn[tick]
             raw.elapsed_s = np.nan
+            raw.held_back = start.limiting
             force_inputs(par, surface, state, raw_array, inverse, inputs)
-            command_pa = sofc_step(*law)
+            command_pa = risen(start, sofc_step(*law))
             row.command_pa = command_pa
             if tick % driver_every == 0:
                 signal_0, signal_1 = drive(driver, hsv, command_pa, raw.pressure_pa)
@@ -118,8 +121,9 @@ def _entries(key: int) -> tuple[Callable[..., None], ...]:
             plant: tuple[Plant, Plant, Plant], hsv: tuple[bool, bool],
             drivers: tuple[Driver, Driver], timing: tuple[int, int, int],
             reference: FloatArray, noise: FloatArray, quantum: FloatArray,
-            torque_n_m: FloatArray, learn: FloatArray, mode: tuple[FloatArray, FloatArray],
-            law: Any, inputs: FloatArray, log: FloatArray) -> None:
+            torque_n_m: FloatArray, learn: FloatArray, rises: tuple[FloatArray, FloatArray],
+            mode: tuple[FloatArray, FloatArray], law: Any, inputs: FloatArray,
+            log: FloatArray) -> None:
         """
         Track an angle; the rules of the law change in place.
 
@@ -135,6 +139,8 @@ def _entries(key: int) -> tuple[Callable[..., None], ...]:
             N ``JOINT_READINGS`` of sensor noise, one behind the other, and those of the steps.
         torque_n_m : float64[:]
             External torque on the limb (N).
+        rises : tuple of float64[:]
+            ``RISE`` of the commands of flexor and extensor.
         mode : tuple
             par and state of ``joint_inputs`` and ``joint_outputs``.
         law, inputs : tuple, float64[:]
@@ -158,6 +164,8 @@ def _entries(key: int) -> tuple[Callable[..., None], ...]:
         steps, driver_every, latency_steps = timing
         wanted = reference.view(WANTED)
         par, state = mode
+        flexor_rises, extensor_rises = rises
+        flexor_rise, extensor_rise = part(flexor_rises, 0, RISE), part(extensor_rises, 0, RISE)
         noises, rows = noise.view(JOINT_READINGS), log.view(JOINT_LOG)
         steps_of = part(quantum, 0, JOINT_READINGS)
         raw_array = np.zeros(_JOINT_INPUT_SIZE)
@@ -190,9 +198,14 @@ def _entries(key: int) -> tuple[Callable[..., None], ...]:
             raw.lead_rate_rad_per_s = wanted[tick].lead_rate
             raw.learning = learn[tick]
             raw.elapsed_s = np.nan
+            raw.held_back = FOLLOWS
+            if flexor_rise.limiting + extensor_rise.limiting > 0.0:
+                raw.held_back = UNKNOWN
             joint_inputs(par, raw_array, inputs)
             u_pa = sofc_step(*law)
             joint_outputs(par, state, u_pa, raw_array, command_array)
+            commands.flexor_pa = risen(flexor_rise, commands.flexor_pa)
+            commands.extensor_pa = risen(extensor_rise, commands.extensor_pa)
             row.flexor_command_pa = commands.flexor_pa
             row.extensor_command_pa = commands.extensor_pa
             if tick % driver_every == 0:
@@ -214,4 +227,4 @@ def _entries(key: int) -> tuple[Callable[..., None], ...]:
 
 force_rollout, joint_rollout = _entries(source_key(
     force_inputs, joint_inputs, joint_outputs, sofc_step, step, joint_step, drive, look_up, read,
-    layout, joint_layout))
+    risen,    layout, joint_layout))

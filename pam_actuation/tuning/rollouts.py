@@ -29,7 +29,7 @@ from pam_actuation.control.lqi import lqi_step
 from pam_actuation.control.pid import pid_step
 from pam_actuation.control.sofc.step import sofc_step
 from pam_actuation.tuning.loop_parts import (
-    DISTURBANCE, drive, Driver, Plant, read, READINGS, WANTED)
+    DISTURBANCE, drive, Driver, Plant, read, READINGS, RISE, risen, WANTED)
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import compiled, entry_point, source_key
 from pam_sim.records import part, record
@@ -51,7 +51,7 @@ LOG = record(
 @compiled
 def sense(tick: int, plant: Plant, hsv: bool, driver: Driver, timing: tuple[int, int, int],
           reference: FloatArray, noise: FloatArray, quantum: FloatArray, disturbance: FloatArray,
-          learn: FloatArray, inputs: FloatArray, log: FloatArray) -> None:
+          learn: FloatArray, rise: FloatArray, inputs: FloatArray, log: FloatArray) -> None:
     """
     Fill the inputs of the controller and the measured part of the log.
 
@@ -75,6 +75,8 @@ def sense(tick: int, plant: Plant, hsv: bool, driver: Driver, timing: tuple[int,
         N ``DISTURBANCE``.
     learn : float64[:]
         1 where the rules may change (N).
+    rise : float64[:]
+        ``RISE`` of the commands, written by ``actuate``.
     inputs : float64[:]
         Inputs of the law (``inputs.INPUT``), written.
     log : float64[:]
@@ -94,6 +96,7 @@ def sense(tick: int, plant: Plant, hsv: bool, driver: Driver, timing: tuple[int,
     inp.lead_rate_m_per_s = wanted.lead_rate
     inp.learning = learn[tick]
     inp.elapsed_s = np.nan
+    inp.held_back = part(rise, 0, RISE).limiting        # LESS
     row.contraction_m = seen.true_contraction_m
     row.pressure_pa = seen.true_pressure_pa
     row.force_n = seen.true_force_n
@@ -103,13 +106,14 @@ def sense(tick: int, plant: Plant, hsv: bool, driver: Driver, timing: tuple[int,
 @compiled
 def actuate(tick: int, command_pa: float, plant: Plant, hsv: bool, driver: Driver,
             timing: tuple[int, int, int], reference: FloatArray, noise: FloatArray,
-            quantum: FloatArray, disturbance: FloatArray, learn: FloatArray, inputs: FloatArray,
-            log: FloatArray) -> None:
+            quantum: FloatArray, disturbance: FloatArray, learn: FloatArray, rise: FloatArray,
+            inputs: FloatArray, log: FloatArray) -> None:
     """Run the driver law where it is due and the physics of a period; others as of ``sense``."""
     plant_state, plant_par, plant_inp, plant_out = plant
     steps, driver_every, latency_steps = timing
     disturbances, row = disturbance.view(DISTURBANCE), log.view(LOG)[tick]
     acting = part(plant_inp, 0, layout.INPUT)
+    command_pa = risen(part(rise, 0, RISE), command_pa)
     signal_0, signal_1 = acting.signal_0, acting.signal_1
     if tick % driver_every == 0:
         signal_0, signal_1 = drive(

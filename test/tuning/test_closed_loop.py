@@ -15,10 +15,14 @@
 """The compiled closed loop on the realistic rig: learning halves the error, frozen does not."""
 
 import numpy as np
+from pam_actuation.bags.load import load_run
 from pam_actuation.control.config import load_controller
 from pam_actuation.control.sofc.persistence import load_rules
 from pam_actuation.experiments.experiment import load_experiment
+from pam_actuation.experiments.offline import simulate_experiment
 from pam_actuation.tuning.closed_loop import ClosedLoop
+from pam_actuation.tuning.foreign_plant import ForeignLoop
+from pam_actuation.tuning.loops_of_rigs import loops_of
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 import pytest
@@ -30,6 +34,13 @@ segments:
   - ramp: {to_m: 0.006, duration_s: 2.0}
   - hold: {duration_s: 3.0}
   - sine: {center_m: 0.014, amplitude_m: 0.008, frequency_hz: 0.25, cycles: 10}
+"""
+STEPS = """
+name: steps
+segments:
+  - rest: {duration_s: 0.2}
+  - step: {to_m: 0.008, duration_s: 2.0}
+  - step: {to_m: 0.014, duration_s: 1.5}
 """
 
 
@@ -100,6 +111,34 @@ def test_a_tick_before_the_run_changes_nothing(loop, name):
     used.step(0.0, 0.0, 0.0, 0.0, 0.0, learn=False, held_back=1.0, age_s=0.05,
               pressure_age_s=0.05)
     assert loop.cost(used) == loop.cost(fresh)
+
+
+@pytest.mark.parametrize('name', ['pid', 'lqi', 'sofc_ppr', 'mpc_ppr'])
+def test_a_slow_start_is_that_of_a_simulated_run(tmp_path, name):
+    """The commands rise as in a real run; without it the muscle is ahead of one."""
+    rig, experiment = load_rig('dmsp_5_300_realistic'), load_experiment(STEPS)
+    simulate_experiment(experiment, rig, load_controller(name, rig), tmp_path / 'run', seed=4)
+    run = load_run(tmp_path / 'run')
+    pressure, begins_s = run['pressure'], run['reference'].time_s[0]
+    away_pa = []
+    for slow in (False, True):
+        loop = ClosedLoop(rig, experiment, seed=4, slow_start=slow)
+        made = loop.run(load_controller(name, rig))
+        at = made.time_s < 3.0
+        away_pa.append(np.sqrt(np.mean((made.pressure_pa - np.interp(
+            made.time_s + begins_s, pressure.time_s, pressure['pressure_pa']))[at] ** 2)))
+        again = ForeignLoop(rig.plant, rig, experiment, seed=4, slow_start=slow).run(
+            load_controller(name, rig))
+        assert np.array_equal(again.command_pa, made.command_pa)
+    assert away_pa[1] < 0.3 * away_pa[0] and away_pa[1] < 8e3
+
+
+def test_tuning_starts_slowly_where_the_cost_counts_the_start(loop):
+    """Not where a periodic part alone counts."""
+    experiments = [load_experiment(SETTLED_SINE), load_experiment(STEPS)]
+    loops, _ = loops_of([loop.rig], experiments, 1, controller_of(loop), loop.rig)
+    assert [one.slow_start for one in loops] == [False, True]
+    assert [one.start_tick > 0 for one in loops] == [True, False]
 
 
 def test_what_cannot_be_run_is_refused(loop):

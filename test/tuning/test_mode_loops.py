@@ -17,8 +17,10 @@
 import math
 
 import numpy as np
+from pam_actuation.bags.load_joint import load_recording
 from pam_actuation.control.config import load_controller
 from pam_actuation.experiments import load_experiment
+from pam_actuation.experiments.offline import simulate_experiment
 from pam_actuation.tuning.force_loop import ForceLoop
 from pam_actuation.tuning.joint_loop import JointLoop
 from pam_sim import load_rig
@@ -153,3 +155,34 @@ def test_what_cannot_be_tracked_is_refused():
         ForceLoop(rig, sine).run(load_controller('controller: pid\nmode: force\n', rig))
     with pytest.raises(InputError, match='rad'):
         JointLoop(joint.with_(parameters={'upper_stop_rad': 0.2}), load_experiment('joint_sine'))
+
+
+@pytest.mark.parametrize('mode', ['joint', 'force'])
+def test_a_slow_start_is_that_of_a_simulated_run(tmp_path, mode):
+    """The pressures rise as in a real run; without it they are ahead."""
+    if mode == 'joint':
+        rig, make, topic = load_joint('joint_dmsp_5_300_realistic'), JointLoop, 'flexor/pressure'
+        wanted, domain = 'rad: 0.2', 'joint_angle'
+    else:
+        rig, make, topic = load_rig('dmsp_5_300_isometric_realistic'), ForceLoop, 'pressure'
+        wanted, domain = 'n: 60.0', 'force'
+    experiment = load_experiment(f"""
+name: jump
+domain: {domain}
+segments:
+  - rest: {{duration_s: 0.1}}
+  - step: {{to_{wanted}, duration_s: 1.5}}
+""")
+    controller = load_controller(f'sofc_{mode}_ppr', rig)
+    simulate_experiment(experiment, rig, controller, tmp_path / 'run', seed=4)
+    run = load_recording(tmp_path / 'run')
+    measured = run[topic]
+    begins_s = run['joint_reference' if mode == 'joint' else 'reference'].time_s[0]
+    away_pa = []
+    for slow in (False, True):
+        made = make(rig, experiment, seed=4, slow_start=slow).run(
+            load_controller(f'sofc_{mode}_ppr', rig))
+        pressure_pa = made.signals['flexor_pressure_pa' if mode == 'joint' else 'pressure_pa']
+        away_pa.append(np.abs(pressure_pa - np.interp(
+            made.time_s + begins_s, measured.time_s, measured['pressure_pa'])).max())
+    assert away_pa[1] < 0.3 * away_pa[0], away_pa
