@@ -56,3 +56,14 @@ segments:
 """)
     run = ClosedLoop(rig, hold, seed=1).run(load_controller('sofc_ppr', rig))
     assert run.rmse_m(5.0, 6.0) < 2e-5
+
+
+@pytest.mark.parametrize('name', ['pid', 'sofc_ppr', 'mpc_ppr'])
+def test_a_preset_knows_its_rig_and_a_written_file_the_one_before(name):
+    """What the reference says of files of a controller: how to compare designs on another rig."""
+    nominal = load_rig('dmsp_5_300_realistic')
+    heavy = nominal.with_(parameters={'mass_kg': 6.5})
+    written = load_controller(name, nominal).to_yaml()
+    at_rest_pa = [float(inverse_pressure_pa(load_controller(one, rig).static_inverse, 0.0))
+                  for one, rig in ((name, nominal), (name, heavy), (written, heavy))]
+    assert at_rest_pa[2] == at_rest_pa[0] < at_rest_pa[1] - 5e4
