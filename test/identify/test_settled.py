@@ -41,7 +41,7 @@ def steps():
         {'name': 'valve_dead_time_by_direction', 'parameters': {
             'delay_s': 0.09, 'vent_later_s': -0.03}},
         {'name': 'flow_limit', 'parameters': {
-            'fill_rate_at_400kpa_pa_per_s': 5.5e5, 'vent_rate_at_400kpa_pa_per_s': 6.0e5}},
+            'fill_rate_at_400kpa_pa_per_s': 3.5e5, 'vent_rate_at_400kpa_pa_per_s': 4.0e5}},
         {'name': 'vent_bleed', 'parameters': {
             'closing_pressure_pa': 15e3, 'bleed_rate_pa_per_s': 8e3}}])
     return record(rig, LEVELS_PA, 2.5, ('pressure', 'contraction'), zero_pa=ZERO_PA)

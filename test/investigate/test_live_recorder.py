@@ -67,7 +67,7 @@ class Nodes:
             if until():
                 return
 
-    def finish(self):
+    def finish(self, failure=None):
         """Vent."""
         self.finished += 1
         return []
