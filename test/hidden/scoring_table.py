@@ -147,9 +147,10 @@ def table(cases, families):
         share_row('– of them hard', kind('hard_null'),
                   lambda c: is_false_alarm(c.answer), most=0.015),
         share_row('out of library, far: abstains or states a remainder',
-                  [c for c in kind('far') if c.gap >= 1.0], lambda c: abstains(c.answer), 0.95),
+                  [c for c in kind('far') if c.gap >= 1.0],
+                  lambda c: abstains(c.answer, c.key), 0.95),
         share_row('out of library, near-family', [c for c in kind('near') if c.gap >= 1.0],
-                  lambda c: abstains(c.answer), 0.80),
+                  lambda c: abstains(c.answer, c.key), 0.80),
         share_row('parameter error reported as a parameter', wrong, right, 0.95),
         share_row('ambiguous: the set and a right next experiment', ambiguous,
                   lambda c: c.answer.verdict == 'ambiguous' and set(c.key['rivals']) <= set(

@@ -17,7 +17,8 @@
 import re
 
 import pytest
-from scoring_judge import is_of_family, is_right, read_answer, shrink_percent, wrong_names
+from scoring_judge import (
+    abstains, is_of_family, is_right, read_answer, shrink_percent, wrong_names)
 from scoring_mutants import constant, oracle
 from scoring_table import scored, table, wilson
 from scoring_text import report
@@ -115,6 +116,15 @@ def test_a_stated_remainder_excuses_a_name_only_out_of_library():
     answer = constant('effects', 'viscous_damping') | {'unexplained_fraction': 0.3}
     assert wrong_names(read_answer(answer), {'effects': [], 'wrong': {}, 'outside': ['x']}) == ()
     assert wrong_names(read_answer(answer), {'effects': ['creep'], 'wrong': {}, 'outside': []})
+
+
+def test_a_kind_that_the_library_holds_since_may_be_named():
+    key = {'effects': [], 'wrong': {}, 'outside': ['swinging_regulator']}
+    named, wrongly = (read_answer(constant('effects', name)) for name in (
+        'regulator_overshoot', 'tube_lag'))
+    assert wrong_names(named, key) == () and abstains(named, key)
+    assert wrong_names(wrongly, key) and not abstains(wrongly, key)
+    assert wrong_names(named, key | {'outside': ['ripple']}) == ('regulator_overshoot',)
 
 
 def test_shrink_is_that_of_the_signal_that_missed_most():
