@@ -51,7 +51,7 @@ LAG_S, LAG_SD = 0.06, 0.5
 MODEL = load_rig(whole.NOMINAL).with_(
     tolerance={**dict.fromkeys(UNKNOWN_NAMES, UNKNOWN), 'T_m': LAG_SD})
 KINDS = 'none', 'creep', 'valve_dead_time + flow_limit', 'swings', 'slower when full'
-UNNAMED = 'swings', 'slower when full'
+NAMES = {'none': [], 'swings': ['regulator_overshoot'], 'slower when full': []}     # else: its own
 TOPICS = 'pressure', 'contraction', 'valve_signal'
 SCALES = 0.5, 1.2            # times the usual size
 
@@ -70,7 +70,7 @@ def draw(seed, place):
                     'resonance_damping': float(rng.uniform(0.3, 0.6))}
     elif kind == 'slower when full':
         numbers['full_slow'] = float(rng.uniform(1.0, 3.0))
-    elif kind != 'none':
+    else:
         for name in names_of(kind):
             numbers |= truth_effects.EFFECTS[name].draw(
                 rng, float(rng.uniform(*SCALES)), 'ppr').numbers
@@ -79,7 +79,7 @@ def draw(seed, place):
 
 def names_of(kind):
     """Return the names that are right for a kind of rig."""
-    return [] if kind in (*UNNAMED, 'none') else kind.split(' + ')
+    return NAMES.get(kind, kind.split(' + '))
 
 
 def recorded(seed, place, numbers, bias_pa):
