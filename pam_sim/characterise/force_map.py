@@ -117,8 +117,13 @@ def surfaces_of_map(table: MeasuredTable, dimensions: Dimensions,
     surfaces = build_surfaces(replace(points, load_u_n=np.full_like(points.load_n, more_n)),
                               dimensions, load_step_n, loads_n)
     remarks = [smooth.text() if smooth else (
-        'A force map has one branch and states no noise: the uncertainty given is that of the '
-        'contraction at which the force vanishes, and what the table is off at its points.')]
+        'A force map is read as one branch and states no noise: the uncertainty given is that of '
+        'the contraction at which the force vanishes, and what the table is off at its points.')]
+    repeated = table.columns['force'].size - measured.force_n.size
+    if repeated:
+        remarks.append(
+            f'{repeated} rows repeat a pressure and a contraction of other rows, so the mean of '
+            'their forces was taken. The uncertainty does not hold how far they are apart.')
     remarks.append(error.text(length_m))
     longer = beyond(measured)
     return surfaces, error, remarks + ([] if longer is None else [longer.text(length_m)])

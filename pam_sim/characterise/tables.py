@@ -144,9 +144,19 @@ def strain_of(table: MeasuredTable, length_m: float) -> FloatArray:
 
 
 def map_of(table: MeasuredTable, length_m: float) -> ForceMap:
-    """Return the ForceMap of a table of kind ``force map``, for a length at rest [m]."""
+    """
+    Return the ForceMap of a table of kind ``force map``, for a length at rest [m].
+
+    The forces of rows at one pressure and contraction are averaged.
+    """
     force = table.columns['force']
     pressure, strain = table.columns['pressure'], strain_of(table, length_m)
+    points, place = np.unique(
+        np.column_stack([pressure, strain]), axis=0, return_inverse=True)
+    if len(points) < force.size:
+        place = place.ravel()
+        force = np.bincount(place, force) / np.bincount(place)
+        pressure, strain = points.T
     return ForceMap(table.path, length_m, pressure, strain, force,
                     slack_points(pressure, strain, force))
 

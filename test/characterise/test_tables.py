@@ -102,6 +102,29 @@ def test_a_table_holds_the_measured_forces_and_says_how_well(name, length_m, bor
 
 
 @pytest.mark.filterwarnings('error')
+def test_rows_of_one_pressure_and_length_are_averaged(tmp_path):
+    law = make_law('sarosi', muscle='dmsp_10_250_map')
+    rows = [(p, percent, max(float(law.formula_n(1e3 * p, 0.01 * percent)), 0.0))
+            for p in range(100, 501, 100) for percent in range(0, 16, 3)]
+
+    def found(rows):
+        return characterise_table(write(
+            tmp_path / 'map.csv', 'pressure_kPa,contraction_percent,force_N', rows),
+            Dimensions(0.25, 0.01))
+
+    once = found(rows)
+    assert not any('repeat' in line for line in once.remarks)
+    up, down = ([(p, percent, share * force) for p, percent, force in rows]
+                for share in (0.92, 1.08))
+    for more in (rows + rows[-1:], rows + rows, up + down, down + up):
+        again = found(more)
+        assert again.surfaces.load_n == pytest.approx(once.surfaces.load_n, abs=1e-6)
+        assert again.surfaces.strain == pytest.approx(once.surfaces.strain, abs=1e-6)
+        assert any(line.startswith(f'{len(more) - len(rows)} rows repeat')
+                   for line in again.remarks)
+
+
+@pytest.mark.filterwarnings('error')
 def test_a_contraction_that_is_a_step_of_the_table_makes_no_second_point(tmp_path):
     rows = [(p, s, p * (1.0 - s / 0.14)) for p in (100, 200, 300) for s in (0.0, 0.07)]
     found = characterise_table(write(tmp_path / 'map.csv', 'pressure_kPa,strain,force_N', rows),
