@@ -20,6 +20,7 @@ import math
 import numpy as np
 from pam_sim.characterise.beyond import beyond
 from pam_sim.characterise.dimensions import Dimensions
+from pam_sim.characterise.points import stepped_loads
 from pam_sim.characterise.scattered import smoothed
 from pam_sim.characterise.surfaces import build_surfaces, Surfaces
 from pam_sim.characterise.tables import map_of, MeasuredTable, points_of_map
@@ -99,12 +100,12 @@ def surfaces_of_map(table: MeasuredTable, dimensions: Dimensions,
     Raises
     ------
     InputError
-        Too few pressures, or the muscle does not contract.
+        Too few pressures or loads, or the muscle does not contract.
 
     """
     length_m, measured = dimensions.length_m, map_of(table, dimensions.length_m)
-    wanted = None if load_step_n is None else load_step_n * np.arange(
-        int(measured.force_n.max() / load_step_n + 0.02) + 1)
+    wanted = None if load_step_n is None else stepped_loads(
+        float(measured.force_n.max()), load_step_n)
     smooth = smoothed(table, length_m)
     points = points_of_map(smooth.table if smooth else table, length_m, wanted,
                            all_forces=smooth is None)

@@ -171,14 +171,27 @@ def load_grid(load_n: FloatArray, step_n: float | None = None) -> FloatArray:
     if step_n is None and (np.any(np.abs(spacing[1:] - usual) > 0.2 * usual) or usual < 1.0):
         inner = np.round(load_n[load_n > 0.05], 1)
         return _with_middles(np.concatenate([[0.0], inner[inner > 0.25 * usual]]))
-    step = float(step_n or np.round(usual))
-    if not step > 0.0:
-        raise InputError(f'is {step:g}; allowed is above 0', '--load-step-n')
-    grid = step * np.arange(int(load_n[-1] / step + 0.02) + 1)
+    return _with_middles(stepped_loads(
+        float(load_n[-1]), float(np.round(usual) if step_n is None else step_n)))
+
+
+def stepped_loads(largest_n: float, step_n: float) -> FloatArray:
+    """
+    Return loads [N] at equal steps from 0 to the largest.
+
+    Raises
+    ------
+    InputError
+        A step of 0 or less, or one that makes fewer than 3 loads.
+
+    """
+    if not step_n > 0.0:
+        raise InputError(f'is {step_n:g}; allowed is above 0', '--load-step-n')
+    grid = step_n * np.arange(int(largest_n / step_n + 0.02) + 1)
     if grid.size < 3:
-        raise InputError(f'of {step:g} N makes {grid.size} loads up to {load_n[-1]:.1f} N; '
+        raise InputError(f'of {step_n:g} N makes {grid.size} loads up to {largest_n:.1f} N; '
                          f'3 or more are needed', '--load-step-n')
-    return _with_middles(grid)
+    return grid
 
 
 def _with_middles(axis: FloatArray) -> FloatArray:

@@ -170,6 +170,15 @@ def test_tables_that_say_too_little_are_refused(tmp_path, head, rows, words):
         write(tmp_path / 'bad.csv', head, rows)
 
 
+@pytest.mark.parametrize('step_n, words', [
+    (1000.0, '3 or more'), (0.0, 'above 0'), (-5.0, 'above 0'), (np.nan, 'above 0')])
+def test_a_step_that_makes_no_loads_is_refused(contraction_table, step_n, words):
+    path = resources.files('pam_sim.muscle').joinpath('dmsp_10_250_force_map.csv')
+    for table in (read_measured_table(path), contraction_table):
+        with pytest.raises(InputError, match=f'--load-step-n: .*{words}'):
+            characterise_table(table, Dimensions(0.25, 0.01), load_step_n=step_n)
+
+
 def test_tables_with_too_few_points_are_refused(tmp_path):
     two = write(tmp_path / 'two.csv', 'pressure_kPa,length_m,force_N',
                 [(p, x, 50) for p in (100, 200) for x in (0.3, 0.28)])

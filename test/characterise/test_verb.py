@@ -86,6 +86,7 @@ def test_a_table_of_others_is_taken_and_what_it_lacks_is_said(tmp_path, capsys):
     ([], 'give bags'),
     ([str(MAP)], '--length-m'),
     ([str(MAP), str(MAP), '--length-m', '0.25'], 'comes alone'),
+    ([str(MAP), '--length-m', '0.25', '--load-step-n', '1000'], '--load-step-n'),
     ([str(MAP), '--simulate', 'dmsp_5_300_realistic'], 'takes no bags'),
     (['--simulate', 'dmsp_5_300_isometric'], 'no hanging mass'),
     (['--simulate', 'dmsp_5_300_realistic', '--experiment', 'step_10mm'], 'pressure domain'),
