@@ -82,8 +82,8 @@ def read_measured_table(path: StrPath, rows_of: RowsOf = read_commented_csv) -> 
     Raises
     ------
     InputError
-        File missing, unknown or missing column, a cell that is no number, a
-        negative pressure.
+        File missing, unknown or missing column, two of one quantity, a cell that is no
+        number, a negative pressure.
 
     """
     rows, source = rows_of(path)
@@ -97,6 +97,13 @@ def read_measured_table(path: StrPath, rows_of: RowsOf = read_commented_csv) -> 
     if unknown:
         raise InputError(
             f'has the column `{unknown[0]}`; known are {", ".join(COLUMNS)}, branch', str(path))
+    first: dict[str, str] = {}
+    for name in head:
+        quantity = COLUMNS[name][0] if name in COLUMNS else name
+        if quantity in first:
+            raise InputError(f'states {quantity} twice, `{first[quantity]}` and `{name}`; allowed '
+                             'is one column of each', str(path))
+        first[quantity] = name
     cells: dict[str, list[float]] = {COLUMNS[name][0]: [] for name in head if name != 'branch'}
     branch: list[str] = []
     for number, row in enumerate(rows[1:], 1):

@@ -164,6 +164,11 @@ def test_zeros_of_force_are_censored_and_leave_a_doubt(tmp_path):
     ('pressure_kPa,load_N,strain', [(1, 'x', 0)], 'no number'),
     ('pressure_kPa,load_N,strain', [(1, 2)], '2 cells'),
     ('pressure_kPa,load_N,strain', [(-50, 2, 0)], 'gauge'),
+    ('pressure_kPa,pressure_Pa,strain,force_N', [(1, 1000, 0, 5)],
+     'pressure twice, `pressure_kpa` and `pressure_pa`'),
+    ('pressure_kPa,strain,contraction_percent,load_N', [(1, 0, 0, 5)], 'strain twice'),
+    ('pressure_kPa,load_N,strain,strain', [(1, 2, 0, 0)], 'strain twice'),
+    ('pressure_kPa,load_N,strain,branch,branch', [(1, 2, 0, 'up', 'up')], 'branch twice'),
 ])
 def test_tables_that_say_too_little_are_refused(tmp_path, head, rows, words):
     with pytest.raises(InputError, match=words):
