@@ -27,7 +27,7 @@ from pam_sim.characterise.points import points_of, without_stuck
 from pam_sim.characterise.surfaces import build_surfaces, Surfaces
 from pam_sim.characterise.tables import loads_of_table, MeasuredTable
 from pam_sim.errors import InputError
-from pam_sim.model_file import load_rig
+from pam_sim.joint import load_rig_or_joint
 from pam_sim.muscle.lookup_table import LookupTable
 from pam_sim.rig import Rig
 from pam_sim.run import Run
@@ -168,15 +168,27 @@ def _stuck_words(loads: Sequence[float]) -> list[str]:
 
 
 def rig_of(run: Run) -> Rig | None:
-    """Return the rig in the metadata of a run, None where there is none that can be read."""
+    """
+    Return the rig in the metadata of a run, None where they hold none of its muscle.
+
+    Of a joint it is the muscle below which the run was recorded, such as ``/knee/flexor``.
+
+    Raises
+    ------
+    InputError
+        It cannot be read.
+
+    """
     text = (run.metadata or {}).get('rig')
     if not text:
         return None
     try:
-        return load_rig(text)
+        rig = load_rig_or_joint(text)
     except InputError as mistake:
         raise InputError(f'the rig in its metadata cannot be read: {mistake}',
                          run.path) from None
+    return rig if isinstance(rig, Rig) else rig.muscles.get(
+        f'{run.namespace.rpartition("/")[2]}/')
 
 
 def _simulated(run: Run) -> bool:

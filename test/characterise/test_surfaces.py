@@ -23,6 +23,7 @@ from pam_sim.characterise import characterise
 from pam_sim.characterise.fixed_load import fixed_load
 from pam_sim.characterise.points import points_of, with_no_load
 from pam_sim.errors import InputError
+from pam_sim.joint import load_joint
 from pam_sim.muscle.registry import make_law
 import pytest
 from stepped_runs import contraction_m, LENGTH_M, LEVELS_PA, series_of_runs, stepped_run
@@ -224,6 +225,17 @@ def test_recordings_of_different_muscles_or_of_none_are_refused():
         characterise_runs(runs)
     with pytest.raises(InputError, match='--length-m'):
         characterise_runs(series_of_runs([0.0, 30.0, 60.0]))
+
+
+def test_a_muscle_of_a_joint_is_characterised():
+    joint = load_joint('knee_dmsp_20_300')
+    runs = series_of_runs([0.0, 30.0, 60.0], metadata={'rig': joint.to_yaml()})
+    with pytest.raises(InputError, match='--length-m'):
+        characterise_runs(runs)
+    assert characterise_runs(runs, MUSCLE).dimensions == MUSCLE
+    for run in runs:
+        run.namespace = '/knee/flexor'
+    assert characterise_runs(runs).dimensions == Dimensions.of_rig(joint.flexor)
 
 
 def test_without_a_force_the_mass_of_the_rig_is_the_load():
