@@ -104,11 +104,11 @@ def characterise_runs(
         pressures, runs of different muscles.
 
     """
-    if loads_n and len(loads_n) != len(runs):
+    if loads_n is not None and len(loads_n) != len(runs):
         raise InputError(f'has {len(loads_n)} loads for {len(runs)} recordings', '--load-n')
     rigs = [rig_of(run) for run in runs]
     size = one_muscle(runs, rigs, dimensions)
-    loads = [fixed_load(run, size.length_m, loads_n[k] if loads_n else None, rigs[k])
+    loads = [fixed_load(run, size.length_m, None if loads_n is None else loads_n[k], rigs[k])
              for k, run in enumerate(runs)]
     points, stuck = without_stuck(points_of(loads))
     surfaces = build_surfaces(points, size, load_step_n)

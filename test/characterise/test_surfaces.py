@@ -195,6 +195,14 @@ def test_repetitions_of_a_load_are_put_together():
         0.0, 15.0, 30.0, 45.0, 60.0]
 
 
+def test_loads_may_be_an_array():
+    loads = np.array([0.0, 30.0, 60.0])
+    found = characterise_runs(series_of_runs(loads), MUSCLE, loads_n=loads)
+    assert [one.load_from for one in found.loads] == ['given'] * 3
+    with pytest.raises(InputError, match='0 loads for 3'):
+        characterise_runs(series_of_runs(loads), MUSCLE, loads_n=[])
+
+
 def rig_text(**parameters):
     return load_rig('dmsp_5_300_hanging_mass').with_(parameters=parameters).to_yaml()
 
