@@ -15,7 +15,7 @@
 """One fixed load: its force, its branches of rising and falling pressure."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from pam_sim.annotations import FloatArray
@@ -165,22 +165,33 @@ def by_load(loads: Sequence[FixedLoad]) -> list[FixedLoad]:
     if len(lengths) > 1:
         raise InputError('the recordings are of different muscles: lengths '
                          + ', '.join(f'{length:g}' for length in lengths) + ' m')
-    merged: list[FixedLoad] = []
+    groups: list[list[FixedLoad]] = []
     for one in sorted(loads, key=lambda one: one.load_n):
-        if merged and one.load_n - merged[-1].load_n < SAME_LOAD_N:
-            last = merged[-1]
-            merged[-1] = FixedLoad(
-                0.5 * (last.load_n + one.load_n),
-                float(np.hypot(0.5 * np.hypot(last.load_u_n, one.load_u_n),
-                               0.5 * (one.load_n - last.load_n))),
-                one.load_from, one.length_m, last.holds + one.holds,
-                last.unsettled + one.unsettled, f'{last.path}, {one.path}')
+        if groups and one.load_n - _mean_load_n(groups[-1]) < SAME_LOAD_N:
+            groups[-1].append(one)
         else:
-            merged.append(one)
-    if len(merged) < 3:
+            groups.append([one])
+    if len(groups) < 3:
         measured = ', '.join(f'{one.load_n:.1f}' for one in sorted(
             loads, key=lambda one: one.load_n))
         raise InputError(
             f'loads of {measured} N: 3 or more that differ by at least {SAME_LOAD_N:g} N are '
             f'needed')
-    return merged
+    return [_together(group) for group in groups]
+
+
+def _mean_load_n(group: Sequence[FixedLoad]) -> float:
+    return float(np.mean([one.load_n for one in group]))
+
+
+def _together(group: Sequence[FixedLoad]) -> FixedLoad:
+    """Return repetitions of a load as one FixedLoad of their mean load."""
+    if len(group) == 1:
+        return group[0]
+    noise = float(np.linalg.norm([one.load_u_n for one in group])) / len(group)
+    return replace(
+        group[-1], load_n=_mean_load_n(group),
+        load_u_n=float(np.hypot(noise, np.std([one.load_n for one in group]))),
+        holds=[hold for one in group for hold in one.holds],
+        unsettled=[hold for one in group for hold in one.unsettled],
+        path=', '.join(one.path for one in group))

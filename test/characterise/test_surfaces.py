@@ -20,7 +20,7 @@ import numpy as np
 from pam_sim import load_rig
 from pam_sim.characterise import against_rig, characterise_runs, Dimensions
 from pam_sim.characterise import characterise
-from pam_sim.characterise.fixed_load import fixed_load
+from pam_sim.characterise.fixed_load import by_load, fixed_load, FixedLoad
 from pam_sim.characterise.points import points_of, with_no_load
 from pam_sim.errors import InputError
 from pam_sim.joint import load_joint
@@ -193,6 +193,15 @@ def test_repetitions_of_a_load_are_put_together():
     runs = series_of_runs([0.0, 30.0, 60.0]) + [stepped_run(30.1, seed=9)]
     assert characterise_runs(runs, MUSCLE).surfaces.load_n.tolist() == [
         0.0, 15.0, 30.0, 45.0, 60.0]
+
+
+def test_the_load_of_repetitions_is_their_mean():
+    hung = [10.0, 10.3, 10.4]
+    found = by_load([FixedLoad(load, 0.1, 'given', LENGTH_M, [], path=f'{load:g}')
+                     for load in (20.0, 0.0, *hung[::-1])])
+    assert [one.path for one in found] == ['0', '10, 10.3, 10.4', '20']
+    assert found[1].load_n == pytest.approx(np.mean(hung))
+    assert found[1].load_u_n == pytest.approx(np.hypot(0.1 / np.sqrt(3.0), np.std(hung)))
 
 
 def test_loads_may_be_an_array():
