@@ -123,7 +123,7 @@ def characterise_runs(
     result = Characterisation(surfaces, size, 'recordings', loads,
                               [run.path for run in runs], provenance)
     result.remarks += _stuck_words(stuck)
-    _finish(result)
+    _finish(result, float(points.load_n[0]))
     return result
 
 
@@ -150,15 +150,17 @@ def characterise_table(
     """
     source = [f'from a {table.kind}'] + [line for line in table.source.splitlines() if line]
     if table.kind == 'force map':
+        smallest_n = 0.0
         surfaces, error, remarks = surfaces_of_map(table, dimensions, load_step_n)
         result = Characterisation(surfaces, dimensions, table.kind, [], [table.path],
                                   source + [error.source()], remarks)
     else:
         loads = loads_of_table(table, dimensions.length_m)
         points, stuck = without_stuck(points_of(loads))
+        smallest_n = float(points.load_n[0])
         result = Characterisation(build_surfaces(points, dimensions, load_step_n), dimensions,
                                   table.kind, loads, [table.path], source, _stuck_words(stuck))
-    _finish(result)
+    _finish(result, smallest_n)
     return result
 
 
@@ -224,8 +226,8 @@ def one_muscle(
     return given if given is not None else next(iter(seen))[0]
 
 
-def _finish(result: Characterisation) -> None:
-    """Add what every result says of itself."""
+def _finish(result: Characterisation, smallest_n: float) -> None:
+    """Add what every result says of itself, with the smallest load that was kept [N]."""
     size = result.dimensions
     bore = '' if size.bore_m is None else f', bore {1e3 * size.bore_m:g} mm'
     result.provenance.append(
@@ -247,8 +249,9 @@ def _finish(result: Characterisation) -> None:
         result.remarks.append(
             'Some points were measured on one branch only: their uncertainty holds no '
             'hysteresis.')
-    if result.loads and result.loads[0].load_n > 0.05:
-        result.remarks.append('No run had 0 N: that column was extrapolated from the others.')
+    if smallest_n > 0.05:
+        result.remarks.append(
+            'No run that was kept had 0 N: that column was extrapolated from the others.')
     if result.surfaces.unknown:
         result.remarks.append(result.surfaces.unknown)
         result.provenance.append(f'not known: {result.surfaces.unknown}')

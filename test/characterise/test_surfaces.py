@@ -126,16 +126,18 @@ def test_what_no_load_was_lifted_at_is_not_known():
 
 
 def test_loads_that_are_all_lifted_leave_nothing_unknown(found):
+    assert not any('extrapolated' in line for line in found.remarks)
     assert not found.surfaces.unknown and 'not known' not in found.table().source
 
 
 def test_a_load_that_friction_holds_is_left_out():
     runs = series_of_runs(np.arange(10.0, 151.0, 10.0), half_m=1e-3)
-    stuck = stepped_run(1.0, half_m=8e-3)
-    found = characterise_runs([stuck, *runs], MUSCLE)
-    assert any('friction holds it' in line for line in found.remarks)
     without = characterise_runs(runs, MUSCLE)
-    assert np.array_equal(found.surfaces.strain, without.surfaces.strain)
+    for stuck_n in (0.0, 1.0):
+        found = characterise_runs([stepped_run(stuck_n, half_m=8e-3), *runs], MUSCLE)
+        assert any('friction holds it' in line for line in found.remarks)
+        assert any('0 N: that column was extrapolated' in line for line in found.remarks)
+        assert np.array_equal(found.surfaces.strain, without.surfaces.strain)
 
 
 def test_one_branch_is_enough_and_said():
