@@ -26,7 +26,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from pam_sim.annotations import FloatArray
-from pam_sim.characterise.fixed_load import FixedLoad
+from pam_sim.characterise.fixed_load import FixedLoad, SCATTER_N
 from pam_sim.characterise.holds import Hold
 from pam_sim.characterise.isobars import isobars_of, loads_of
 from pam_sim.characterise.points import Points
@@ -177,6 +177,11 @@ def loads_of_table(table: MeasuredTable, length_m: float) -> list[FixedLoad]:
     wrong = [name for name in branch if name not in ('up', 'down')]
     if wrong:
         raise InputError(f'has the branch {wrong[0]!r}; allowed: up, down', table.path)
+    smallest_n = columns['load'].min()
+    # A load cell may read a little below 0 N without a load.
+    if smallest_n < -SCATTER_N:
+        raise InputError(f'has a load of {smallest_n:g} N; pull is positive, allowed is 0 N or '
+                         'more', table.path)
     loads = []
     for load in np.unique(columns['load']):
         rows = np.flatnonzero(columns['load'] == load)

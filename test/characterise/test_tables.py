@@ -14,6 +14,7 @@
 
 """Tables measured by others: force maps and contraction tables."""
 
+from dataclasses import replace
 from importlib import resources
 
 import numpy as np
@@ -173,6 +174,12 @@ def test_zeros_of_force_are_censored_and_leave_a_doubt(tmp_path):
 def test_tables_that_say_too_little_are_refused(tmp_path, head, rows, words):
     with pytest.raises(InputError, match=words):
         write(tmp_path / 'bad.csv', head, rows)
+
+
+def test_a_load_that_pushes_is_refused(contraction_table):
+    columns = {**contraction_table.columns, 'load': contraction_table.columns['load'] - 5.0}
+    with pytest.raises(InputError, match='table.csv: has a load of -5 N; .* 0 N or more'):
+        characterise_table(replace(contraction_table, columns=columns), Dimensions(0.3))
 
 
 @pytest.mark.parametrize('step_n, words', [
