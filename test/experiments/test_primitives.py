@@ -181,6 +181,16 @@ def test_pulses_begin_each_interval_and_end_at_the_base():
     assert primitive.end == 0.003
 
 
+@pytest.mark.parametrize('rest_s', [0.7, 1.0, 1.7])
+@pytest.mark.parametrize('every, width', [(10, 1), (10, 5), (7, 3), (30, 2)])
+def test_all_pulses_of_a_train_are_as_wide_as_asked(rest_s, every, width):
+    keys = {'height_m': 0.01, 'width_s': width / 100, 'every_s': every / 100, 'count': 20}
+    primitive, first = make_primitive('pulses', keys, 0.0, 0.0, 'm'), round(100 * rest_s)
+    high = [k for k in range(21 * every)                 # the ticks of a reference at 100 Hz
+            if primitive.at((first + k) * 10_000_000 * 1e-9 - rest_s)[0] > 0.0]
+    assert high == [pulse * every + k for pulse in range(20) for k in range(width)]
+
+
 def test_the_file_that_the_guide_shows_is_a_primitive(tmp_path):
     # A name that is free, should the example stand in the package.
     (tmp_path / 'own_sawtooth.py').write_text(re.search('```python\n(.*?)```', GUIDE, re.S)[1])

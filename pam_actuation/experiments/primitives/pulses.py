@@ -18,6 +18,8 @@ from dataclasses import dataclass
 
 from pam_actuation.experiments.primitives.base import key, Primitive
 
+_ROUNDING_S = 1e-9       # a time of an edge may be rounded below it, and counts as the edge
+
 
 @dataclass
 class Pulses(Primitive):
@@ -42,6 +44,7 @@ class Pulses(Primitive):
 
     def at(self, t_s: float) -> tuple[float, float]:
         """Return the value and rate 0; a pulse begins each interval."""
+        t_s += _ROUNDING_S
         inside = t_s < self.duration_s and t_s % self.every_s < self.width_s
         return self.start + (self.height if inside else 0.0), 0.0
 
