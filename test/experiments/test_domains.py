@@ -16,6 +16,7 @@
 
 from pam_actuation.bags.load import load_run
 from pam_actuation.control.config import load_controller
+from pam_actuation.control.modes.force_surface import highest_force_n
 from pam_actuation.experiments import load_experiment, ReferenceLoop
 from pam_actuation.experiments.offline import simulate_experiment
 from pam_actuation.messages import ValveSignal
@@ -173,6 +174,38 @@ def test_a_rig_refuses_what_it_cannot_do_before_anything_is_written(
         simulate_experiment(
             load_experiment(text), pam_sim.load_rig(rig, valve=valve), None, tmp_path / 'bag')
     assert not (tmp_path / 'bag').exists()
+
+
+@pytest.mark.parametrize('rig, valve, number', [
+    ('dmsp_5_300_realistic', 'ppr', {'K_m': 50e3}),               # 0 to 6 V
+    ('dmsp_5_300_realistic', 'hsv', {'supply_pa': 401_325.0}),
+    ('dmsp_5_300_isometric', 'ppr', {'K_m': 50e3}),
+    ('dmsp_5_300_isometric', 'hsv', {'supply_pa': 401_325.0})])
+def test_what_valve_and_supply_give_limits_pressure_and_force(rig, valve, number):
+    strong = pam_sim.load_rig(rig, valve=valve)
+    weak = strong.with_(parameters=number)
+    within, beyond = (load_experiment(HIGH % (101_325.0 + pa)) for pa in (299e3, 310e3))
+    says = 'allows 0 to 300.0 kPa'
+    if strong.load == 'isometric':
+        within, beyond = (load_experiment(
+            f'name: pull\ndomain: force\nsegments:\n  - step: {{to_n: {n}, duration_s: 1}}\n')
+            for n in (0.99 * highest_force_n(weak, 300e3), 1.01 * highest_force_n(weak, 300e3)))
+        says = f'allows 0 to {highest_force_n(weak, 300e3):.1f} N'
+    within.check_reachable(weak)
+    beyond.check_reachable(strong)
+    with pytest.raises(InputError, match=says):
+        beyond.check_reachable(weak)
+
+
+def test_the_limit_of_the_driver_may_be_asked_of_a_regulator_that_was_identified():
+    rig = pam_sim.load_rig('dmsp_5_300_realistic', valve='ppr')
+    whole = load_experiment(HIGH % 701_325.0)
+    whole.check_reachable(rig.with_(parameters={'K_m': 99.3e3}))
+    with pytest.raises(InputError, match='allows 0 to 570.0 kPa'):
+        whole.check_reachable(rig.with_(parameters={'K_m': 95e3}))
+    with pytest.raises(InputError, match='allows 0 to 595.8 kPa'):
+        load_experiment(HIGH % 702_325.0).check_reachable(
+            rig.with_(parameters={'K_m': 99.3e3}))
 
 
 def test_needs_and_disturbance_round_trip():
