@@ -33,6 +33,7 @@ from pam_sim.files import StrPath, write_json
 
 if TYPE_CHECKING:
     from pam_actuation.bags.load import RecordedRun
+    from pam_actuation.experiments.experiment import Experiment
     from pam_actuation.investigate.question import Question
 
 STOPPED = 'stopped; finished rounds are kept, and the same command goes on from there'
@@ -145,17 +146,20 @@ class Investigation:
         ended = decision.ended or self._spent(number, deadline)
         if ended:
             return ended, ''
-        try:
-            if not given:
-                self._record(number, decision)
-        except Declined as error:
-            return DECLINED, str(error)
-        except RecordingFailed as error:
-            return FAILED, str(error)
-        except InputError as error:
-            if not rounds:
-                raise
-            return IMPOSSIBLE, str(error)
+        if not given and self._store.bag(number) is None:
+            assert decision.experiment is not None       # of a decision that goes on
+            try:
+                self._recorder.check(decision.experiment)
+            except InputError as error:
+                if not rounds:
+                    raise
+                return IMPOSSIBLE, str(error)
+            try:
+                self._record(number, decision.experiment, decision.why)
+            except Declined as error:
+                return DECLINED, str(error)
+            except RecordingFailed as error:
+                return FAILED, str(error)
         rounds.append(self._look(number, given, decision))
         return '', ''
 
@@ -174,18 +178,13 @@ class Investigation:
         tell(0.0)
         return tell
 
-    def _record(self, number: int, decision: Decision) -> None:
-        """Record the experiment of a round, if that was not done before."""
-        experiment = decision.experiment
-        assert experiment is not None       # of a decision that goes on
-        if self._store.bag(number) is not None:
-            return
-        self._recorder.check(experiment)
+    def _record(self, number: int, experiment: 'Experiment', why: str) -> None:
+        """Record the experiment of a round."""
         tell = self._told(number, 0.0, RECORDING_SHARE, f'recording {experiment.name}')
         began = time.perf_counter()
         with self._store.new_bag(number) as bag:
             self._recorder.record(
-                experiment, bag, self._question.seed + number - 1, decision.why, tell)
+                experiment, bag, self._question.seed + number - 1, why, tell)
         self._store.told_time(number, 'recording', time.perf_counter() - began)
 
     def _look(self, number: int, given: bool, decision: Decision) -> Round:

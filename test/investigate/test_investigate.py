@@ -269,6 +269,25 @@ def test_a_motion_that_is_declined_or_fails_ends_in_order(small, tmp_path):
     assert outcome.answered and [one[0] for one in played] == ['tell_apart_edges']
 
 
+def test_what_the_rig_cannot_do_is_an_ending_and_what_goes_wrong_is_none(
+        small, tmp_path, monkeypatch):
+    full = InputError('No space left on device', 'recordings/2/bag')
+    with pytest.raises(InputError, match='No space left'):
+        small(['ambiguous'], {2: full})
+    assert not (tmp_path / 'out' / 'investigation.json').exists()
+    outcome, played = small(['effects'])            # the first round is kept
+    assert outcome.answered and [one[0] for one in played] == ['tell_apart_edges']
+
+    def check(_, experiment):
+        if experiment.name == 'tell_apart_edges':
+            raise InputError('asks for too much')
+
+    monkeypatch.setattr(Copies, 'check', check)
+    outcome, played = small(['ambiguous'], folder=tmp_path / 'weak')
+    assert (outcome.ended, outcome.because) == ('impossible', 'asks for too much')
+    assert not outcome.wrong and len(played) == 1
+
+
 def test_a_live_recording_that_is_refused_is_made_again(small, tmp_path, monkeypatch):
     outcome, _ = small(['refused'])
     assert outcome.wrong and not outcome.has_model
