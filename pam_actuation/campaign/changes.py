@@ -107,14 +107,17 @@ def changes_of(several: Sequence[Series], level: float = LEVEL) -> list[Change]:
 
 
 def is_tested(series: Series) -> bool:
-    """Tell whether a series has values enough, and names enough among them, for a test."""
-    return len(series) >= FEWEST and int(series.named.sum()) >= FEWEST_NAMED
+    """Tell whether a series has values enough, names among them, and two times, for a test."""
+    return (len(series) >= FEWEST and int(series.named.sum()) >= FEWEST_NAMED
+            and float(np.ptp(series.time)) > 0.0)
 
 
 def _change(series: Series, tests: int) -> Change | None:
     """Return the likeliest change of a series, None where constant is likelier."""
     kept = np.flatnonzero(~far_from_neighbours(series))
     time, value, sd = (of[kept] for of in (series.time, series.value, series.sd))
+    if not np.ptp(time) > 0.0:
+        return None         # the only other day is far from its neighbours
     count, weight = len(kept), sd**-2.0 / np.sum(sd**-2.0)
     total, floor = float(np.sum(sd**-2.0)), len(kept) * LEAST_SCATTER**2
     mean = float(weight @ value)
@@ -135,7 +138,7 @@ def _change(series: Series, tests: int) -> Change | None:
     constant = total * float(weight @ off**2)
     best_score, best = bic(constant, 1), None
     for shape in SHAPES:
-        starts = [0] if shape == 'line' else _starts(time)
+        starts = [0] if shape == 'line' else _starts(shape, time)
         rests = [residual(_column(shape, time, start)) for start in starts]
         if not rests:
             continue
@@ -161,10 +164,11 @@ def _change(series: Series, tests: int) -> Change | None:
         math.sqrt(scatter / known), p, left_out)
 
 
-def _starts(time: FloatArray) -> list[int]:
-    """Return the places at which something may begin; of equal times the first."""
+def _starts(shape: str, time: FloatArray) -> list[int]:
+    """Return the places at which a shape may begin; of equal times the first."""
     places = range(AT_END, len(time) - AT_END + 1)
-    return [k for k in places if time[k] > time[k - 1]]
+    return [k for k in places if time[k] > time[k - 1]
+            and (shape == 'step' or time[-1] > time[k])]    # a line needs a later time
 
 
 def _column(shape: str, time: FloatArray, start: int) -> FloatArray:

@@ -90,6 +90,20 @@ def test_several_recordings_a_day_begin_together():
     assert found.begin == 10 and time[found.begin] == 6.0
 
 
+def test_of_one_time_nothing_can_change():
+    value = 1.0 + 0.5 * (np.arange(10) >= 5)
+    assert changes_of([series(value, time=np.full(10, 3.0))]) == []
+    # Nor where the one value of another day is far from all others.
+    value = np.where(np.arange(12) == 0, 9.0, 1.0 + 0.02 * (np.arange(12) % 2))
+    assert changes_of([series(value, time=np.where(np.arange(12) == 0, 2.0, 3.0))]) == []
+
+
+def test_two_days_may_differ():
+    time = np.repeat([1.0, 2.0], 5)
+    [found] = changes_of([series(noisy(1.0 + 0.5 * (DAY >= 6))[:10], time=time)])
+    assert found.fitted() == pytest.approx(1.0 + 0.5 * (time > 1.0), abs=0.05)
+
+
 def row(day, verdict='effects', sizes=(), ambiguous=(), least=None):
     """Return a row of a campaign."""
     return {'case': Case('p', 'rig', str(day), float(day)), 'key': f'k{day}', 'verdict': verdict,
