@@ -19,6 +19,7 @@ A recording of several muscles is a case for each of them, or for each joint.
 """
 
 from collections.abc import Iterator, Sequence
+import contextlib
 import csv
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta, timezone
@@ -155,7 +156,7 @@ def _listed(path: Path) -> list[dict[str, str]]:
             raise InputError(f'has {len(values)} values for {len(head)} columns',
                              f'{path}:{number}')
         row = dict(zip(head, values))
-        if row.get('day') and _date(row['day']) is None:
+        if row.get('day') and _date(row['day'], strictly=True) is None:
             raise InputError(f'day is {row["day"]!r}; write it as 2026-11-25 or '
                              '2026-11-25T09:30', f'{path}:{number}')
         rows.append(row)
@@ -243,18 +244,18 @@ def _parts(bag: Bag | None, joints: bool, wanted: str) -> list[str]:
 def _rig_of(inside: str) -> str:
     """Return the rig that the folders above a recording name."""
     folders = [part for part in Path(inside).parent.parts if part not in ('.', '..', os.sep)]
-    named = [DAY.sub('', part).strip(' _-') for part in folders]
+    named = [DAY.sub(lambda found: '' if _date(found[0]) else found[0], part).strip(' _-')
+             for part in folders]
     return '/'.join(part for part in named if part) or ONE_RIG
 
 
-def _date(text: str) -> datetime | None:
-    """Return the last date in a text, None without one."""
+def _date(text: str, strictly: bool = False) -> datetime | None:
+    """Return the last date in a text, None without one; what is no time may be a number."""
     for found in reversed(list(DAY.finditer(text))):
-        year, month, day, hour, minute, second = (int(part or 0) for part in found.groups())
-        try:
-            return datetime(year, month, day, hour, minute, second, tzinfo=timezone.utc)
-        except ValueError:
-            continue
+        year, month, day, *given = (int(part or 0) for part in found.groups())
+        for hour, minute, second in [given] if strictly else [given, [0, 0, 0]]:
+            with contextlib.suppress(ValueError):
+                return datetime(year, month, day, hour, minute, second, tzinfo=timezone.utc)
     return None
 
 

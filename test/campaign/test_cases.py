@@ -66,6 +66,19 @@ def test_a_list_names_them_as_it_likes(lab):
     assert [case.day for case in find_cases(plain)] == ['2026-03-01', '2026-03-02']
 
 
+@pytest.mark.parametrize('path, rig, day', [
+    # Serial numbers are no dates, and numbers of recordings no times.
+    ('10023456/2026-03-02', '10023456', '2026-03-02'),
+    ('10023999/2026-03-02', '10023999', '2026-03-02'),
+    ('bench/2026-03-02_0075', 'bench', '2026-03-02'),
+    ('bench/20260302_9999/20261399', 'bench/20261399', '2026-03-02')])
+def test_digits_that_are_no_date_name_the_rig(tmp_path, path, rig, day):
+    (tmp_path / path).mkdir(parents=True)
+    (tmp_path / path / 'check.mcap').write_bytes(b'no bag')
+    [case] = find_cases(tmp_path)
+    assert (case.rig, case.day) == (rig, day)
+
+
 def test_recordings_of_one_time_are_numbered(tmp_path):
     for name in ('b', 'a'):
         write_bag(tmp_path / name, 20)
@@ -133,7 +146,8 @@ def test_each_muscle_has_its_model(exo):
 @pytest.mark.parametrize('text, says', [
     ('path,rigg\na,b\n', 'list.csv:1.*`rigg` .did you mean `rig`'),
     ('path,rig\na\n', 'list.csv:2.*1 values for 2 columns'),
-    ('path,day\na,Monday\n', "list.csv:2.*day is 'Monday'"), ('# only\n', 'lists no recording'),
+    ('path,day\na,Monday\n', "list.csv:2.*day is 'Monday'"),
+    ('path,day\na,2026-11-25T25:00\n', "list.csv:2.*day is '2026-11-25T25:00'"), ('# only\n', 'lists no recording'),
     ('path\n', 'lists no recording')])
 def test_a_mistake_in_a_list_is_told_with_its_line(tmp_path, text, says):
     path = tmp_path / 'list.csv'
