@@ -135,9 +135,14 @@ def span(change: Change) -> str:
     """Return when a change began, with its interval."""
     days = change.series.days
     if change.shape == 'line':
-        return f'over all days from {days[0]}'
+        return f'over all {_step(change)}s from {days[0]}'
     day, low, high = days[change.begin], days[change.earliest], days[change.latest]
     return f'from {day} on' + (f' (95 %: {low} to {high})' if (low, high) != (day, day) else '')
+
+
+def _step(change: Change) -> str:
+    """Return what the time of a series counts: recordings without a date are numbered."""
+    return 'recording' if change.series.days[0].isdigit() else 'day'
 
 
 def sentence(group: list[Change]) -> str:
@@ -152,7 +157,7 @@ def sentence(group: list[Change]) -> str:
         how = f'by {shown(first.amount, one.unit)} (95 %: {low} to {high})'
     else:
         does = 'grows' if abs(first.after) > abs(first.before) else 'shrinks'
-        how = f'by {shown(first.amount, one.unit)} a day (95 %: {low} to {high})'
+        how = f'by {shown(first.amount, one.unit)} a {_step(first)} (95 %: {low} to {high})'
     text = (f'{one.rig}: {one.name} {does} {span(first)}: {one.quantity} changes {how}, '
             f'to {shown(first.after, one.unit)}; p = {first.p:.1g}.')
     also = list(dict.fromkeys(other.series.name for other in group[1:]

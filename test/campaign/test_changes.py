@@ -19,6 +19,7 @@ import math
 import numpy as np
 from pam_actuation.campaign.cases import Case
 from pam_actuation.campaign.changes import changes_of
+from pam_actuation.campaign.findings import sentence
 from pam_actuation.campaign.series import IN_95, Series, series_of
 import pytest
 
@@ -81,6 +82,17 @@ def test_less_than_a_recording_can_tell_and_few_names_are_no_change():
     assert changes_of([series(noisy(1.0 + 0.02 * (DAY >= 11), sd=0.001), sd=0.02)]) == []
     named = DAY >= 24
     assert changes_of([series(np.where(named, 1.0, 0.0), named=named)]) == []
+
+
+def test_a_sentence_counts_days_or_numbered_recordings():
+    numbered = series(1.0 + 0.03 * DAY)
+    numbered.days = [str(k) for k in range(1, DAYS + 1)]
+    [found] = changes_of([numbered])
+    assert 'grows over all recordings from 1: ' in sentence([found])
+    assert ' a recording (95 %: ' in sentence([found])
+    found.series.days = [f'2026-03-{k:02}' for k in range(1, DAYS + 1)]
+    assert 'grows over all days from 2026-03-01: ' in sentence([found])
+    assert ' a day (95 %: ' in sentence([found])
 
 
 def test_several_recordings_a_day_begin_together():
