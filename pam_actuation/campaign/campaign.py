@@ -30,13 +30,15 @@ from pam_actuation.campaign.work import NEED_A_MODEL, Settings, work_on
 from pam_actuation.kept_folders import kept_folder
 from pam_actuation.workers import ClusterLost, WorkerLost, Workers
 from pam_sim.errors import InputError
-from pam_sim.files import StrPath, write_json
+from pam_sim.files import StrPath, UNFINISHED, write_json
 from pam_sim.joint.parameters import SIDES
 
 FAILED = 'failed'
 WARM = {'gap': ('pam_actuation.report.gap',), 'identify': ('pam_actuation.report.identify',),
         'replay': ('pam_actuation.replay.compare',), 'report': ('pam_actuation.report.pages',)}
 _ATTEMPTS = 4           # to find a cluster again that was lost
+# Failures that say nothing of the recording: its case is worked on again next time.
+NOT_OF_THE_RECORDING = (WorkerLost, MemoryError, OSError)
 _LOST = {'sizes': [], 'ambiguous': [], 'least': {}, 'bad': True}
 
 
@@ -131,8 +133,8 @@ def run_campaign(cases: Sequence[Case], settings: Settings, out: StrPath, jobs: 
 
         def done(key: str, result: Any) -> None:
             task = todo.pop(key)
-            if isinstance(result, WorkerLost):
-                lost[key] = f'{task.case.name}: {result}'
+            if isinstance(result, NOT_OF_THE_RECORDING):
+                lost[key] = f'{task.case.name}: {_told(result)}'
             elif isinstance(result, Exception):
                 raise result
             else:
@@ -182,12 +184,21 @@ def work_and_keep(given: tuple[Settings, str, str], task: Task) -> tuple[float, 
     with kept_folder(Path(cases), task.key) as folder:
         try:
             found = work_on(task.case, settings, folder)
-        except InputError as error:
-            found = {'verdict': FAILED, 'reason': ' '.join(str(error).split()), **_LOST}
+        except NOT_OF_THE_RECORDING:
+            raise               # another time the case may be worked on
         except Exception as error:      # noqa: B902, a failed case is a row and not an end
-            found = {'verdict': FAILED, 'reason': f'{type(error).__name__}: {error}', **_LOST}
+            if isinstance(error, InputError) and UNFINISHED in error.where:
+                raise           # its files cannot be written
+            found = {'verdict': FAILED, 'reason': _told(error), **_LOST}
         write_json(folder / RESULT, found)
     return time.perf_counter() - began, time.process_time() - used
+
+
+def _told(error: Exception) -> str:
+    """Return an error as the reason of a row."""
+    text = ' '.join(str(error).split())
+    return text if isinstance(error, (InputError, WorkerLost)) else (
+        f'{type(error).__name__}: {text}')
 
 
 def _with_models(cases: Sequence[Case], settings: Settings) -> tuple[Settings, list[str]]:

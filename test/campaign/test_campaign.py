@@ -14,6 +14,7 @@
 
 """A campaign: worked on once, kept whole or not at all, the same bytes after a kill."""
 
+import errno
 import json
 import os
 from pathlib import Path
@@ -23,7 +24,7 @@ import subprocess
 import sys
 
 import pam_actuation
-from pam_actuation.campaign import code, store
+from pam_actuation.campaign import campaign, code, store
 from pam_actuation.campaign.campaign import run_campaign, Task, work_and_keep
 from pam_actuation.campaign.cases import Case, find_cases
 from pam_actuation.campaign.code import code_digest
@@ -34,10 +35,11 @@ from pam_actuation.cli.main import main
 from pam_actuation.experiments import load_experiment
 from pam_actuation.experiments.offline import simulate_experiment
 from pam_actuation.kept_folders import kept_folder
+from pam_actuation.workers import Workers
 import pam_sim
 from pam_sim import load_rig
 from pam_sim.errors import InputError
-from pam_sim.files import UNFINISHED, write_json, write_text
+from pam_sim.files import cannot_write, UNFINISHED, write_json, write_text
 import pytest
 
 MODEL = 'dmsp_5_300_hanging_mass'
@@ -174,6 +176,39 @@ def test_a_worker_with_other_code_is_refused(lab, tmp_path):
     with pytest.raises(InputError, match='has other code'):
         work_and_keep((Settings('gap'), str(tmp_path), 'other'), Task('key', case))
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize('error', [MemoryError('4 GiB'), OSError(errno.EIO, 'no answer')])
+def test_a_failure_of_the_machine_is_no_result(lab, tmp_path, monkeypatch, error):
+    [case, _], settings = find_cases(lab), Settings('report')
+
+    def fails(*given):
+        raise error
+
+    # Without processes: they would not see what is replaced here.
+    monkeypatch.setattr(campaign, 'Workers', lambda *given, **more: Workers())
+    with monkeypatch.context() as patched:
+        patched.setattr(campaign, 'work_on', fails)
+        failed = run_campaign([case], settings, tmp_path)
+    [row] = failed.rows
+    assert row['verdict'] == 'failed' and failed.worked_on == 0
+    assert type(error).__name__ in row['reason'] and str(error) in row['reason']
+    assert not list((tmp_path / 'cases').iterdir())
+    again = run_campaign([case], settings, tmp_path)
+    assert again.worked_on == 1 and again.rows[0]['verdict'] == 'reported'
+
+
+def test_a_full_disk_ends_the_campaign(lab, tmp_path, monkeypatch):
+    [case, _] = find_cases(lab)
+
+    def fails(case, settings, folder):
+        raise cannot_write(folder / 'report.html', OSError(errno.ENOSPC, 'no space left'))
+
+    monkeypatch.setattr(campaign, 'Workers', lambda *given, **more: Workers())
+    monkeypatch.setattr(campaign, 'work_on', fails)
+    with pytest.raises(InputError, match='report.html: cannot be written: no space left'):
+        run_campaign([case], Settings('report'), tmp_path)
+    assert not list((tmp_path / 'cases').iterdir())
 
 
 def test_what_a_kill_left_half_done_is_removed(tmp_path):
