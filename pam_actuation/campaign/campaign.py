@@ -113,14 +113,17 @@ def run_campaign(cases: Sequence[Case], settings: Settings, out: StrPath, jobs: 
     Raises
     ------
     InputError
-        The model cannot be read, the folder cannot be written or is in use, or the cluster
-        cannot be reached.
+        The model cannot be read, the folder cannot be written, is in use or is inside a
+        recording, or the cluster cannot be reached.
     ClusterLost
         The cluster was lost and did not come back. What is done is kept.
 
     """
     started = time.perf_counter()
     settings, texts = _with_models(cases, settings)
+    for case in cases:
+        if Path(os.path.abspath(out)).is_relative_to(case.path):
+            raise InputError(f'is inside the recording {case.path}; give a folder outside', out)
     Workers(cluster=cluster)        # refuses what is no address, before anything is written
     store = Store(out)
     with store.locked():

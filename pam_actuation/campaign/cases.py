@@ -124,12 +124,19 @@ def _bags_below(folder: Path, without: StrPath | None) -> Iterator[Path]:
         here = Path(place)
         names[:] = sorted(name for name in names if not name.startswith('.')
                           and os.path.realpath(here / name) != left_out)
-        if 'metadata.yaml' in files and here != folder:
+        bags = sorted(name for name in files
+                      if name.endswith(BAG_FILES) and not name.startswith('.'))
+        if 'metadata.yaml' in files or bags and _is_split(here.name, bags):
             names[:] = []
             yield here
-            continue
-        yield from (here / name for name in sorted(files)
-                    if name.endswith(BAG_FILES) and not name.startswith('.'))
+        else:
+            yield from (here / name for name in bags)
+
+
+def _is_split(name: str, files: Sequence[str]) -> bool:
+    """Tell whether these are NAME_0, NAME_1, ... as in a bag whose metadata.yaml is missing."""
+    return any({f'{name}_{number}{ending}' for number in range(len(files))} == set(files)
+               for ending in BAG_FILES)
 
 
 def _listed(path: Path) -> list[dict[str, str]]:
@@ -207,6 +214,7 @@ def _cases_of_bag(row: dict[str, str], folder: Path, path: Path, bag: Bag | None
                   parts: list[str]) -> list[Case]:
     """Return the cases of one recording; without a date they have the time of its stamps."""
     inside = os.path.relpath(path.absolute(), folder)
+    inside = path.resolve().name if inside == '.' else inside
     day = _date(row.get('day') or '') or _date(inside)
     if day is None:
         stamps = [] if bag is None else [

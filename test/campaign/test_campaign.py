@@ -259,6 +259,10 @@ def test_mistakes_are_told_before_any_work(lab, tmp_path, capsys):
                             (['--model', MODEL, '--cluster', 'somewhere'], 'no address')):
         assert main(['campaign', str(lab), '--out', str(tmp_path / 'out'), *arguments]) == 2
         assert says in capsys.readouterr().err
+    inside = lab / 'rig_1' / '2026-03-01' / 'check' / 'out'
+    with pytest.raises(InputError, match='out: is inside the recording .*check; give a folder'):
+        run_campaign(find_cases(lab), Settings('report'), inside)
+    assert not inside.exists()
     with pytest.raises(InputError, match='no model'):
         run_campaign(find_cases(lab), Settings('identify'), tmp_path / 'other')
     assert not os.path.exists(tmp_path / 'other') and not os.path.exists(tmp_path / 'out')

@@ -116,6 +116,35 @@ def test_a_bag_of_an_exoskeleton_has_four_muscles_or_two_joints(exo):
         ('rig/left_knee', '/left_knee'), ('rig/right_knee', '/right_knee')]
 
 
+def test_a_split_recording_is_one_case(tmp_path):
+    split = tmp_path / 'lab' / 'bench' / '2026-03-01'
+    with BagWriter(split / 'run', {}, max_file_s=1.0) as writer:
+        topic = BY_NAME['pressure']
+        writer.add_topic(topic.full_name('/muscle'), topic.type_name)
+        for stamp_ns in range(START_NS, START_NS + 4_000_000_000, 100_000_000):
+            writer.write(topic.full_name('/muscle'), encode('pressure', plain_numbers(topic)),
+                         stamp_ns, stamp_ns)
+    files = sorted((split / 'run').glob('*.mcap'))
+    assert len(files) > 2
+    [above] = find_cases(tmp_path / 'lab')
+    assert Path(above.path) == split / 'run'
+    # The bag itself is one recording too.
+    [itself] = find_cases(split / 'run')
+    assert (itself.path, itself.rig) == (above.path, 'rig')
+    # So it is without metadata.yaml, as a killed recorder leaves it.
+    (split / 'run' / 'metadata.yaml').unlink()
+    assert find_cases(tmp_path / 'lab') == [above]
+    assert [case.path for case in find_cases(split / 'run')] == [above.path]
+    # Files that are not numbered from 0 on by the name of their folder are recordings each.
+    files[0].rename(split / 'run' / 'other.mcap')
+    assert len(find_cases(tmp_path / 'lab')) == len(files)
+
+
+def test_the_name_of_the_bag_itself_tells_its_day(tmp_path):
+    write_bag(tmp_path / 'check_2026-03-01', 2)
+    assert [case.day for case in find_cases(tmp_path / 'check_2026-03-01')] == ['2026-03-01']
+
+
 def test_each_muscle_has_its_model(exo):
     cases = find_cases(exo / 'runs' / '2026-03-01')
     knee = 'knee_dmsp_20_300'
@@ -147,7 +176,8 @@ def test_each_muscle_has_its_model(exo):
     ('path,rigg\na,b\n', 'list.csv:1.*`rigg` .did you mean `rig`'),
     ('path,rig\na\n', 'list.csv:2.*1 values for 2 columns'),
     ('path,day\na,Monday\n', "list.csv:2.*day is 'Monday'"),
-    ('path,day\na,2026-11-25T25:00\n', "list.csv:2.*day is '2026-11-25T25:00'"), ('# only\n', 'lists no recording'),
+    ('path,day\na,2026-11-25T25:00\n', "list.csv:2.*day is '2026-11-25T25:00'"),
+    ('# only\n', 'lists no recording'),
     ('path\n', 'lists no recording')])
 def test_a_mistake_in_a_list_is_told_with_its_line(tmp_path, text, says):
     path = tmp_path / 'list.csv'
