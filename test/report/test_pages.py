@@ -190,6 +190,17 @@ def test_runs_of_several_seeds_have_mean_and_standard_deviation(tmp_path):
     assert '2.000 ± 1.000 mm' in body.partition('</section>')[0]
 
 
+def test_runs_whose_learning_is_frozen_are_counted_apart(tmp_path):
+    runs = [seeded(1e-3 * k, k) for k in (1, 2, 3, 4)]
+    for run, learning in zip(runs, (1.0, 1.0, 0.0, 0.0)):
+        stamp_ns = run['pressure_command'].stamp_ns
+        run.topics['controller_state'] = Series(
+            stamp_ns, {'learning': np.where(np.arange(len(stamp_ns)) < 500, learning, 0.0)})
+    found = pages.bag_report(runs, tmp_path / 'page.html', ['l1', 'l2', 'f3', 'f4'])
+    assert set(found['over_seeds']) == {'pid: l1, l2', 'pid: f3, f4'}
+    assert 'over_seeds' not in pages.bag_report(runs[1:3], tmp_path / 'two.html')
+
+
 def test_repeated_runs_of_one_seed_and_other_references_are_no_seeds(tmp_path):
     other = seeded(2e-3, 2)
     other.metadata['preview_s'] = '0'

@@ -47,7 +47,8 @@ def over_seeds(measured: 'Sequence[Measured]') -> dict[str, dict[str, Any]]:
     Parameters
     ----------
     measured : sequence of (title, Run, RunMetrics)
-        Runs of the same experiment, rig and controller belong together.
+        Runs of the same experiment, rig and controller belong together. Those whose rules
+        learn are apart from those whose learning is frozen.
 
     Returns
     -------
@@ -56,10 +57,11 @@ def over_seeds(measured: 'Sequence[Measured]') -> dict[str, dict[str, Any]]:
         have ``{mean, std}``, SI.
 
     """
-    groups: dict[tuple[str, ...], list[Measured]] = {}
+    groups: dict[tuple[object, ...], list[Measured]] = {}
     for one in measured:
         texts = one[1].metadata or {}
-        groups.setdefault(tuple(texts.get(name, '') for name in _SAME), []).append(one)
+        same = (*(texts.get(name, '') for name in _SAME), _learns(one[1]))
+        groups.setdefault(same, []).append(one)
     found = {}
     for runs in groups.values():
         titles = [title for title, _, _ in runs]
@@ -72,6 +74,12 @@ def over_seeds(measured: 'Sequence[Measured]') -> dict[str, dict[str, Any]]:
             **{name: spread for _, name, _, _ in _FIGURES
                if (spread := _spread([one[name] for one in figures])) is not None}}
     return found
+
+
+def _learns(run: 'Run') -> bool:
+    """Return whether the controller of a run ever learned."""
+    return 'controller_state' in run and bool(
+        (run['controller_state'].values.get('learning', np.zeros(1)) == 1.0).any())
 
 
 def _kind(run: 'Run') -> str:
@@ -106,7 +114,7 @@ def seeds_section(found: dict[str, dict[str, Any]], key: str = 'over-seeds',
     body = table(['', *found], [row for row in rows if any(cell is not None for cell in row[1:])])
     return Section(key, title, paragraph(
         'Mean and standard deviation over runs of the same experiment, rig and controller, '
-        'whose seeds differ.') + body)
+        'whose seeds differ. Runs with frozen rules are counted apart.') + body)
 
 
 def _shown(spread: dict[str, Any] | None, factor: float, unit: str) -> str | None:
