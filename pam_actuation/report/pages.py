@@ -49,6 +49,8 @@ if TYPE_CHECKING:
 
 FOOTER = ('Written by pam_actuation. Pressures are gauge, against 101.325 kPa. This page needs '
           'no network.')
+# What stands beside the runs in ``pam report --json``.
+TAKEN = ('report', 'remarks', 'over_seeds', 'implausible')
 
 
 def recorded_rig(run: 'Run') -> 'Rig | None':
@@ -168,12 +170,12 @@ def _implausible(runs: 'Sequence[tuple[str, Run]]') -> Section | None:
 
 
 def default_titles(runs: 'Sequence[Run]') -> list[str]:
-    """Return a short distinct name of every run, from path or experiment."""
+    """Return a short distinct name of every run, from path or experiment; none of ``TAKEN``."""
     names: list[str] = []
     for k, run in enumerate(runs):
         name = str(run.path).rstrip('/').rsplit('/', 1)[-1] or (
             run.metadata or {}).get('experiment_name') or f'run {k + 1}'
-        names.append(name if name not in names else f'{name} ({k + 1})')
+        names.append(name if name not in (*TAKEN, *names) else f'{name} ({k + 1})')
     return names
 
 

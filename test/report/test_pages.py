@@ -151,6 +151,13 @@ def test_runs_of_equal_name_stay_apart(tmp_path):
     assert len(found) == 2
 
 
+@pytest.mark.parametrize('taken', ['report', 'remarks', 'implausible', 'over_seeds'])
+def test_a_bag_with_the_name_of_another_key_is_numbered(taken, tmp_path):
+    runs = [tracking_run(AMPLITUDES) for _ in range(2)]
+    runs[0].path, runs[1].path = f'runs/{taken}', 'runs/second'
+    assert set(pages.bag_report(runs, tmp_path / 'page.html')) == {f'{taken} (1)', 'second'}
+
+
 def test_several_runs_are_laid_over_each_other(tmp_path):
     runs = [tracking_run(AMPLITUDES), tracking_run(AMPLITUDES[::-1]), step_run()]
     pages.bag_report(runs, tmp_path / 'page.html', ['one', 'two', 'three'])
