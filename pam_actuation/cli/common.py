@@ -16,6 +16,7 @@
 
 import argparse
 import json
+import math
 import os
 import sys
 from types import SimpleNamespace
@@ -43,7 +44,7 @@ def emit(args: argparse.Namespace, payload: dict[str, Any], text: str) -> None:
     args : argparse.Namespace
         With ``json``: print ``payload`` as one JSON document instead of the text.
     payload : dict
-        The result for programs, plain data.
+        The result for programs, plain data. A number that is not finite is null in JSON.
     text : str
         The result for people.
 
@@ -53,7 +54,17 @@ def emit(args: argparse.Namespace, payload: dict[str, Any], text: str) -> None:
         payload = {**payload, 'implausible': implausible}
         new = [sentence for sentence in implausible if sentence.rstrip('.') not in text]
         text = '\n'.join([text, *(f'warning: {sentence}' for sentence in new)])
-    print(json.dumps(payload, indent=2, default=str) if args.json else text)
+    print(json.dumps(_finite(payload), indent=2, default=str, allow_nan=False)
+          if args.json else text)
+
+
+def _finite(data: Any) -> Any:
+    """Return plain data with None for every number that JSON has not."""
+    if isinstance(data, dict):
+        return {key: _finite(value) for key, value in data.items()}
+    if isinstance(data, (list, tuple)):
+        return [_finite(value) for value in data]
+    return None if isinstance(data, float) and not math.isfinite(data) else data
 
 
 def read_line(question: str) -> str:

@@ -34,6 +34,7 @@ from pam_actuation.control.tick import (
     AGES, HELD_BACK, input_names, join_stamp, MuscleLaw, reference_names, RUNNING, STAMPED,
     TickCore, TickInputs)
 from pam_actuation.drivers.recorded import as_recorded, nearly_in
+from pam_actuation.replay.difference import difference
 from pam_actuation.slow_rise import SlowRise
 from pam_sim import load_rig
 from pam_sim.annotations import FloatArray, IntArray
@@ -62,7 +63,7 @@ class ReplayResult:
     recorded_pa, replayed_pa : numpy.ndarray
         Commands as recorded and as replayed, absolute Pa.
     max_abs_difference_pa : float
-        Largest difference of the two.
+        Largest difference of the two, as of ``Difference``.
     identical : bool
         Every command and every internal number agrees to the bit.
     ticks : int
@@ -155,9 +156,10 @@ def replay_controller(run: 'Run', controller: 'Controller | str | os.PathLike[st
             kept[place] = values
         differing.update(name for (name, column), value in zip(compared.items(), values)
                          if not _same(column[row], value))
-    difference = float(np.max(np.abs(recorded - replayed))) if len(order) else 0.0
+    stamp_ns = states.stamp_ns[order]
+    largest_pa = difference('pressure_command', 'Pa', stamp_ns, recorded, replayed, 0).largest
     return ReplayResult(
-        states.stamp_ns[order], recorded, replayed, difference,
+        stamp_ns, recorded, replayed, largest_pa,
         bool(np.array_equal(recorded, replayed)) and not differing, len(order), sent.missing,
         dict(differing), chosen, dict(zip(core.names, kept.T)) if keep_states else {})
 

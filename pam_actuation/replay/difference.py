@@ -34,12 +34,14 @@ class Difference:
     signal, unit : str
         ``topic`` or ``topic.field``, and its SI unit.
     count, differing : int
-        Messages compared, and how many of them are not equal to the bit.
+        Messages, and how many of them are not equal to the bit.
+    not_comparable : int
+        How many of those that differ have a value that is not finite.
     rms, largest : float
-        Root mean square and largest absolute difference.
+        Root mean square and largest absolute difference of all others; NaN if there are none.
     at_s : float or None
-        Where the largest stands, seconds after the first message of the run; None if all are
-        equal.
+        Where the largest stands, seconds after the first message of the run; None if all that
+        can be compared are equal.
     span : float
         Range of the recorded signal, to judge the others by.
 
@@ -53,6 +55,7 @@ class Difference:
     largest: float
     at_s: float | None
     span: float
+    not_comparable: int = 0
 
     @property
     def identical(self) -> bool:
@@ -70,8 +73,12 @@ class Difference:
         factor, unit = _SHOWN.get(self.unit, (1.0, '' if self.unit == '1' else self.unit))
         rms, largest, span = (f'{factor * v:.4g} {unit}'.rstrip()
                               for v in (self.rms, self.largest, self.span))
-        return (f'  {self.signal}: rms {rms}, largest {largest} at {self.at_s:.3f} s '
-                f'(range recorded {span}; {self.differing} of {self.count} messages differ)')
+        where = '' if self.at_s is None else f' at {self.at_s:.3f} s'
+        sizes = ('nothing to compare' if self.not_comparable == self.count
+                 else f'rms {rms}, largest {largest}{where}')
+        lost = f', {self.not_comparable} of them not finite' if self.not_comparable else ''
+        return (f'  {self.signal}: {sizes} (range recorded {span}; '
+                f'{self.differing} of {self.count} messages differ{lost})')
 
 
 def difference(signal: str, unit: str, stamp_ns: IntArray, recorded: FloatArray,
@@ -86,7 +93,7 @@ def difference(signal: str, unit: str, stamp_ns: IntArray, recorded: FloatArray,
     stamp_ns : array_like of int, shape (N,)
         Header stamps.
     recorded, replayed : array_like, shape (N,)
-        SI values; two NaN are equal, one NaN is a difference of infinite size.
+        SI values; two NaN are equal, one NaN is a difference without a size.
     start_ns : int
         Stamp from which ``at_s`` counts.
 
@@ -95,15 +102,19 @@ def difference(signal: str, unit: str, stamp_ns: IntArray, recorded: FloatArray,
     replayed = np.asarray(replayed, dtype=float)
     missing = np.isnan(recorded) & np.isnan(replayed)
     same = missing | ((recorded == replayed) & (np.signbit(recorded) == np.signbit(replayed)))
-    with np.errstate(invalid='ignore'):
-        away = np.where(missing, 0.0, np.abs(recorded - replayed))
-    away = np.where(np.isnan(away), np.inf, away)
+    comparable = same | (np.isfinite(recorded) & np.isfinite(replayed))
+    away = np.zeros(recorded.shape)
+    np.subtract(recorded, replayed, out=away, where=comparable & ~same)
+    away = np.abs(away[comparable])
     known = recorded[np.isfinite(recorded)]
     span = float(np.ptp(known)) if known.size else 0.0
     count, differing = int(recorded.size), int(np.sum(~same))
     if not differing:
         return Difference(signal, unit, count, 0, 0.0, 0.0, None, span)
-    worst = int(np.argmax(away))
-    return Difference(
-        signal, unit, count, differing, float(np.sqrt(np.mean(away ** 2))),
-        float(away[worst]), (int(stamp_ns[worst]) - int(start_ns)) * 1e-9, span)
+    lost = count - away.size
+    if not away.size:
+        return Difference(signal, unit, count, differing, np.nan, np.nan, None, span, lost)
+    worst = int(np.flatnonzero(comparable)[np.argmax(away)])
+    at_s = None if lost == differing else (int(stamp_ns[worst]) - int(start_ns)) * 1e-9
+    return Difference(signal, unit, count, differing, float(np.sqrt(np.mean(away ** 2))),
+                      float(away.max()), at_s, span, lost)

@@ -17,10 +17,12 @@
 from dataclasses import replace
 import json
 import shutil
+from types import SimpleNamespace
 
 import numpy as np
 from pam_actuation.bags.load import load_run
 from pam_actuation.bags.source import read_bag
+from pam_actuation.cli.common import emit
 from pam_actuation.cli.main import main
 from pam_actuation.control.config import load_controller
 from pam_actuation.experiments import load_experiment
@@ -290,7 +292,42 @@ def test_a_difference_says_how_large_and_where():
     same = difference('a', 'Pa', stamps, [0.0, np.nan], [0.0, np.nan], 0)
     assert same.identical and same.at_s is None and 'identical' in same.line()
     assert not difference('a', 'Pa', stamps, [0.0], [-0.0], 0).identical
-    assert difference('a', 'Pa', stamps, [1.0], [np.nan], 0).largest == np.inf
+
+
+@pytest.mark.parametrize('odd', [np.nan, np.inf])
+def test_a_value_that_is_not_finite_is_counted_beside_the_sizes_of_the_others(odd):
+    stamps = 1_000_000_000 + np.arange(4) * 100_000_000
+    one = difference('a', 'Pa', stamps, [1.0, odd, 3.0, 4.0], [1.0, 2.0, 3.5, 4.0], stamps[0])
+    assert (one.differing, one.not_comparable, one.count, one.largest) == (2, 1, 4, 0.5)
+    assert one.at_s == pytest.approx(0.2) and one.rms == pytest.approx(0.5 / np.sqrt(3.0))
+    assert not one.identical
+    assert '2 of 4 messages differ, 1 of them not finite' in one.line()
+    alone = difference('a', 'Pa', stamps, [1.0, odd], [1.0, 2.0], 0)
+    assert (alone.rms, alone.largest, alone.at_s, alone.identical) == (0.0, 0.0, None, False)
+    assert 'largest 0 kPa (' in alone.line()
+    none = difference('a', 'Pa', stamps, [odd], [1.0], 0)
+    assert np.isnan([none.rms, none.largest]).all() and not none.identical
+    assert 'nothing to compare' in none.line() and 'nan' not in none.line()
+    equal = difference('a', 'Pa', stamps, [odd], [odd], 0)
+    assert equal.identical and equal.not_comparable == 0
+
+
+def test_one_command_that_is_no_number_hides_no_other_and_gives_strict_json(runs, capsys):
+    run = runs[next(case for case in CASES if 'ppr' in case)]
+    commands = run.topics['pressure_command']
+    odd_pa = commands['pressure_pa'].copy()
+    odd_pa[100], odd_pa[200] = np.nan, odd_pa[200] + 5.0
+    changed = Run({**run.topics, 'pressure_command': Series(
+        commands.stamp_ns, {'pressure_pa': odd_pa})}, run.metadata, run.namespace, run.path)
+    found = replay_run(changed, only='controller')
+    assert found.controller.max_abs_difference_pa == pytest.approx(5.0)
+    assert found.unexpected_difference
+    lost = {'rms': np.nan, 'sizes': (np.inf, 1.0), 'number': np.float64('-inf'), 'ticks': 3}
+    emit(SimpleNamespace(json=True), {'found': found.to_dict(), 'lost': [lost]}, '')
+    said = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
+    assert said['lost'] == [{'rms': None, 'sizes': [None, 1.0], 'number': None, 'ticks': 3}]
+    signal, = said['found']['controller']['signals']
+    assert (signal['not_comparable'], signal['differing']) == (1, 2)
 
 
 def test_a_hole_in_the_recording_is_told_beside_the_free_run(runs):
