@@ -16,6 +16,7 @@
 
 from collections.abc import Iterator, Sequence
 import datetime
+import math
 from typing import TYPE_CHECKING
 
 from pam_actuation.bags.facts import recorded, recorded_rig_title
@@ -29,6 +30,7 @@ _DISPLAY = {
     'contraction_m': (1e3, 'mm', 2),
     'velocity_m_per_s': (1e3, 'mm/s', 1),
     'force_n': (1.0, 'N', 1),
+    'angle_rad': (math.degrees(1.0), '°', 2),
     'ppr_voltage': (1.0, 'V', 3),
     'fill_duty': (1.0, '', 3),
     'vent_duty': (1.0, '', 3),
@@ -100,7 +102,7 @@ def _range_lines(topic: 'TopicInfo') -> Iterator[str]:
                 f'{topic.name}: {gauge_kpa(low):.1f} to {gauge_kpa(high):.1f} kPa gauge')
         elif name in _DISPLAY:
             factor, unit, digits = _DISPLAY[name]
-            what = '' if name in ('contraction_m', 'force_n') else f' {name}'
+            what = '' if name in ('contraction_m', 'force_n', 'angle_rad') else f' {name}'
             yield (
                 f'{topic.name}{what}: {factor * low:.{digits}f} to '
                 f'{factor * high:.{digits}f} {unit}').rstrip()

@@ -228,7 +228,7 @@ def _topics_of_muscle(namespace: str, namespaces: Collection[str]) -> list[Topic
 
 def _time_remarks(topic: 'TopicData', info: 'TopicInfo', stamp_ns: IntArray) -> list[str]:
     remarks = []
-    name, row = topic.name, RECORDED.get(short_name(topic.name))
+    name, row = topic.name, BY_NAME.get(short_name(topic.name))
     steady = row is not None and row.steady
     if info.stamps_backward:
         remarks.append(f'{name}: the header stamp goes back {info.stamps_backward} times.')

@@ -19,11 +19,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from pam_actuation.bags import series
 from pam_actuation.bags.load_joint import is_joint_topic
-from pam_actuation.bags.rig_topics import is_rig_topic
 from pam_actuation.bags.source import TopicData
 from pam_actuation.topics.cdr import CdrError
 from pam_actuation.topics.definitions import typestore
-from pam_actuation.topics.table import BY_NAME, OF_A_RUN, short_name, TOPICS
+from pam_actuation.topics.table import BY_NAME, short_name, TOPICS
 from pam_sim.annotations import FloatArray, IntArray
 
 # An interval between stamps this many times the usual one counts as a gap.
@@ -82,7 +81,7 @@ def topic_info(topic: TopicData,
         info.stamp_jitter_s = float(np.sqrt(np.mean((steps_s - usual_s)**2)))
     for name, column in values.items():
         finite = column[np.isfinite(column)]
-        if len(finite) and not OF_A_RUN[short_name(topic.name)].internals:
+        if len(finite) and not BY_NAME[short_name(topic.name)].internals:
             info.ranges[name] = (float(finite.min()), float(finite.max()))
     return info, stamp_ns, values
 
@@ -91,12 +90,13 @@ def _stamps_and_values(topic: TopicData,
                        remarks: list[str]) -> tuple[IntArray, dict[str, FloatArray]]:
     """Return header stamps in file order (receive times if these tell more) and values."""
     short = short_name(topic.name)
-    if is_rig_topic(topic) and short in OF_A_RUN and OF_A_RUN[short].numeric is not None:
+    row = BY_NAME.get(short)
+    if row is not None and row.numeric is not None and is_joint_topic(topic):
         stamp_ns, values, bad = series.table(short, topic.payloads)
         if bad.any():
             remarks.append(f'{topic.name}: {int(bad.sum())} messages cannot be decoded.')
-        return stamp_ns[~bad], {name: column[~bad] for name, column in values.items()}
-    row = BY_NAME.get(short)
+        times_ns = stamp_ns if row.stamped else topic.log_time_ns
+        return times_ns[~bad], {name: column[~bad] for name, column in values.items()}
     if _has_header(topic) and (row is None or row.stamped or not is_joint_topic(topic)):
         try:
             return series.stamps(topic.payloads), {}

@@ -181,7 +181,8 @@ TOPICS = (
         Value('angle_rad', 'position'), Value('torque_n_m', 'effort'))),
           'measured angle, and torque of both tendons',
           ('joint_simulator', 'hardware_sensors'),
-          ('joint_controller', 'joint_trajectory_server', *REFERENCE), place=JOINT),
+          ('joint_controller', 'joint_trajectory_server', *REFERENCE), place=JOINT,
+          steady=True),
     Topic('joint_reference', Numbers(JOINT_STATE, messages.AngleReference, (
         Value('angle_rad', 'position'), Value('rate_rad_per_s', 'velocity'))),
           'wanted angle, now', REFERENCE, ('joint_controller',), place=JOINT, held=True,

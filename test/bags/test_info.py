@@ -15,6 +15,7 @@
 """What is said about a bag: rates, gaps, losses, and what cannot be true."""
 
 import json
+import math
 
 import numpy as np
 from pam_actuation import messages
@@ -26,7 +27,7 @@ from pam_actuation.bags.renamed import may_be, may_be_in
 from pam_actuation.bags.writer import BagWriter
 from pam_actuation.cli.main import main
 from pam_actuation.topics import codec
-from pam_actuation.topics.table import RECORDED
+from pam_actuation.topics.table import BY_NAME, RECORDED
 from pam_sim.errors import InputError
 import pytest
 from sample_bag import example_messages, full_name, METADATA, START_NS, STEP_NS, write_bag
@@ -390,6 +391,35 @@ def test_a_muscle_of_a_joint_needs_no_reference_and_a_regulator_no_supply(
     assert not said(commanded, 'valve_signal') and commanded.notes == [
         '/muscle has no messages on valve_signal: pam gap and pam identify take '
         'pressure_command for the input of a regulator.']
+
+
+def joint_info(path, angle_rad, stamp_ns):
+    """Return what is known of a bag with the angle of a joint and an unstamped co-contraction."""
+    with BagWriter(path, {}) as writer:
+        for name in ('joint_state', 'co_contraction'):
+            writer.add_topic(f'/knee/{name}', BY_NAME[name].type_name)
+        for angle, now_ns in zip(angle_rad, stamp_ns):
+            for name, message in (('joint_state', messages.JointAngle(now_ns, angle)),
+                                  ('co_contraction', messages.Pressure(0, 3e5))):
+                writer.write(f'/knee/{name}', codec.encode(name, message), now_ns, now_ns)
+    return bag_info(path)
+
+
+def test_the_angle_of_a_joint_is_looked_at(tmp_path):
+    stamp_ns = [START_NS + i * STEP_NS for i in range(COUNT)]
+    angle_rad = [0.1 * math.sin(0.05 * i) for i in range(COUNT)]
+    good = joint_info(tmp_path / 'good', angle_rad, stamp_ns)
+    assert not said(good, '/knee/')
+    assert good.topic('/knee/co_contraction').rate_hz == pytest.approx(200.0)
+    low, high = good.topic('/knee/joint_state').ranges['angle_rad']
+    assert (low, high) == pytest.approx((-0.1, 0.1), rel=1e-2)
+    assert '/knee/joint_state: -5.73 to 5.73 °' in render_text(good)
+    lost = joint_info(tmp_path / 'lost', [math.nan] * COUNT, stamp_ns)
+    assert said(lost, '/knee/joint_state', 'angle_rad are not finite (nan or inf), none can be')
+    assert lost.has_findings
+    holed = joint_info(tmp_path / 'holed', angle_rad, [
+        now_ns + 4 * 10**9 * (i > 200) for i, now_ns in enumerate(stamp_ns)])
+    assert said(holed, '/knee/joint_state: 1 gaps, the longest 4005 ms')
 
 
 def test_foreign_topics_are_listed(tmp_path):
