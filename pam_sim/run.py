@@ -263,12 +263,44 @@ class Run:
             stamp_ns = np.asarray(one.stamp_ns, dtype=np.int64)
             order = np.argsort(stamp_ns, kind='stable')
             seconds = (stamp_ns[order] - int(start_ns)) * 1e-9
-            held = name in HELD_TOPICS if one.held is None else one.held
+            held = _is_held(name, one)
             values[name] = {
                 key: _held(time_s, seconds, np.asarray(samples, float)[order]) if held
                 else _interpolated(time_s, seconds, np.asarray(samples, float)[order], max_gap_s)
                 for key, samples in one.values.items()}
         return Grid(int(start_ns), dt_s, time_s, values)
+
+    def ends_of_table(self, topics: Collection[str] | None = None) -> tuple[str, str]:
+        """
+        Return the topics with which the rows of ``to_dataframe(rate_hz)`` begin and end.
+
+        That is the one that begins last, and the measured one that ends first. A held value
+        counts on. Without a measured topic, it is the held one that ends last.
+
+        Parameters
+        ----------
+        topics : collection of str, optional
+            Short names; all with messages by default.
+
+        Raises
+        ------
+        InputError
+            A topic without messages, no messages.
+
+        """
+        series = self._chosen(topics)
+        ends_ns = {name: int(np.max(one.stamp_ns)) for name, one in series.items()}
+        measured = [name for name, one in series.items() if not _is_held(name, one)]
+        return (max(series, key=lambda name: int(np.min(series[name].stamp_ns))),
+                min(measured, key=ends_ns.__getitem__) if measured
+                else max(series, key=ends_ns.__getitem__))
+
+    def _chosen(self, topics: Collection[str] | None) -> dict[str, Series]:
+        series = {name: self.require(name)
+                  for name in topics or [name for name in self.topics if name in self]}
+        if not series:
+            raise InputError('has no messages', self.path or 'run')
+        return series
 
     def to_dataframe(self, rate_hz: float | None = None,
                      topics: Collection[str] | None = None) -> 'pd.DataFrame':
@@ -281,8 +313,9 @@ class Run:
         Parameters
         ----------
         rate_hz : float, optional
-            Rows at equal distances, as ``on_grid``. By default there is a row for each stamp
-            of any topic, and NaN where a topic has no message at that stamp.
+            Rows at equal distances, as ``on_grid``, from and to ``ends_of_table``. By default
+            there is a row for each stamp of any topic, and NaN where a topic has no message at
+            that stamp.
         topics : collection of str, optional
             Short names; all with messages by default.
 
@@ -293,15 +326,13 @@ class Run:
 
         """
         import pandas as pd     # takes a second to load
-        series = {name: self.require(name)
-                  for name in topics or [name for name in self.topics if name in self]}
-        if not series:
-            raise InputError('has no messages', self.path or 'run')
+        series = self._chosen(topics)
         if rate_hz is not None:
             if not LEAST_RATE_HZ <= rate_hz <= MOST_RATE_HZ:
                 raise InputError(
                     f'{rate_hz:g} Hz; allowed is {LEAST_RATE_HZ:g} to {MOST_RATE_HZ:g} Hz', 'rate')
-            grid = self.on_grid(1.0 / rate_hz, topics=series)
+            last = series[self.ends_of_table(topics)[1]]
+            grid = self.on_grid(1.0 / rate_hz, end_ns=int(np.max(last.stamp_ns)), topics=series)
             stamp_ns = grid.start_ns + np.round(grid.time_s * 1e9).astype(np.int64)
             columns = {f'{topic}.{name}': values for topic, fields in grid.values.items()
                        for name, values in fields.items()}
@@ -357,6 +388,10 @@ class Grid:
     def __len__(self) -> int:
         """Return the number of grid points."""
         return len(self.time_s)
+
+
+def _is_held(name: str, series: Series) -> bool:
+    return name in HELD_TOPICS if series.held is None else series.held
 
 
 def _held(time_s: FloatArray, stamp_s: FloatArray, samples: FloatArray) -> FloatArray:

@@ -15,14 +15,19 @@
 """``pam export``: a bag as a table for other programs."""
 
 import argparse
+from typing import TYPE_CHECKING
 
 from pam_actuation.cli.common import (
     add_overwrite_option, add_recover_option, add_topic_option, check_outputs, emit, EXIT_DONE,
     note_implausible)
 from pam_actuation.cli.options import number, out_path, Parser, source
 
+if TYPE_CHECKING:
+    from pam_sim.run import Run
+
 HELP = 'Write a bag as a table: CSV, Excel, MAT, Parquet or NumPy. All in SI, pressures absolute.'
 EXAMPLE = 'pam export runs/first --out first.csv --rate 500'
+SHORT_S = 0.1          # topics begin and end that far apart in every recording
 
 
 def add_arguments(parser: Parser) -> None:
@@ -56,7 +61,24 @@ def run(args: argparse.Namespace) -> int:
     frame = loaded.to_dataframe(args.rate, topics)
     write_table(frame, args.out)
     columns = [str(name) for name in frame.columns]
-    emit(args, {'table': args.out, 'rows': len(frame), 'columns': columns},
-         f'wrote {len(frame)} rows and {len(columns)} columns\ntable: {args.out}\n'
-         f'columns: {", ".join(columns)}')
+    remarks = _left_out(loaded, topics) if args.rate else []
+    emit(args, {'table': args.out, 'rows': len(frame), 'columns': columns, 'remarks': remarks},
+         '\n'.join([f'wrote {len(frame)} rows and {len(columns)} columns',
+                    *(f'remark: {text}' for text in remarks), f'table: {args.out}',
+                    f'columns: {", ".join(columns)}']))
     return EXIT_DONE
+
+
+def _left_out(run: 'Run', topics: list[str] | None) -> list[str]:
+    """Return a sentence on each end where rows are left out for one topic."""
+    first, last = run.ends_of_table(topics)
+    times_s = [run[name].time_s for name in topics or run.topics if name in run]
+    begin_s, end_s = run[first].time_s.min(), run[last].time_s.max()
+    latest_s = max(time_s.max() for time_s in times_s)
+    remarks = []
+    if begin_s - min(time_s.min() for time_s in times_s) > SHORT_S:
+        remarks.append(f'{first} begins at {begin_s:.3f} s: the rows before are left out')
+    if latest_s - end_s > SHORT_S:
+        remarks.append(
+            f'{last} ends at {end_s:.3f} s of {latest_s:.3f} s: the rows after are left out')
+    return remarks

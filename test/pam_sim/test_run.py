@@ -40,6 +40,23 @@ def test_grid_interpolates_measurements_and_holds_commands():
     assert grid['valve_signal', 'ppr_voltage'][19] == pytest.approx(0.1)
 
 
+def test_a_table_ends_with_the_first_measured_topic_to_end():
+    run = make_run()
+    once = Series(run['pressure'].stamp_ns[:1], {'pressure_pa': np.array([2e5])})
+    run = Run({'pressure': run['pressure'], 'pressure_command': once,
+               'valve_signal': run['valve_signal']})
+    frame = run.to_dataframe(rate_hz=1000.0)
+    assert len(frame) == 496 and (frame['pressure_command.pressure_pa'] == 2e5).all()
+    assert frame['valve_signal.ppr_voltage'].iloc[-1] == pytest.approx(4.9)
+    assert run.ends_of_table() == ('pressure', 'pressure')
+    held = ('pressure_command', 'valve_signal')
+    assert len(run.to_dataframe(1000.0, held)) == 491
+    assert run.ends_of_table(held) == ('pressure_command', 'valve_signal')
+    run.topics['force'] = Series(run['pressure'].stamp_ns[20:50], {'force_n': np.zeros(30)})
+    assert run.ends_of_table() == ('force', 'force')
+    assert len(run.to_dataframe(1000.0)) == 146
+
+
 def test_gaps_are_interpolated_or_left_empty():
     start = 10**18
     stamp_ns = start + np.array([0, 10, 20, 520, 530]) * 1_000_000

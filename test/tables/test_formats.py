@@ -99,6 +99,32 @@ def test_the_same_table_gives_the_same_bag(bag, tmp_path):
     assert one.read_bytes() == two.read_bytes()
 
 
+def test_rows_that_one_topic_leaves_out_are_told(bag, tmp_path, capsys):
+    call = ['export', str(bag), '--rate', '500', '--overwrite', '--out', str(tmp_path / 'a.csv')]
+    assert main([*call, '--json']) == 0
+    assert json.loads(capsys.readouterr().out)['remarks'] == []
+    with BagWriter(tmp_path / 'cut', {}) as writer:
+        for number, stamp_ns in enumerate(STAMPS.tolist()):
+            said = {'pressure': messages.Pressure(stamp_ns, 2e5)}
+            if number < 80:
+                said['force'] = messages.Force(stamp_ns, 40.0)
+            if number > 60:
+                said['valve_signal'] = messages.ValveSignal(stamp_ns, ('ppr_voltage',), (2.0,))
+            for name, message in said.items():
+                writer.add_topic(f'/muscle/{name}', topic_of(name).type_name)
+                writer.write(f'/muscle/{name}', encode(name, message), stamp_ns, stamp_ns)
+    call[1] = str(tmp_path / 'cut')
+    assert main([*call, '--json']) == 0
+    begin, end = json.loads(capsys.readouterr().out)['remarks']
+    assert begin == 'valve_signal begins at 0.122 s: the rows before are left out'
+    assert end == 'force ends at 0.158 s of 0.399 s: the rows after are left out'
+    assert main([*call, '--topics', 'pressure,valve_signal']) == 0
+    told = capsys.readouterr().out
+    assert told.count('remark: ') == 1 and f'remark: {begin}' in told
+    assert main(['export', call[1], '--out', str(tmp_path / 'all.csv')]) == 0
+    assert 'remark' not in capsys.readouterr().out
+
+
 def test_a_data_frame_on_a_grid_holds_commands(bag):
     frame = load_run(bag).to_dataframe(rate_hz=500.0, topics=['pressure', 'valve_signal'])
     assert list(frame.columns) == [
