@@ -54,7 +54,7 @@ def held_points(run: Run) -> tuple[FloatArray, FloatArray]:
     time_s, pressure = samples_of(run, 'pressure', 'pressure_pa', origin)
     force_s, force = samples_of(run, 'force', 'force_n', origin)
     points = []
-    for begin, end in still_spans(time_s, pressure, BIN_S, SHORTEST_S):
+    for begin, end in still_spans(time_s, pressure, BIN_S, SHORTEST_S, run.path):
         # The bins at both ends feel the steps before and after.
         windows = [(t >= begin + BIN_S) & (t < end - BIN_S) for t in (time_s, force_s)]
         if all(np.any(one) for one in windows):

@@ -32,6 +32,7 @@ from pam_sim.units import P_ATM_PA
 BIN_S = 0.1                 # pressure is averaged over such bins before its rate is judged
 STILL_PA = 1.5e3            # change over two bins below which the pressure stands still
 SHORTEST_S = 1.0            # shorter stillness is no hold
+LONGEST_S = 1e6             # a longer recording has a wrong stamp
 LONGEST_WINDOW_S = 2.0      # averaged: the last half of a hold, at most this much
 BLOCKS = 5                  # parts of the window whose means tell drift from noise
 SETTLED_STRAIN = 4e-4       # largest spread of these means in a settled hold, of L0
@@ -88,7 +89,7 @@ def find_holds(run: Run, length_m: float) -> list[Hold]:
     Raises
     ------
     InputError
-        Pressure or contraction missing, or shorter than one hold.
+        Pressure or contraction missing, shorter than one hold, or a stamp far from the others.
 
     """
     origin = int(np.min(run.require('pressure').stamp_ns))
@@ -99,7 +100,7 @@ def find_holds(run: Run, length_m: float) -> list[Hold]:
     if pressure_t[-1] - pressure_t[0] < SHORTEST_S:
         raise InputError(f'is shorter than one hold of {SHORTEST_S:g} s', run.path)
     holds: list[Hold] = []
-    for begin, end in still_spans(pressure_t, pressure):
+    for begin, end in still_spans(pressure_t, pressure, path=run.path):
         # The last bin already feels the next increment.
         stop = end - 0.5 * BIN_S
         start = stop - min(0.5 * (end - begin), LONGEST_WINDOW_S)
@@ -122,8 +123,20 @@ def samples_of(run: Run, topic: str, key: str, origin_ns: int) -> tuple[FloatArr
 
 
 def still_spans(time: FloatArray, pressure: FloatArray, bin_s: float = BIN_S,
-                shortest_s: float = SHORTEST_S) -> list[tuple[float, float]]:
-    """Return (begin, end) [s] of every stretch of at least a hold without pressure change."""
+                shortest_s: float = SHORTEST_S, path: str = '') -> list[tuple[float, float]]:
+    """
+    Return (begin, end) [s] of every stretch of at least a hold without pressure change.
+
+    Raises
+    ------
+    InputError
+        The times span more than any recording; ``path`` is named.
+
+    """
+    span_s = float(time[-1] - time[0])
+    if span_s > LONGEST_S:
+        raise InputError(f'its stamps of the pressure span {span_s:.2g} s; allowed is at most '
+                         f'{LONGEST_S:g} s', path)
     index = np.floor((time - time[0]) / bin_s).astype(int)
     count = np.bincount(index)
     with np.errstate(invalid='ignore'):

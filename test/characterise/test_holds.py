@@ -16,6 +16,7 @@
 
 import numpy as np
 from pam_sim.characterise.fixed_load import fixed_load
+from pam_sim.characterise.held import held_points
 from pam_sim.characterise.holds import find_holds
 from pam_sim.errors import InputError
 import pytest
@@ -56,6 +57,14 @@ def test_gaps_and_disorder_of_the_recording_do_no_harm():
     run.topics['contraction'].values['contraction_m'][::50] = np.nan
     found = [hold.contraction_m for hold in find_holds(run, LENGTH_M)]
     assert found == pytest.approx(wanted, abs=1e-5)
+
+
+def test_a_stamp_far_from_the_others_is_refused():
+    run = stepped_run(50.0)
+    run.topics['pressure'].stamp_ns[0] = 0
+    for holds in (lambda: find_holds(run, LENGTH_M), lambda: held_points(run)):
+        with pytest.raises(InputError, match='made: .* 1.7e[+]09 s; allowed is at most 1e[+]06 s'):
+            holds()
 
 
 @pytest.mark.parametrize('topic', ['pressure', 'contraction'])
