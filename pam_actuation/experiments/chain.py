@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 CHECK_EVERY_S = 0.01        # as often as the reference is sent
 _MOST_CHECKS = 100_000
+_ROUNDING_S = 1e-9          # of times that are sums
 _SHOWN = {'pa': 'Pa', 'n': 'N', 'v': 'V'}       # units as people write them
 LONGEST_S = 6 * 3600.0
 
@@ -78,6 +79,8 @@ class Chain:
         What the values mean.
     segments : list of (name, arguments, where)
         The primitives in order, with the keys of the file and ``file:line``.
+    stop_after_s : float, optional
+        End before the last primitive does. All are checked; what follows is then left out.
 
     Raises
     ------
@@ -87,7 +90,8 @@ class Chain:
 
     """
 
-    def __init__(self, domain: Domain, segments: Sequence[Segment]) -> None:
+    def __init__(self, domain: Domain, segments: Sequence[Segment],
+                 stop_after_s: float | None = None) -> None:
         self.domain = domain
         self.segments: list[Primitive] = []
         self._starts: list[float] = []
@@ -111,7 +115,12 @@ class Chain:
                     f'{name} cannot be calculated with these keys: {error}', where) from error
             self.segments.append(primitive)
             self._starts.append(t - primitive.duration_s)
-        self.duration_s = t
+        self.whole_s = t
+        self.duration_s = t if stop_after_s is None else min(stop_after_s, t)
+        played = bisect.bisect_left(self._starts, self.duration_s - _ROUNDING_S)
+        del self.segments[played:], self._starts[played:]
+        last, left = self.segments[-1], self.duration_s - self._starts[-1]
+        self._end = last.end if left >= last.duration_s - _ROUNDING_S else last.at(left)[0]
 
     def _check_range(self, primitive: 'Primitive', name: str, where: str) -> None:
         domain, duration_s = self.domain, primitive.duration_s
@@ -138,7 +147,7 @@ class Chain:
         if t_s < 0.0:
             return self.segments[0].at(0.0)[0], 0.0
         if t_s >= self.duration_s:
-            return self.segments[-1].end, 0.0
+            return self._end, 0.0
         k = self._index(t_s)
         return self.segments[k].at(t_s - self._starts[k])
 
@@ -148,9 +157,12 @@ class Chain:
 
     @property
     def periodic_parts(self) -> tuple[tuple[float, float, int], ...]:
-        """Return (start_s, period_s, count) of every periodic primitive."""
-        return tuple((start, *segment.periods)
-                     for start, segment in zip(self._starts, self.segments) if segment.periods)
+        """Return (start_s, period_s, count of whole periods) of every periodic primitive."""
+        found = [(start, *segment.periods)
+                 for start, segment in zip(self._starts, self.segments) if segment.periods]
+        end = self.duration_s + _ROUNDING_S
+        return tuple((start, period_s, min(count, int((end - start) / period_s)))
+                     for start, period_s, count in found)
 
     def extremes(self) -> tuple[float, float]:
         """Return the lowest and highest value, looked at every 10 ms."""

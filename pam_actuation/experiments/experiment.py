@@ -89,25 +89,23 @@ class Experiment:
             raise InputError('segments is empty; an experiment needs at least one', where)
         self.name, self.description, self.domain = name, description, domain
         self.needs = tuple(needs)
-        self.chain = Chain(DOMAINS[domain], segments)
+        self.chain = Chain(DOMAINS[domain], segments, stop_after_s)
         self.disturbance = Chain(FORCE, disturbance) if disturbance else None
-        whole_s = self.chain.duration_s
+        whole_s = self.chain.whole_s
         if self.disturbance and self.disturbance.duration_s > whole_s + 1e-9:
             raise InputError(
                 f'disturbance lasts {self.disturbance.duration_s:g} s, the experiment only '
                 f'{whole_s:g} s', disturbance[0][2])
         self.stop_after_s = stop_after_s
-        self.duration_s = whole_s if stop_after_s is None else min(stop_after_s, whole_s)
+        self.duration_s = self.chain.duration_s
 
     def at(self, t_s: float) -> tuple[float, float]:
         """Return (value, rate) at t_s since the start; outside, the end values at rest."""
-        if t_s >= self.duration_s:
-            return self.chain.at(self.duration_s)[0], 0.0
         return self.chain.at(t_s)
 
     def shuts_valve(self, t_s: float) -> bool:
         """Tell whether both valves of a pair are shut at t_s, whatever the value."""
-        return t_s < self.duration_s and self.chain.shuts_valve(t_s)
+        return self.chain.shuts_valve(t_s)
 
     def external_force_n(self, t_s: float) -> float:
         """Return the disturbance on the load [N], against contraction positive; 0 outside."""

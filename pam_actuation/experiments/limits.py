@@ -151,8 +151,7 @@ def jump_remarks(experiment: 'Experiment') -> tuple[str, ...]:
         f'the reference jumps from {factor * before:.4g} to {factor * after:.4g} {unit} at '
         f'{start:.4g} s, where `{name}` begins; ramp to its start first, or use `step` if a jump '
         'is meant'
-        for start, name, before, after in experiment.chain.jumps(LEAST_JUMP[experiment.domain])
-        if start < experiment.duration_s)
+        for start, name, before, after in experiment.chain.jumps(LEAST_JUMP[experiment.domain]))
 
 
 def _check_stroke(experiment: 'Experiment', rig: 'Rig', place: str) -> None:

@@ -227,6 +227,28 @@ def test_a_long_experiment_may_be_stopped_early():
         load_experiment(text.replace('0.5\ndomain', '0\ndomain'))
 
 
+def test_what_comes_after_an_early_stop_is_neither_checked_nor_told():
+    rig = pam_sim.load_rig('dmsp_5_300_realistic', valve='ppr')
+    tail = ('name: tail\nstop_after_s: 2.0\nsegments:\n  - ramp: {to_m: 0.01, duration_s: 2.0}\n'
+            '  - ramp: {to_m: %s, duration_s: 2.0}\n')
+    with pytest.raises(InputError, match='asks for 200.0 mm'):
+        load_experiment((tail % 0.2).replace('2.0\nseg', '4.0\nseg')).check_reachable(rig)
+    stopped = load_experiment(tail % 0.2)
+    stopped.check_reachable(rig)
+    assert stopped.remarks('ppr', rig) == ()
+    assert stopped.chain.extremes() == pytest.approx((0.0, 0.01))
+    assert stopped.at(5.0) == (pytest.approx(0.01), 0.0)
+    assert load_experiment(stopped.to_yaml()).to_dict() == stopped.to_dict()
+    shut = SHUT.replace('domain:', 'stop_after_s: 1.2\ndomain:')
+    assert load_experiment(shut).remarks('ppr') == ()
+    assert load_experiment(shut.replace('1.2', '1.3')).remarks('ppr') != ()
+    # Of a part that repeats itself, as many periods as are played whole.
+    sine = ('name: sine\nstop_after_s: 5.0\nsegments:\n  - sine: {center_m: 0.01, amplitude_m: '
+            '0.005, frequency_hz: 0.5, cycles: 20}\n')
+    assert load_experiment(sine).periodic_parts == ((0.0, 2.0, 2),)
+    assert load_experiment(sine.replace('5.0', '60.0')).periodic_parts == ((0.0, 2.0, 20),)
+
+
 def test_simulation_takes_the_timing_of_another_run(tmp_path):
     rig = pam_sim.load_rig('dmsp_5_300_realistic', valve='ppr')
     runs = []
