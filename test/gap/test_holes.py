@@ -64,6 +64,15 @@ def test_stretches_come_longest_first_and_are_told(whole):
     assert text.endswith('count as 2 recordings, without those of less than 1 s')
 
 
+def test_a_hole_within_another_leaves_no_stretch_inside(whole):
+    run = without(whole, 5.0, 15.0, topics=('pressure',))
+    for begin_s, end_s in ((6.0, 7.0), (10.0, 11.0)):
+        run = without(run, begin_s, end_s, topics=('contraction',))
+        parts, text = stretches(run, 1.0, driven=True)
+        assert [part.path for part in parts] == ['bag, 15.0 to 24.0 s', 'bag, 0.0 to 5.0 s']
+        assert text.endswith('count as 2 recordings')
+
+
 def test_a_recording_of_short_stretches_alone_is_refused(whole):
     parts, text = stretches(without(whole, *HOLE_S), 20.0)
     assert parts == [] and 'no stretch of 20 s is left' in text

@@ -21,6 +21,7 @@ given. Nobody knows what they did during a hole, nor where the muscle is after i
 
 from collections.abc import Sequence
 import copy
+from itertools import accumulate
 
 import numpy as np
 from pam_sim.annotations import IntArray
@@ -56,14 +57,16 @@ def stretches(run: Run, least_s: float, driven: bool = False) -> tuple[list[Run]
     every = sorted((begin, end) for one in found.values() for begin, end in one)
     if not every:
         return [run], ''
-    begins = [run.start_ns, *(end for _, end in every)]
+    # A hole may lie within that of another topic: what is between them is no stretch.
+    begins = accumulate((run.start_ns, *(end for _, end in every)), max)
     ends = [*(begin for begin, _ in every), run.end_ns]
-    kept = [(begin, end) for begin, end in zip(begins, ends) if end - begin >= least_s * 1e9]
+    parts = [(begin, end) for begin, end in zip(begins, ends) if end > begin]
+    kept = [(begin, end) for begin, end in parts if end - begin >= least_s * 1e9]
     if not kept:
         return [], NONE_LEFT.format(holes=told, least_s=least_s)
     kept.sort(key=lambda ends: ends[0] - ends[1])
     text = COUNT.format(path=run.path or 'recording', holes=told, count=len(kept))
-    if len(kept) < len(begins):
+    if len(kept) < len(parts):
         text += SHORT.format(least_s=least_s)
     return [between(run, *one) for one in kept], text
 
