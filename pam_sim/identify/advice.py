@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 from pam_sim.annotations import FloatArray
+from pam_sim.errors import InputError
 from pam_sim.gap.data.noise import noise_sd
 from pam_sim.gap.data.pressed import recorded_gauge_pa
 from pam_sim.gap.data.signals import FIELD, UNIT
@@ -238,7 +239,10 @@ def _noise(offers: Sequence[Offer]) -> dict[str, float]:
 def _information(rig: Rig, numbers: Sequence[Number], proposal: Proposal,
                  noise: dict[str, float]) -> FloatArray:
     """Return what a simulated recording of the experiment would add."""
-    offer = offer_of(_simulated(rig, proposal, noise), rig, proposal.added_kg)
+    try:
+        offer = offer_of(_simulated(rig, proposal, noise), rig, proposal.added_kg)
+    except InputError:          # it would lift nothing
+        return np.zeros((len(numbers), len(numbers)))
     if rig.valve != 'ppr':
         # Its duties depend on the driver: only what muscle and load show is predicted.
         offer = Offer(offer.path, offer.recording, False, offer.mechanics, offer.kind,

@@ -16,15 +16,17 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+import math
 
 import numpy as np
 from pam_sim.errors import InputError
+from pam_sim.gap.criteria import CRITERIA
 from pam_sim.gap.data.health import missed_pulses
 from pam_sim.gap.data.holes import stretches
 from pam_sim.gap.data.noise import noise_of
 from pam_sim.gap.data.recording import Recording
-from pam_sim.gap.data.resting import Rest, rest_of
-from pam_sim.gap.data.signals import tells_of
+from pam_sim.gap.data.resting import Rest, rest_of, ZERO
+from pam_sim.gap.data.signals import FIELD, ordered, tells_of
 from pam_sim.gap.subsystems.mechanics import MechanicsProblem
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.gap.subsystems.valve import ValveProblem
@@ -39,6 +41,10 @@ STILL_SHARE = 0.003          # of the stroke; a contraction that moves less is h
 ONE_LENGTH = ('the rig states one length, so the recordings without a contraction count as held '
               'at the same one; pam characterise --held-mm takes several lengths')
 MOVING_PA = 20e3             # a pressure that moves more would move a free muscle
+# Of pressure by bore. At full length a muscle pulls with about six times that.
+FOLLOWS_SHARE = 0.2
+NEVER_LIFTED = ('neither contraction nor force follows the pressure, so the load was never '
+                'lifted; raise the pressure')
 
 
 @dataclass(frozen=True)
@@ -148,7 +154,8 @@ def offer_of(run: Run, rig: Rig, added_kg: float = 0.0) -> Offer:
     Raises
     ------
     InputError
-        There is no pressure, or neither a command nor a contraction or force.
+        There is no pressure, or neither a command nor a contraction or force. There is no
+        command, and the load was never lifted.
 
     """
     where = run.path or 'recording'
@@ -162,13 +169,17 @@ def offer_of(run: Run, rig: Rig, added_kg: float = 0.0) -> Offer:
     is_still = _is_held(run, rig)
     held = rig.is_driven or (force and is_still)
     isometric_m = rig.parameters.get('contraction_m') if rig.load == 'isometric' else None
-    mechanics = (force and (contraction or isometric_m is not None)) if held else contraction
+    rests = held and not rig.is_driven and _never_lifted(run, rig)
+    mechanics = not rests and (
+        (force and (contraction or isometric_m is not None)) if held else contraction)
     missed = missed_pulses(run['valve_signal'].stamp_ns) if command and rig.valve == 'hsv' else ''
     valve = command and not missed and (
         rig.valve == 'ppr' or contraction or isometric_m is not None)
     if missed and not mechanics:
         raise InputError(missed, where)
     if not (valve or mechanics):
+        if rests:
+            raise InputError(NEVER_LIFTED, where)
         needs = 'a `force`' if held else 'a `contraction`'
         raise InputError(f'has a pressure alone: {needs} tells of muscle and load, a '
                          f'`valve_signal` of the valve (a `pressure_command` too, behind a '
@@ -182,7 +193,8 @@ def offer_of(run: Run, rig: Rig, added_kg: float = 0.0) -> Offer:
               'muscle at a measured length' if contraction and not is_still else
               'muscle at a held length')
     kinds = [word for word, there in (('valve', valve), (muscle, mechanics)) if there]
-    kind = ' and '.join(kinds) + (f'; the valve is left out: {missed}' if missed else '')
+    kind = ' and '.join(kinds) + (f'; the valve is left out: {missed}' if missed else '') + (
+        f'; muscle and load are left out: {NEVER_LIFTED}' if rests else '')
     return Offer(where, recording, valve, mechanics, kind, added_kg, rest)
 
 
@@ -193,6 +205,24 @@ def _is_held(run: Run, rig: Rig) -> bool:
     moved = float(np.ptp(np.percentile(run['contraction']['contraction_m'], (1, 99))))
     pressed = float(np.ptp(run['pressure']['pressure_pa']))
     return moved < STILL_SHARE * rig.muscle.stroke_m and pressed > MOVING_PA
+
+
+def _never_lifted(run: Run, rig: Rig) -> bool:
+    """
+    Tell whether a still load rests on its stop and the force does not follow the pressure.
+
+    In a simulation the load cell reads the weight there. On a real rig it reads the muscle.
+    """
+    contraction = ordered(run['contraction'], FIELD['contraction'])[1] - rig.number(ZERO)
+    if np.median(np.abs(contraction)) > CRITERIA.rest_stroke_share * rig.muscle.stroke_m:
+        return False
+    at, pressure = ordered(run['pressure'], FIELD['pressure'])
+    stamp, force = ordered(run['force'], FIELD['force'])
+    if force.size < LEAST_SAMPLES:
+        return False
+    covariance = np.cov(np.interp(stamp, at, pressure), force)
+    bore_m2 = math.pi / 4.0 * rig.muscle.bore_m ** 2
+    return bool(abs(covariance[0, 1]) < FOLLOWS_SHARE * bore_m2 * covariance[0, 0])
 
 
 def problems_of(rig: Rig, offers: Sequence[Offer], holds_certify: bool = False

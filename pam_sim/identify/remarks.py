@@ -96,5 +96,6 @@ def of_another_law(rig: Rig, left: Squares) -> list[str]:
 def _what_shows(number: Number) -> str:
     if number.name == 'force_zero_n':
         return 'record a force'
-    valve = subsystem_of_number(number.name) == 'valve'
-    return 'record a `valve_signal` or `pressure_command`' if valve else 'record a contraction'
+    if subsystem_of_number(number.name) == 'valve':
+        return 'record a `valve_signal` or `pressure_command`'
+    return 'record a contraction that moves'

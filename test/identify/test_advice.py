@@ -14,13 +14,14 @@
 
 """From where the next experiment is predicted, and how an interval is told."""
 
-from made_records import RIG
+from made_records import record, RIG
 import numpy as np
 from pam_sim import load_rig
-from pam_sim.identify.advice import proposals, where_open
+from pam_sim.identify.advice import next_experiment, proposals, where_open
 from pam_sim.identify.judgement import DETERMINED, is_at_edge, TOGETHER, UNDETERMINED
 from pam_sim.identify.numbers import unknown_numbers
 from pam_sim.identify.profile import Interval
+from pam_sim.identify.records import offer_of
 from pam_sim.identify.result import Found
 from pam_sim.units import P_ATM_PA
 import pytest
@@ -64,6 +65,15 @@ def test_what_goes_above_the_recorded_pressure_comes_last_and_says_so(
     if last_pa > first_pa:
         assert f'up to {1e-3 * last_pa:.0f} kPa gauge; the recordings stayed below ' \
                f'{1e-3 * recorded_pa:.0f} kPa' in found[-1].why
+
+
+def test_an_experiment_that_would_not_lift_the_load_is_not_the_next_one():
+    low = record(RIG, gauge_pa=(0.0, 60e3, 20e3), keep=('pressure', 'contraction'))
+    for valve in ('ppr', 'hsv'):
+        rig = load_rig('dmsp_5_300_hanging_mass', valve=valve)
+        found = next_experiment(rig, [MAP], [], np.zeros((0, 0)), [offer_of(low, RIG)], True)
+        assert found['determines'] == ['force_map_gain']
+        assert 'the recordings stayed below' in found['why']
 
 
 @pytest.mark.parametrize('ends, said', [

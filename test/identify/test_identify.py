@@ -123,6 +123,28 @@ def test_the_muscle_alone_is_identified_at_a_held_length_without_a_command():
     assert inside(found['force_map_gain'], 0.9) and inside(found['force_zero_n'], 0.0)
 
 
+def test_a_load_that_was_never_lifted_is_no_muscle_at_a_held_length():
+    low = record(RIG, gauge_pa=(0.0, 20e3, 40e3, 60e3, 20e3), seed=4)
+    offer = offer_of(low, RIG)
+    assert (offer.valve, offer.mechanics) == (True, False)
+    assert offer.kind.startswith('valve; muscle and load are left out: ')
+    assert 'the load was never lifted; raise the pressure' in offer.kind
+    found = identify(low, RIG, ['law'])
+    assert found.found == [] and 'record a contraction that moves' in found.text()
+    assert inside(identify([low, record(RIG)], RIG, ['mass_kg'])['mass_kg'], 5.0)
+    del low.topics['valve_signal']
+    with pytest.raises(InputError, match='bag: .* never lifted; raise the pressure'):
+        identify(low, RIG, ['law'])
+
+
+def test_a_muscle_that_is_held_on_a_rig_with_a_mass_is_one_at_a_held_length():
+    for strain in (0.0, 0.1):
+        held = load_rig('dmsp_5_300_isometric').with_(parameters={'contraction_m': strain * 0.3})
+        for gauge_pa in ((0.0, 30e3, 60e3, 20e3), (300e3, 400e3, 500e3)):
+            assert offer_of(record(held, gauge_pa), RIG).kind == (
+                'valve and muscle at a held length')
+
+
 def test_the_held_length_may_be_unknown_and_beyond_the_stroke_is_no_length():
     rig = load_rig('dmsp_5_300_isometric').with_(parameters={'contraction_m': 0.03})
     run = record(rig, keep=('pressure', 'force'), command=False)

@@ -60,7 +60,7 @@ def test_holds_tell_the_zero(steps):
     exact = GIVEN.with_(tolerance={'ppr_zero_pa': AbsoluteSd(0.0)})
     assert settled_zero(exact, valve) == (zero, interval)
     moving = record(RIG, voltage=1.0 + np.sin(np.arange(4000) / 300.0))
-    (valve, _) = problems_of(GIVEN, [offer_of(moving, GIVEN)])
+    (valve,) = problems_of(GIVEN, [offer_of(moving, GIVEN)])    # the load is never lifted
     assert settled_zero(GIVEN, valve) is None
 
 
