@@ -104,7 +104,7 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     Raises
     ------
     InputError
-        The recording for the validation is one of those that are searched.
+        Two of the recordings, searched or for the validation, are the same one.
 
     """
     started = time.perf_counter() - spent_s

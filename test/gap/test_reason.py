@@ -243,6 +243,16 @@ def test_the_proof_may_not_be_on_searched_data(run):
         assert str(found.value).startswith('--certify')
 
 
+def test_one_recording_is_searched_once(run):
+    another = recorded(nominal(), voltages(4.0), seed=9)
+    for copy in (run, part(run, 0, None), part(run, 300, None), part(run, 0, None, 4)):
+        for certify in (None, recorded(nominal(), voltages(4.0), seed=8)):
+            with pytest.raises(InputError, match='is the same recording as simulated .*once'):
+                find_gap([another, run, copy], nominal(), certify)
+    with pytest.raises(InputError, match='copy: is the same recording'):
+        find_gap([run, copy], nominal())
+
+
 def test_another_run_of_the_same_clock_is_a_proof(run):
     # Simulations begin at one time: equal stamps alone say nothing.
     other = recorded(nominal(), voltages(4.0), seed=1, jitter_s=0.0)

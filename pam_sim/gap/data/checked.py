@@ -60,12 +60,11 @@ def checked_runs(runs: Run | Sequence[Run], certify: Run | None, rig: Rig,
     Raises
     ------
     InputError
-        The recording for the validation is one of those that are searched.
+        Two of the recordings, searched or for the validation, are the same one.
 
     """
     runs = [runs] if isinstance(runs, Run) else list(runs)
-    if certify is not None:
-        check_apart(runs, certify, criteria)
+    check_apart(runs, certify, criteria)
     runs, certify, told = all_commanded(runs, certify, rig)
     runs, certify, holes, refusals = split_at_holes(
         runs, certify, criteria.min_duration_s, rig.is_driven)

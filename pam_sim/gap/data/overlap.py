@@ -12,9 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A proof on data that were searched proves nothing: tell whether recordings are one."""
+"""Data that are searched twice prove nothing: tell whether recordings are one."""
 
-from collections.abc import Iterable
+from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 from pam_sim.errors import InputError
@@ -22,32 +23,37 @@ from pam_sim.gap.criteria import CRITERIA, Criteria
 from pam_sim.gap.data.signals import FIELD
 from pam_sim.run import Run
 
+PROOF = 'the proof needs another run, or leave --certify out to split this one'
+ONCE = 'what one of them keeps for choice and proof, the other fits; give it once'
 
-def check_apart(runs: Iterable[Run], certify: Run, criteria: Criteria = CRITERIA) -> None:
+
+def check_apart(runs: Sequence[Run], certify: Run | None, criteria: Criteria = CRITERIA) -> None:
     """
-    Raise InputError if the recording for the validation is one of those that are searched.
+    Raise InputError if two of the recordings, searched or for the validation, are the same one.
 
     Whatever the files are called: the messages are compared, by stamp and value. A subsystem or
     filtered copy is the same recording too.
 
     Parameters
     ----------
-    runs : list of pam_sim.run.Run
+    runs : sequence of pam_sim.run.Run
         Those that are searched.
-    certify : pam_sim.run.Run
+    certify : pam_sim.run.Run or None
         The one for the validation.
     criteria : Criteria
         Decision thresholds.
 
     """
-    for run in runs:
-        share = shared_part(run, certify)
+    pairs = [(*pair, ONCE, pair[1].path or 'recording') for pair in combinations(runs, 2)]
+    if certify is not None:
+        pairs += [(run, certify, PROOF, f'--certify {certify.path}'.strip()) for run in runs]
+    for run, other, needs, where in pairs:
+        share = shared_part(run, other)
         if share > criteria.greater_part:
             raise InputError(
                 f'is the same recording as {run.path or "one that is searched"} '
-                f'({100 * share:.0f} % of its messages have the same stamp and value); the proof '
-                'needs another run, or leave --certify out to split this one',
-                f'--certify {certify.path}'.strip())
+                f'({100 * share:.0f} % of its messages have the same stamp and value); {needs}',
+                where)
 
 
 def shared_part(run: Run, other: Run) -> float:
