@@ -104,7 +104,7 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     Raises
     ------
     InputError
-        Two of the recordings, searched or for the validation, are the same one.
+        No recording is given. Two of them, searched or for the validation, are the same one.
 
     """
     started = time.perf_counter() - spent_s

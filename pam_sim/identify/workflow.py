@@ -88,12 +88,15 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
     Raises
     ------
     InputError
-        Nothing is unknown, there is no such number, or a recording offers nothing. Only the
-        force law is unknown, while no force was recorded and an effect is missing.
+        Nothing is unknown, there is no such number or no recording, or a recording offers
+        nothing. Only the force law is unknown, while no force was recorded and an effect is
+        missing.
 
     """
     progress = _onward(progress)
     runs = [runs] if isinstance(runs, Run) else list(runs)
+    if not runs:
+        raise InputError('at least one recording is needed', 'runs')
     if added_kg and len(added_kg) != len(runs):
         raise InputError(f'{len(added_kg)} masses for {len(runs)} recordings; give one for each, '
                          '0 for none', 'added mass')

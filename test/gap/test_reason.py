@@ -243,6 +243,11 @@ def test_the_proof_may_not_be_on_searched_data(run):
         assert str(found.value).startswith('--certify')
 
 
+def test_without_a_recording_there_is_no_answer():
+    with pytest.raises(InputError, match='at least one recording is needed'):
+        find_gap([], nominal())
+
+
 def test_one_recording_is_searched_once(run):
     another = recorded(nominal(), voltages(4.0), seed=9)
     for copy in (run, part(run, 0, None), part(run, 300, None), part(run, 0, None, 4)):

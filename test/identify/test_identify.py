@@ -184,6 +184,11 @@ def test_a_stiffness_of_the_muscle_counts_as_spring_where_no_force_is_measured()
     assert 'would look the same' not in identify(with_force, RIG, ['spring_n_per_m']).text()
 
 
+def test_without_a_recording_nothing_is_identified():
+    with pytest.raises(InputError, match='at least one recording is needed'):
+        identify([], RIG, ['mass_kg'])
+
+
 @pytest.mark.parametrize('change, said', [
     (lambda run: run.topics.pop('pressure'), 'has no `pressure`'),
     (lambda run: [run.topics.pop(n) for n in ('contraction', 'force', 'valve_signal')],

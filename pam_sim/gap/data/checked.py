@@ -17,6 +17,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from pam_sim.errors import InputError
 from pam_sim.gap.criteria import CRITERIA, Criteria
 from pam_sim.gap.data.commanded import all_commanded
 from pam_sim.gap.data.health import check_for, without_dead
@@ -60,10 +61,12 @@ def checked_runs(runs: Run | Sequence[Run], certify: Run | None, rig: Rig,
     Raises
     ------
     InputError
-        Two of the recordings, searched or for the validation, are the same one.
+        No recording is given. Two of them, searched or for the validation, are the same one.
 
     """
     runs = [runs] if isinstance(runs, Run) else list(runs)
+    if not runs:
+        raise InputError('at least one recording is needed', 'runs')
     check_apart(runs, certify, criteria)
     runs, certify, told = all_commanded(runs, certify, rig)
     runs, certify, holes, refusals = split_at_holes(
