@@ -37,6 +37,8 @@ FAILED = 'failed'
 WARM = {'gap': ('pam_actuation.report.gap',), 'identify': ('pam_actuation.report.identify',),
         'replay': ('pam_actuation.replay.compare',), 'report': ('pam_actuation.report.pages',)}
 _ATTEMPTS = 4           # to find a cluster again that was lost
+# Kept in place of its path: recordings of equal bytes share what is kept.
+THE_RECORDING = '{recording}'
 # Failures that say nothing of the recording: its case is worked on again next time.
 NOT_OF_THE_RECORDING = (WorkerLost, MemoryError, OSError)
 _LOST = {'sizes': [], 'ambiguous': [], 'least': {}, 'bad': True}
@@ -149,6 +151,8 @@ def run_campaign(cases: Sequence[Case], settings: Settings, out: StrPath, jobs: 
         rows = [{'case': case, 'key': key, **(store.result(key) or {
             'verdict': FAILED, 'reason': lost.get(key, 'not there'), **_LOST})}
             for key, case in zip(keys, cases)]
+        for row in rows:
+            row['reason'] = row['reason'].replace(THE_RECORDING, row['case'].path)
     return Campaign(settings, rows, count - len(lost), time.perf_counter() - started)
 
 
@@ -192,7 +196,8 @@ def work_and_keep(given: tuple[Settings, str, str], task: Task) -> tuple[float, 
         except Exception as error:      # noqa: B902, a failed case is a row and not an end
             if isinstance(error, InputError) and UNFINISHED in error.where:
                 raise           # its files cannot be written
-            found = {'verdict': FAILED, 'reason': _told(error), **_LOST}
+            reason = _told(error).replace(task.case.path, THE_RECORDING)
+            found = {'verdict': FAILED, 'reason': reason, **_LOST}
         write_json(folder / RESULT, found)
     return time.perf_counter() - began, time.process_time() - used
 

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import math
 from typing import Any, TYPE_CHECKING
 
+from pam_actuation.campaign.cases import Case
 from pam_actuation.campaign.changes import Change, changes_of, FAR, far_from_neighbours
 from pam_actuation.campaign.series import IN_95, Series, series_of
 
@@ -99,21 +100,21 @@ def began(change: Change) -> float:
 def _odd(campaign: 'Campaign', series: list[Series], changes: list[Change]) -> list[Odd]:
     """Return the recordings that do not fit, the worst first; each once."""
     fitted = {id(change.series): change.fitted() for change in changes}
-    found: dict[str, Odd] = {}
-    rows = {row['key']: row for row in campaign.rows}
+    found: dict[Case, Odd] = {}
+    rows = {row['case']: row for row in campaign.rows}
     for row in campaign.rows:
         if row['bad']:
-            found[row['key']] = Odd(row, row['reason'] or row['verdict'], math.inf)
+            found[row['case']] = Odd(row, row['reason'] or row['verdict'], math.inf)
     for one in series:
         far = far_from_neighbours(one)
         expected = fitted.get(id(one))
         for k in range(len(one)):
-            if not far[k] or one.keys[k] in found:
+            if not far[k] or one.cases[k] in found:
                 continue
             middle = _expected(one, k) if expected is None else float(expected[k])
             distance = abs(one.value[k] - middle) / one.sd[k]
             if distance > FAR:
-                found[one.keys[k]] = Odd(rows[one.keys[k]], (
+                found[one.cases[k]] = Odd(rows[one.cases[k]], (
                     f'{one.name}: {one.quantity} is {shown(one.value[k], one.unit)}, recordings '
                     f'near it say {shown(middle, one.unit)}'), float(distance))
     return sorted(found.values(), key=lambda odd: (-odd.far, odd.row['case'].rig,

@@ -121,9 +121,9 @@ def _series(findings: Findings) -> Section:
 
 def _all(campaign: Campaign, findings: Findings) -> Section:
     """Return the list of all recordings, those that stand out first."""
-    first = {odd.row['key']: place for place, odd in enumerate(findings.odd)}
+    first = {odd.row['case']: place for place, odd in enumerate(findings.odd)}
     rows = sorted(campaign.rows, key=lambda row: (
-        first.get(row['key'], len(first)), row['case'].rig, row['case'].time))
+        first.get(row['case'], len(first)), row['case'].rig, row['case'].time))
     lines = [[_link(campaign, row), text(row['case'].rig), text(row['case'].day),
               text(row['verdict']), text(_sizes(row) or row['reason'])] for row in rows]
     return Section('recordings', 'All recordings', _table(

@@ -20,6 +20,7 @@ import math
 from typing import Any
 
 import numpy as np
+from pam_actuation.campaign.cases import Case
 from pam_sim.annotations import BoolArray, FloatArray
 from pam_sim.short_repr import short_repr
 
@@ -46,8 +47,8 @@ class Series:
         SI. Where nothing is named: ``nothing``, as uncertain as the smallest size that shows.
     named : ndarray of bool, shape (N,)
         Whether the recording names it.
-    keys : list of str
-        Of the cases.
+    cases : list of Case
+        Whose values they are.
     nothing : float
         The value that means that all is as the model says.
 
@@ -63,7 +64,7 @@ class Series:
     value: FloatArray
     sd: FloatArray
     named: BoolArray
-    keys: list[str]
+    cases: list[Case]
     nothing: float
 
     def __len__(self) -> int:
@@ -100,7 +101,7 @@ def _of_rig(rig: str, rows: list[dict[str, Any]]) -> list[Series]:
         found.append(Series(
             rig, name, like['kind'], quantity, like['unit'],
             np.array([case.time for case in cases]), [case.day for case in cases], value, sd,
-            named.astype(bool), [point[0]['key'] for point in points],
+            named.astype(bool), cases,
             math.nan if like['nothing'] is None else like['nothing']))
     return found
 

@@ -110,5 +110,5 @@ def key_of(case: Case, settings: Settings, model_text: str) -> str:
     for part in (code_digest(), model_text, json.dumps(options, sort_keys=True),
                  case.namespace or ''):
         digest.update(part.encode() + b'\0')
-    add_files(digest, case.path, lambda file, error: str(error.errno).encode())
+    add_files(digest, case.path, lambda file, error: f'{error.errno} {file}'.encode())
     return digest.hexdigest()[:20]

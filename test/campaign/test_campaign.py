@@ -28,6 +28,8 @@ from pam_actuation.campaign import campaign, code, store
 from pam_actuation.campaign.campaign import run_campaign, Task, work_and_keep
 from pam_actuation.campaign.cases import Case, find_cases
 from pam_actuation.campaign.code import code_digest
+from pam_actuation.campaign.findings import find
+from pam_actuation.campaign.page import campaign_page
 from pam_actuation.campaign.results import NO_PARQUET, table_rows, write_table
 from pam_actuation.campaign.store import key_of, Store
 from pam_actuation.campaign.work import Settings
@@ -196,6 +198,30 @@ def test_a_failure_of_the_machine_is_no_result(lab, tmp_path, monkeypatch, error
     assert not list((tmp_path / 'cases').iterdir())
     again = run_campaign([case], settings, tmp_path)
     assert again.worked_on == 1 and again.rows[0]['verdict'] == 'reported'
+
+
+def test_recordings_of_equal_bytes_keep_their_own_reason(tmp_path):
+    for rig in ('a', 'b'):
+        broken = tmp_path / 'lab' / rig / '2026-03-01'
+        broken.mkdir(parents=True)
+        (broken / f'{rig}.mcap').write_bytes(b'no bag')
+    table = tmp_path / 'list.csv'
+    table.write_text('path,rig\nlab,\nmissing_c,m\nmissing_d,n\n')
+    done = run_campaign(find_cases(table), Settings('report'), tmp_path / 'out', jobs=1)
+    paths = [row['case'].path for row in done.rows]
+    assert [Path(path).name for path in paths] == ['a.mcap', 'b.mcap', 'missing_c', 'missing_d']
+    for row in done.rows:
+        assert row['reason'].startswith(f'{row["case"].path}: ')
+    found = find(done)
+    assert [odd.row['case'].path for odd in found.odd] == paths
+    assert [odd.why for odd in found.odd] == [row['reason'] for row in done.rows]
+    page = campaign_page(done, found)
+    assert page.index('>missing_d<') < page.index('All recordings</h2>')
+    # A folder that was moved is told where it is.
+    (tmp_path / 'lab').rename(tmp_path / 'moved')
+    table.write_text('path\nmoved\n')
+    again = run_campaign(find_cases(table), Settings('report'), tmp_path / 'out', jobs=1)
+    assert again.worked_on == 0 and f'{tmp_path}/moved/a/' in again.rows[0]['reason']
 
 
 def test_a_full_disk_ends_the_campaign(lab, tmp_path, monkeypatch):
