@@ -25,6 +25,8 @@ from pam_sim.annotations import BoolArray, FloatArray
 from pam_sim.short_repr import short_repr
 
 IN_95 = 1.959963984540054       # standard deviations on either side of a 95 % interval
+TO_SD = 1.4826                  # times the median of |x|: standard deviation of a normal x
+LEAST_SHARE = 1e-12             # of the largest value, which rounding may be
 # Of these nothing follows for names that they do not hold.
 TELL_NOTHING = ('failed', 'refused', 'unknown')
 
@@ -45,6 +47,7 @@ class Series:
         The same as told.
     value, sd : ndarray, shape (N,)
         SI. Where nothing is named: ``nothing``, as uncertain as the smallest size that shows.
+        Where no value has an interval: as uncertain as they differ from one to the next.
     named : ndarray of bool, shape (N,)
         Whether the recording names it.
     cases : list of Case
@@ -96,7 +99,8 @@ def _of_rig(rig: str, rows: list[dict[str, Any]]) -> list[Series]:
                   if (point := _point(row, name, quantity, like)) is not None]
         value, sd, named = (np.array([point[k] for point in points]) for k in (1, 2, 3))
         known = sd[np.isfinite(sd) & (sd > 0.0)]
-        sd = np.where(np.isfinite(sd) & (sd > 0.0), sd, np.median(known) if len(known) else 1.0)
+        sd = np.where(np.isfinite(sd) & (sd > 0.0), sd,
+                      np.median(known) if len(known) else _scatter(value))
         cases = [point[0]['case'] for point in points]
         found.append(Series(
             rig, name, like['kind'], quantity, like['unit'],
@@ -104,6 +108,14 @@ def _of_rig(rig: str, rows: list[dict[str, Any]]) -> list[Series]:
             named.astype(bool), cases,
             math.nan if like['nothing'] is None else like['nothing']))
     return found
+
+
+def _scatter(value: FloatArray) -> float:
+    """Return the standard deviation of values from the next ones; a step counts for little."""
+    if len(value) < 2:
+        return 1.0
+    scatter = TO_SD * float(np.median(np.abs(np.diff(value)))) / math.sqrt(2.0)
+    return max(scatter, LEAST_SHARE * float(np.max(np.abs(value)))) or 1.0
 
 
 def _point(row: dict[str, Any], name: str, quantity: str, like: dict[str, Any]

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from pam_actuation.bags.load import RecordedRun
 
 SECONDS = 3600.0        # of search, so that a slow machine finds what a fast one finds
+ROUNDING = 1e-9         # of the range of a signal; smaller differences count as none
 PLOTLY = 'plotly.js'    # beside the page of the campaign, for all its reports
 
 
@@ -139,7 +140,8 @@ def replay(run: 'RecordedRun', model: str, settings: Settings, folder: Path) -> 
     write_text(folder / 'replay.json', json.dumps(data, indent=2, default=str) + '\n')
     write_text(folder / 'report.txt', found.text() + '\n')
     sizes = [size(f'{part}.{one["signal"]}', 'difference', 'rms', {
-        'value': one['rms'], 'unit': one['unit']})
+        'value': one['rms'] if one['rms'] > ROUNDING * one['span'] else 0.0,
+        'unit': one['unit']})
         for part in ('controller', 'driver', 'plant') for one in data.get(part, {}).get(
             'signals', ())]
     differs = bool(found.unexpected_difference)

@@ -32,7 +32,7 @@ from pam_actuation.campaign.findings import find
 from pam_actuation.campaign.page import campaign_page
 from pam_actuation.campaign.results import NO_PARQUET, table_rows, write_table
 from pam_actuation.campaign.store import key_of, Store
-from pam_actuation.campaign.work import Settings
+from pam_actuation.campaign.work import Settings, WORKS
 from pam_actuation.cli.main import main
 from pam_actuation.experiments import load_experiment
 from pam_actuation.experiments.offline import simulate_experiment
@@ -134,6 +134,24 @@ def test_a_table_has_a_row_for_each_size(done, lab, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, 'pyarrow', None)
     path, remark = write_table(rows, tmp_path)
     assert remark == NO_PARQUET and path.read_text().count('\n') == 3
+
+
+def test_a_difference_of_rounding_counts_as_none(tmp_path, monkeypatch):
+    class Replayed:
+        unexpected_difference = False
+
+        def to_dict(self):
+            return {'plant': {'signals': [
+                {'signal': name, 'unit': 'Pa', 'rms': rms, 'span': 1e5}
+                for name, rms in (('a', 1e-8), ('b', 1e-3), ('c', 0.0))]}}
+
+        def text(self):
+            return ''
+
+    monkeypatch.setattr('pam_actuation.replay.compare.replay_run', lambda run: Replayed())
+    monkeypatch.setattr('pam_actuation.replay.model.is_joint', lambda run: False)
+    found = WORKS['replay'](None, '', Settings('replay'), tmp_path)
+    assert [one['value'] for one in found['sizes']] == [0.0, 1e-3, 0.0]
 
 
 def test_the_key_is_of_recording_model_settings_and_code(lab, tmp_path, monkeypatch):

@@ -14,13 +14,15 @@
 
 """What changed over time: each shape is found on its day, and chance is not."""
 
+from dataclasses import replace
 import math
 
 import numpy as np
 from pam_actuation.campaign.cases import Case
-from pam_actuation.campaign.changes import changes_of
+from pam_actuation.campaign.changes import changes_of, far_from_neighbours
 from pam_actuation.campaign.findings import sentence
 from pam_actuation.campaign.series import IN_95, Series, series_of
+from pam_actuation.campaign.work import size
 import pytest
 
 DAYS = 25
@@ -121,6 +123,32 @@ def row(day, verdict='effects', sizes=(), ambiguous=(), least=None):
     return {'case': Case('p', 'rig', str(day), float(day)), 'key': f'k{day}', 'verdict': verdict,
             'reason': '', 'sizes': list(sizes), 'ambiguous': list(ambiguous),
             'least': least or {}, 'bad': False}
+
+
+def without_interval(values, rig='rig'):
+    """Return the series of the rms differences of replays, which have no interval."""
+    found = [row(day, 'replayed', [size('plant.contraction', 'difference', 'rms', {
+        'value': value, 'unit': 'm'})]) for day, value in enumerate(values, 1)]
+    [one] = series_of([{**each, 'case': replace(each['case'], rig=rig)} for each in found])
+    return one
+
+
+def test_sizes_without_interval_change_in_any_unit():
+    value = noisy(1.0 + 2.0 * (DAY >= 11), sd=0.1)
+    found = [changes_of([without_interval(factor * value)]) for factor in (1e-6, 1e-3, 1.0, 1e3)]
+    assert [(one.shape, one.begin) for [one] in found] == [('step', 10)] * 4
+    assert [one.p for [one] in found] == pytest.approx([found[0][0].p] * 4, rel=1e-3)
+    value[5] = 9.0
+    assert [bool(far) for far in far_from_neighbours(without_interval(1e-6 * value))] == [
+        day == 6 for day in DAY]
+
+
+def test_chance_is_no_change_of_sizes_without_interval():
+    several = [without_interval(1e-4 * np.exp(noisy(np.zeros(DAYS), seed, sd=0.3)), f'rig_{seed}')
+               for seed in range(100)]
+    assert changes_of(several) == []
+    assert sum(bool(changes_of([one], level=0.05)) for one in several) <= 10
+    assert changes_of([without_interval(np.zeros(DAYS))]) == []
 
 
 def test_days_without_a_name_count_as_nothing_or_not_at_all():
