@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 # Design values: of a contraction [m] that friction may take, and of jumps worth a word.
 FRICTION_PA = 30e3
-GAIN_SHARE = 0.02       # an identified regulator that ends so little below the limit may go on
+GAIN_SHARE = 0.02       # of the range of a regulator; a pressure beyond it is worth a word
 LEAST_JUMP = {'contraction': 5e-4, 'force': 2.0, 'joint_angle': 0.02}
 _SHOWN = {'contraction': (1e3, 'mm'), 'force': (1.0, 'N'), 'joint_angle': (1.0, 'rad')}
 _VALVE_OF = {'ppr_voltage': 'ppr', 'hsv_duty': 'hsv'}
@@ -47,10 +47,11 @@ def check_rig(experiment: 'Experiment', rig: 'JointRig | Rig') -> None:
     Raise InputError where an experiment asks for more than a rig can give.
 
     Contraction: the stroke of the muscle. Force: what the muscle gives at the highest pressure
-    where its load holds it, and a load whose contraction is prescribed. Joint angle: a
-    joint, and its range. Pressure: the limit of the driver, the range of a regulator and the
-    supply of the valves. Raw valve signal: the valve it is meant for, and the input range of a
-    regulator. Disturbance: a load that moves freely. Measured topics it needs.
+    where its load holds it, and a load whose contraction is prescribed. Joint angle: a joint,
+    and its range. Pressure: the limit of the driver and the supply of the valves; a regulator
+    that ends below it stays at its end, which ``reach_remarks`` tells. Raw valve signal: the
+    valve it is meant for, and the input range of a regulator. Disturbance: a load that moves
+    freely. Measured topics it needs.
     """
     place = f'experiment "{experiment.name}"'
     if experiment.domain == 'joint_angle' or isinstance(rig, JointRig):
@@ -107,9 +108,12 @@ def highest_gauge_pa(rig: 'Rig',
 
 def reach_remarks(experiment: 'Experiment', rig: 'JointRig | Rig | None',
                   controller: Any = None) -> tuple[str, ...]:
-    """Return a sentence if a reference asks for more than the rig holds at its limit."""
-    if rig is None or experiment.domain != 'contraction' or isinstance(rig, JointRig) \
-            or not LOADS[rig.load].MOVES_FREELY:
+    """Return a sentence if an experiment asks for more than the rig holds at its limit."""
+    if rig is None or isinstance(rig, JointRig):
+        return ()
+    if experiment.domain == 'pressure' and rig.valve == 'ppr':
+        return _regulator_remarks(experiment, rig)
+    if experiment.domain != 'contraction' or not LOADS[rig.load].MOVES_FREELY:
         return ()
     gauge_pa = highest_gauge_pa(rig, controller)
     worst_m = experiment.chain.extremes()[1]
@@ -121,6 +125,16 @@ def reach_remarks(experiment: 'Experiment', rig: 'JointRig | Rig | None',
     return (f'the reference asks for up to {1e3 * worst_m:.1f} mm; at {1e-3 * gauge_pa:.0f} kPa '
             f'gauge this rig holds {1e3 * reach_m:.1f} mm at most, less with friction; it is '
             f'{time}, where the error says nothing of the controller',)
+
+
+def _regulator_remarks(experiment: 'Experiment', rig: 'Rig') -> tuple[str, ...]:
+    highest, worst = highest_gauge_pa(rig), experiment.chain.extremes()[1] - P_ATM_PA
+    if worst <= (1.0 + GAIN_SHARE) * highest:
+        return ()
+    share = experiment.chain.share_above(P_ATM_PA + highest)
+    return (f'the experiment asks for up to {1e-3 * worst:.0f} kPa gauge; the regulator of this '
+            f'rig ends at {1e-3 * highest:.0f} kPa and stays there for {100 * share:.0f} % of the '
+            'time',)
 
 
 def unknown_remarks(rig: 'JointRig | Rig | None') -> tuple[str, ...]:
@@ -191,15 +205,15 @@ def _check_joint(experiment: 'Experiment', joint: 'JointRig | Rig', place: str) 
 
 
 def _check_pressure(experiment: 'Experiment', rig: 'Rig', place: str) -> None:
-    highest = allowed = highest_gauge_pa(rig)
-    if rig.valve == 'ppr':
-        allowed = min((1.0 + GAIN_SHARE) * highest,
-                      driver_config(rig).safety.max_pressure_gauge_pa)
+    config = driver_config(rig)
+    highest = config.safety.max_pressure_gauge_pa
+    if rig.valve == 'hsv':
+        highest = min(highest, config.hsv.supply_pa - P_ATM_PA)
     worst = experiment.chain.extremes()[1] - P_ATM_PA
-    if worst > allowed + 1e-6:
+    if worst > highest + 1e-6:
         raise InputError(
             f'asks for {1e-3 * worst:.1f} kPa gauge; {rig.name} allows 0 to '
-            f'{1e-3 * highest:.1f} kPa (driver limit, regulator and supply)', place)
+            f'{1e-3 * highest:.1f} kPa (driver limit and supply)', place)
 
 
 def _check_voltage(experiment: 'Experiment', rig: 'Rig', place: str) -> None:

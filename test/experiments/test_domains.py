@@ -177,9 +177,8 @@ def test_a_rig_refuses_what_it_cannot_do_before_anything_is_written(
 
 
 @pytest.mark.parametrize('rig, valve, number', [
-    ('dmsp_5_300_realistic', 'ppr', {'K_m': 50e3}),               # 0 to 6 V
     ('dmsp_5_300_realistic', 'hsv', {'supply_pa': 401_325.0}),
-    ('dmsp_5_300_isometric', 'ppr', {'K_m': 50e3}),
+    ('dmsp_5_300_isometric', 'ppr', {'K_m': 50e3}),               # 0 to 6 V
     ('dmsp_5_300_isometric', 'hsv', {'supply_pa': 401_325.0})])
 def test_what_valve_and_supply_give_limits_pressure_and_force(rig, valve, number):
     strong = pam_sim.load_rig(rig, valve=valve)
@@ -197,15 +196,18 @@ def test_what_valve_and_supply_give_limits_pressure_and_force(rig, valve, number
         beyond.check_reachable(weak)
 
 
-def test_the_limit_of_the_driver_may_be_asked_of_a_regulator_that_was_identified():
+def test_a_pressure_beyond_the_range_of_the_regulator_is_told():
+    """It is played: the regulator stays at its end, as when a lab's own regulator ends lower."""
     rig = pam_sim.load_rig('dmsp_5_300_realistic', valve='ppr')
-    whole = load_experiment(HIGH % 701_325.0)
-    whole.check_reachable(rig.with_(parameters={'K_m': 99.3e3}))
-    with pytest.raises(InputError, match='allows 0 to 570.0 kPa'):
-        whole.check_reachable(rig.with_(parameters={'K_m': 95e3}))
-    with pytest.raises(InputError, match='allows 0 to 595.8 kPa'):
-        load_experiment(HIGH % 702_325.0).check_reachable(
-            rig.with_(parameters={'K_m': 99.3e3}))
+    high = load_experiment(HIGH % 651_325.0)
+    assert high.remarks('ppr', rig) == ()
+    for gain, remarks in ((0.92e5, 0), (0.85e5, 1)):
+        weak = rig.with_(parameters={'K_m': gain})
+        high.check_reachable(weak)
+        assert len(high.remarks('ppr', weak)) == remarks
+    said, = high.remarks('ppr', weak)
+    assert 'asks for up to 550 kPa gauge' in said and 'ends at 510 kPa' in said
+    assert '100 % of the time' in said
 
 
 def test_needs_and_disturbance_round_trip():
