@@ -120,7 +120,7 @@ def ppr_pressures(voltage: float, h: float, beyond: int, state: np.record,
     x = state.contraction_m
     target, time_constant = hooks.set_point(
         set_point_pa(voltage, par.gain_ppr_pa_per_v, par.lowest_ppr_v, par.highest_ppr_v,
-                     par.at_lowest_ppr_pa, par.atmosphere_pa),
+                     par.at_lowest_ppr_pa),
         par.time_constant_s, p, x, beyond, state, par)
     if not (beyond > NOMINAL and par.used.pressure_rate > 0.0):
         decay = par.decay_half

@@ -15,20 +15,20 @@
 """
 Proportional pressure regulator (PPR): a first order lag of the set point.
 
-    T_m dp_g/dt = max(p_zero + K_m (sat(u, u_low, u_high) - u_low), 0) - p_g
+    T_m dp_g/dt = p_zero + K_m (sat(u, u_low, u_high) - u_low) - p_g
 
 The nominal regulator has u_low = 0, u_high = 6 V and p_zero = 0. The regulator imposes the
-pressure; volume changes do not disturb it. It vents to the atmosphere and makes no vacuum.
+pressure; volume changes do not disturb it.
 """
 
 from collections.abc import Mapping
 
-from pam_sim.compiled import inlined, interpreted
+from pam_sim.compiled import inlined
 from pam_sim.parameters import Parameter
 
 NAME = 'ppr'
 SENTENCE = 'Proportional pressure regulator: the pressure follows the command voltage with a lag.'
-EQUATION = 'T_m dp_g/dt = max(p_zero + K_m (sat(u, u_low, u_high) - u_low), 0) - p_g'
+EQUATION = 'T_m dp_g/dt = p_zero + K_m (sat(u, u_low, u_high) - u_low) - p_g'
 SOURCE = 'Situm and Herceg 2008 (first order lag of command and pressure).'
 SIGNAL_NAMES = ('ppr_voltage',)
 MAX_VOLTAGE_V = 6.0
@@ -47,15 +47,14 @@ PARAMETERS = (
     Parameter('ppr_highest_v', 'V', MAX_VOLTAGE_V, 4.5, 12.0, 0.0,
               'Input u_high at which the range of the regulator ends.', 'set-point range 0-6 V'),
     Parameter('ppr_zero_pa', 'Pa', 0.0, -100e3, 200e3, 0.0,
-              'Gauge pressure p_zero that the regulator gives at its lowest input; below 0 it '
-              'vents.',
+              'Gauge pressure p_zero that the regulator gives at its lowest input.',
               'an ideal regulator vents there'),
 )
 
 
 @inlined
 def set_point_pa(voltage_v: float, gain_pa_per_v: float, lowest_v: float, highest_v: float,
-                 at_lowest_pa: float, atmosphere_pa: float) -> float:
+                 at_lowest_pa: float) -> float:
     """
     Return the absolute pressure set point [Pa] of a command voltage.
 
@@ -69,19 +68,17 @@ def set_point_pa(voltage_v: float, gain_pa_per_v: float, lowest_v: float, highes
         Range of the input, V.
     at_lowest_pa : float
         Absolute pressure [Pa] at the lowest input.
-    atmosphere_pa : float
-        Pa; a regulator vents to it and makes no vacuum.
 
     """
     voltage = min(max(voltage_v, lowest_v), highest_v)
-    return max(at_lowest_pa + gain_pa_per_v * (voltage - lowest_v), atmosphere_pa)
+    return at_lowest_pa + gain_pa_per_v * (voltage - lowest_v)
 
 
 def set_point_of(voltage_v: float, parameters: Mapping[str, float], atmosphere_pa: float) -> float:
     """Return the absolute set point [Pa] of a command voltage, by the numbers of a rig."""
-    return interpreted(set_point_pa)(
-        voltage_v, parameters['K_m'], parameters['ppr_lowest_v'], parameters['ppr_highest_v'],
-        atmosphere_pa + parameters['ppr_zero_pa'], atmosphere_pa)
+    lowest_v, highest_v = parameters['ppr_lowest_v'], parameters['ppr_highest_v']
+    voltage = min(max(voltage_v, lowest_v), highest_v)
+    return (atmosphere_pa + parameters['ppr_zero_pa']) + parameters['K_m'] * (voltage - lowest_v)
 
 
 def voltage_v(gauge_pa: float, parameters: Mapping[str, float]) -> float:
