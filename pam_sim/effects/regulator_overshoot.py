@@ -23,7 +23,6 @@ sqrt(T_m / T_i) / 2. The mean of w over a physics step is used, exact for a held
 """
 
 from collections.abc import Mapping
-import math
 from typing import Any
 
 import numpy as np
@@ -31,16 +30,13 @@ import numpy as np
 from pam_sim.compiled import compiled
 from pam_sim.effects.effect import Effect, Numbers, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
+from pam_sim.effects.lag import HELD, mean_of_held, pack_held
 from pam_sim.parameters import Parameter
 from pam_sim.records import record
 
 
 def _pack(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
-    lag_s, step_s = values['inner_lag_s'], numbers.substep_s
-    if lag_s <= 0.0:
-        return {'decay': 0.0, 'share': 1.0}
-    ended = -math.expm1(-step_s / lag_s)
-    return {'decay': 1.0 - ended, 'share': 1.0 - lag_s / step_s * ended}
+    return pack_held({'time_constant_s': values['inner_lag_s']}, numbers)
 
 
 EFFECT = Effect(
@@ -60,7 +56,7 @@ EFFECT = Effect(
     amplitude=('inner_lag_s',),
     reported=(Reported('inner_lag_s', 's', lambda values, rig: values['inner_lag_s']),),
     states=record('rate_pa_per_s', 'asked_pa_per_s', 'calls'),
-    packed=record('decay', 'share'),
+    packed=HELD,
     pack=_pack,
     valves=('ppr',),
     order=45,               # after the limits of the flow, before what leaks behind it
@@ -75,14 +71,15 @@ def pressure_rate(rate_pa_per_s: float, state: np.record, par: np.record) -> flo
     """Return the mean rate of the step, were this one asked for all along."""
     state.asked_pa_per_s += rate_pa_per_s
     state.calls += 1.0
-    return state.rate_pa_per_s + par.share * (rate_pa_per_s - state.rate_pa_per_s)
+    mean_pa_per_s, _ = mean_of_held(rate_pa_per_s, state.rate_pa_per_s, par)
+    return mean_pa_per_s
 
 
 @compiled
 def commit(state: np.record, par: np.record) -> None:
     """Advance the valve towards the mean of what was asked for."""
     if state.calls > 0.0:
-        asked = state.asked_pa_per_s / state.calls
-        state.rate_pa_per_s = asked + par.decay * (state.rate_pa_per_s - asked)
+        _, state.rate_pa_per_s = mean_of_held(
+            state.asked_pa_per_s / state.calls, state.rate_pa_per_s, par)
         state.asked_pa_per_s = 0.0
         state.calls = 0.0
