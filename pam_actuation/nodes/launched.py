@@ -15,8 +15,6 @@
 
 import atexit
 from collections.abc import Callable, Iterable
-import json
-import os
 import shutil
 import signal
 import tempfile
@@ -26,8 +24,7 @@ from launch.actions import EmitEvent, RegisterEventHandler
 from launch.event_handlers import OnProcessExit
 from launch.events import matches_action, Shutdown
 from launch.events.process import ShutdownProcess
-from pam_actuation.bags.ending import ENDED_FILE, ERROR, INTERRUPTED, REFERENCE
-from pam_sim.files import write_text
+from pam_actuation.bags.ending import ERROR, INTERRUPTED, REFERENCE, tell_recorder
 
 Handler = Callable[[Any, Any], list[Any]]
 
@@ -75,12 +72,9 @@ class RigEnd:
         if code:
             how = (f'was ended by {signal.Signals(-code).name}' if code < 0
                    else f'ended with exit code {code}')
-            told = {'ended': ERROR, 'because': f'{name} {how}'}
+            tell_recorder(self.notes_folder, ERROR, f'{name} {how}')
         elif name != REFERENCE:
-            told = {'ended': INTERRUPTED, 'because': reason}
-        else:
-            return
-        write_text(os.path.join(self.notes_folder, ENDED_FILE), json.dumps(told))
+            tell_recorder(self.notes_folder, INTERRUPTED, reason)
 
 
 def full_namespace(context: Any, namespace: str) -> str:
