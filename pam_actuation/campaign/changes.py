@@ -29,6 +29,7 @@ import math
 import numpy as np
 from pam_actuation.campaign.series import IN_95, Series
 from pam_sim.annotations import BoolArray, FloatArray, IntArray
+from pam_sim.gap.data.noise import MAD_TO_SD
 
 LEVEL = 0.01            # of significance, over all tests of a campaign together
 FEWEST = 8              # values of a series that is tested
@@ -191,7 +192,7 @@ def far_from_neighbours(series: Series) -> BoolArray:
         near = _window(k, count)
         off[k] = min(abs(series.value[k] - np.median(series.value[near])),
                      abs(series.value[k] - _robust_line(series, near[near != k], k)))
-    scatter = np.maximum(1.4826 * float(np.median(off)), series.sd)
+    scatter = np.maximum(MAD_TO_SD * float(np.median(off)), series.sd)
     far = off > FAR * scatter
     if int(far.sum()) > MOST_LEFT_OUT * count:
         far[:] = False

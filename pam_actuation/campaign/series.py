@@ -22,10 +22,10 @@ from typing import Any
 import numpy as np
 from pam_actuation.campaign.cases import Case
 from pam_sim.annotations import BoolArray, FloatArray
+from pam_sim.gap.data.noise import MAD_TO_SD
 from pam_sim.short_repr import short_repr
 
 IN_95 = 1.959963984540054       # standard deviations on either side of a 95 % interval
-TO_SD = 1.4826                  # times the median of |x|: standard deviation of a normal x
 LEAST_SHARE = 1e-12             # of the largest value, which rounding may be
 # Of these nothing follows for names that they do not hold.
 TELL_NOTHING = ('failed', 'refused', 'unknown')
@@ -114,7 +114,7 @@ def _scatter(value: FloatArray) -> float:
     """Return the standard deviation of values from the next ones; a step counts for little."""
     if len(value) < 2:
         return 1.0
-    scatter = TO_SD * float(np.median(np.abs(np.diff(value)))) / math.sqrt(2.0)
+    scatter = MAD_TO_SD * float(np.median(np.abs(np.diff(value)))) / math.sqrt(2.0)
     return max(scatter, LEAST_SHARE * float(np.max(np.abs(value)))) or 1.0
 
 

@@ -27,13 +27,13 @@ import numpy as np
 from pam_sim.annotations import BoolArray, FloatArray
 from pam_sim.characterise.fixed_load import by_load, FixedLoad, NEAR_PA
 from pam_sim.errors import InputError
+from pam_sim.muscle.geometry import MOST_STRAIN
 from pam_sim.short_repr import short_repr
 from scipy.interpolate import PchipInterpolator
 
 EDGE_PA = 3e3               # a pressure this far beyond a branch is read at its end
 LIFTED_STRAIN = 1e-4        # contraction from which a load counts as lifted
 STUCK_STRAIN = 5e-3         # branches closer than this are never a stuck muscle
-MOST_STRAIN = 0.43          # threads along the axis: no braided muscle shortens by more
 _SURFACES = ('strain', 'half_distance', 'noise', 'settling', 'reading')
 LEAST = 4                   # points a cubic needs along an axis
 SAME_PA = 1e3               # grid pressures are rounded to this

@@ -29,6 +29,7 @@ LENGTH_M = 0.300
 BORE_M = 0.005
 BRAID_ANGLE_RAD = math.radians(28.6)      # of the threads, from the axis, at x = 0
 MAX_STRAIN = 0.25                         # mechanical end of contraction
+MOST_STRAIN = 0.43                        # of any braid: 1 - 1 / sqrt(3), threads along the axis
 
 
 def braid(length_m: float = LENGTH_M, bore_m: float = BORE_M,

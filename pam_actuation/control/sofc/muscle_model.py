@@ -49,7 +49,7 @@ from pam_sim.compiled import compiled
 from pam_sim.records import record
 from pam_sim.units import P_ATM_PA
 
-_LIFTED_M = 5e-4          # below this contraction the pressure says nothing of the muscle
+LIFTED_M = 5e-4          # below this contraction the pressure says nothing of the muscle
 _MOVES_M_PER_S = 2e-3     # from this rate on a residual counts in full: at rest friction hides it
 _FRICTION_AT_PA = 4e5     # gauge: what the numbers of the path are at
 _FADE = 0.99              # per tick, of a disturbance that is not observed any more
@@ -235,7 +235,7 @@ def find_numbers(par: np.record, inverse: FloatArray, st: np.record, surprised: 
     value, and its variance ends at that of the start. Noise of the acceleration makes the inertia
     too small, so innovation and regressor pass one low pass more.
     """
-    if not par.model_noise_pa > 0.0 or st.contraction_m < _LIFTED_M or st.known < 0.5:
+    if not par.model_noise_pa > 0.0 or st.contraction_m < LIFTED_M or st.known < 0.5:
         return
     middle = 0.5 * (par.reference_lower_m + par.reference_upper_m)
     now, phi, gain, cov = st.now, st.regressor, st.gain, st.covariance_pa2
@@ -365,7 +365,7 @@ def observe(par: np.record, inverse: FloatArray, rules: FloatArray, st: np.recor
         - inertia_pa_s2_per_m(par, st, x) * acceleration
         - numbers_pa(par, st, st.path, x, static_pa) - rules_pa(par, rules, st.path, x))
     st.innovation_pa = innovation
-    if not par.disturbance_time_s > 0.0 or x < _LIFTED_M:
+    if not par.disturbance_time_s > 0.0 or x < LIFTED_M:
         st.disturbance_pa *= _FADE
         return
     kept = (1.0 - st.held) * st.strength * period / (par.disturbance_time_s + period)
@@ -381,7 +381,7 @@ def learn(par: np.record, rules: FloatArray, fired: FloatArray, st: np.record) -
 
     Normalised least mean squares: the active rules together mend ``path_learning`` of it.
     """
-    if par.path_sets < 1.0 or st.contraction_m < _LIFTED_M or st.known < 0.5:
+    if par.path_sets < 1.0 or st.contraction_m < LIFTED_M or st.known < 0.5:
         return 0.0
     k, wk = locate(st.contraction_m, par.reference_lower_m, par.reference_upper_m, rules.shape[1])
     moves = min(abs(st.rate_m_per_s) / _MOVES_M_PER_S, 1.0)

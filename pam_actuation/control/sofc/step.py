@@ -43,7 +43,6 @@ from pam_sim.records import part
 from pam_sim.units import P_ATM_PA
 
 _START_TRIM_PA = 1e4      # largest integral taken over at the start: what dry friction explains
-_LIFTED_M = 5e-4          # below this contraction the pressure at rest says nothing
 
 
 @compiled
@@ -76,7 +75,7 @@ def _start(par: np.record, inverse: FloatArray, values: Tables, kept: Tables, ri
     if par.revision > 0.5:
         for row in range(ring.shape[0]):
             ring[row].command_pa = st.command_pa
-    if math.isfinite(pressure) and x > _LIFTED_M:
+    if math.isfinite(pressure) and x > muscle_model.LIFTED_M:
         trim = (pressure - inverse_pressure_pa(inverse, x)) / dynamics.load_shape(par, x)
         st.integral_pa = min(max(trim, -_START_TRIM_PA), _START_TRIM_PA)
         st.integral_mean_pa = st.integral_pa
