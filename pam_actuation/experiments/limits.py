@@ -14,7 +14,6 @@
 
 """What a rig can do of an experiment, asked before the first message is sent."""
 
-import math
 from types import SimpleNamespace
 from typing import Any, TYPE_CHECKING
 
@@ -26,7 +25,7 @@ from pam_sim.joint.rig import JointRig
 from pam_sim.load import LOADS
 from pam_sim.muscle.coefficients import PREFIX as OF_LAW
 from pam_sim.units import P_ATM_PA
-from pam_sim.valve.ppr import set_point_of
+from pam_sim.valve.reach import reach_gauge_pa
 
 if TYPE_CHECKING:
     from pam_actuation.control.compiled_controller import CompiledController
@@ -95,12 +94,8 @@ def check_tracked(
 def highest_gauge_pa(rig: 'Rig',
                      controller: 'CompiledController | SimpleNamespace | None' = None) -> float:
     """Return the highest pressure [Pa gauge] that driver, valve, supply and controller allow."""
-    config = driver_config(rig)
-    limits = [config.safety.max_pressure_gauge_pa]
-    if rig.valve == 'ppr':
-        limits.append(set_point_of(math.inf, rig.parameters, 0.0))
-    if rig.valve == 'hsv':
-        limits.append(config.hsv.supply_pa - P_ATM_PA)
+    limits = [driver_config(rig).safety.max_pressure_gauge_pa,
+              reach_gauge_pa(rig.valve, rig.parameters)]
     if controller is not None and 'max_pressure_gauge_pa' in controller.settings:
         limits.append(controller.settings['max_pressure_gauge_pa'])
     return min(limits)
@@ -205,10 +200,8 @@ def _check_joint(experiment: 'Experiment', joint: 'JointRig | Rig', place: str) 
 
 
 def _check_pressure(experiment: 'Experiment', rig: 'Rig', place: str) -> None:
-    config = driver_config(rig)
-    highest = config.safety.max_pressure_gauge_pa
-    if rig.valve == 'hsv':
-        highest = min(highest, config.hsv.supply_pa - P_ATM_PA)
+    highest = (highest_gauge_pa(rig) if rig.valve == 'hsv'
+               else driver_config(rig).safety.max_pressure_gauge_pa)
     worst = experiment.chain.extremes()[1] - P_ATM_PA
     if worst > highest + 1e-6:
         raise InputError(

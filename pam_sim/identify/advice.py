@@ -35,7 +35,8 @@ from pam_sim.identify.records import Offer, offer_of, problems_of
 from pam_sim.rig import Rig
 from pam_sim.run import Run, Series
 from pam_sim.units import P_ATM_PA
-from pam_sim.valve.ppr import set_point_of, voltage_v
+from pam_sim.valve.ppr import voltage_v
+from pam_sim.valve.reach import reach_gauge_pa
 
 HIGH_PA, LOW_PA = 500e3, 50e3            # gauge
 SAME_HEIGHT = 0.98           # of a pressure; an experiment this near to it goes no higher
@@ -84,8 +85,7 @@ def proposals(rig: Rig, has_force: bool, recorded_pa: float) -> list[Proposal]:
     What goes above the highest pressure that was recorded, ``recorded_pa`` [Pa gauge], comes
     last and says so. Nothing goes above what the rig gives.
     """
-    reach_pa = min(HIGH_PA, set_point_of(math.inf, rig.parameters, 0.0) if rig.valve == 'ppr'
-                   else rig.parameters['supply_pa'] - P_ATM_PA)
+    reach_pa = min(HIGH_PA, reach_gauge_pa(rig.valve, rig.parameters))
     within = _up_to(min(reach_pa, recorded_pa), rig, has_force)
     if recorded_pa >= SAME_HEIGHT * reach_pa:
         return within
