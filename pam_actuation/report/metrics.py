@@ -315,7 +315,6 @@ def air_fed(run: 'Run', conductance_m3_per_s_pa: float, critical_ratio: float,
 
 
 def run_metrics(run: 'Run', parts: Sequence[Cycles] | None = None,
-                volume_m3: Callable[[FloatArray], FloatArray] | None = None,
                 rig: 'Rig | None' = None) -> RunMetrics:
     """
     Return the RunMetrics of a run.
@@ -326,11 +325,9 @@ def run_metrics(run: 'Run', parts: Sequence[Cycles] | None = None,
         The recording.
     parts : sequence of (start_s, period_s, count), optional
         Of the repeating parts; by default as ``errors.find_parts``.
-    volume_m3 : callable, optional
-        Muscle volume over contraction; without it air use is None.
     rig : pam_sim.rig.Rig, optional
-        Gives the data sheet of the valves; without it the air through the fill valve and the
-        shares at the limits of a regulator are None.
+        Gives muscle and data sheet of the valves; without it air use, the air through the fill
+        valve and the shares at the limits of a regulator are None.
 
     """
     parts = find_parts(run) if parts is None else parts
@@ -340,8 +337,9 @@ def run_metrics(run: 'Run', parts: Sequence[Cycles] | None = None,
     saturation = saturation_share(run, rig) or (None, None)
     used = None
     pressure, contraction = signals.series(run, 'pressure'), signals.series(run, 'contraction')
-    if volume_m3 is not None and pressure is not None and contraction is not None:
-        used = air_use(pressure[1], np.interp(pressure[0], *contraction), volume_m3)
+    if rig is not None and pressure is not None and contraction is not None:
+        used = air_use(pressure[1], np.clip(
+            np.interp(pressure[0], *contraction), 0.0, rig.muscle.stroke_m), rig.volume_m3)
     timing = [loop_timing(run, topic) for topic in (
         'reference', 'pressure_command', 'valve_signal', 'pressure', 'contraction', 'force')]
     return RunMetrics(

@@ -14,10 +14,9 @@
 
 """The page about one experiment or several runs of it."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, TYPE_CHECKING
 
-import numpy as np
 from pam_actuation.bags.ending import early_sentences
 from pam_actuation.report.errors import by_part
 from pam_actuation.report.metrics import run_metrics, RunMetrics
@@ -64,18 +63,9 @@ def recorded_rig(run: 'Run') -> 'Rig | None':
         return None
 
 
-def muscle_volume(run: 'Run') -> 'Callable[[FloatArray], FloatArray] | None':
-    """Return the volume function [m^3 over m] of the rig in a run's metadata, or None."""
-    rig = recorded_rig(run)
-    if rig is None:
-        return None
-    return lambda contraction_m: rig.volume_m3(
-        np.clip(contraction_m, 0.0, rig.muscle.stroke_m))
-
-
 def recorded_metrics(run: 'Run') -> RunMetrics:
     """Return the figures of a run, with the rig in its metadata."""
-    return run_metrics(run, volume_m3=muscle_volume(run), rig=recorded_rig(run))
+    return run_metrics(run, rig=recorded_rig(run))
 
 
 def experiment_report(runs: 'Sequence[Run]', out_path: StrPath,
