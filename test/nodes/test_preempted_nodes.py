@@ -26,10 +26,7 @@ from pam_actuation.messages import Pressure, ValveSignal                    # no
 from pam_actuation.nodes import qos                                         # noqa: E402
 from pam_actuation.nodes.interfaces import node_class                       # noqa: E402
 from pam_actuation.nodes.ros_messages import class_of                       # noqa: E402
-from pam_actuation.rigging.client import local_context                      # noqa: E402
-from pam_actuation.rigging.domain import DomainLock                         # noqa: E402
 from pam_actuation.topics.codec import Writer                               # noqa: E402
-import rclpy                                                                # noqa: E402
 from rclpy.node import Node                                                 # noqa: E402
 from rclpy.parameter import Parameter                                       # noqa: E402
 
@@ -70,15 +67,6 @@ class Sender:
         self._ending.set()
         self._thread.join()
         self._node.destroy_node()
-
-
-@pytest.fixture(scope='module')
-def context():
-    lock = DomainLock()
-    opened = local_context(lock.domain_id)
-    yield opened
-    rclpy.try_shutdown(context=opened)
-    lock.release()
 
 
 def ticked(context, name, topics, look, lost_every=1, lost_s=LOST_S, **parameters):

@@ -26,12 +26,9 @@ from pam_actuation.messages import AngleReference, Contraction, JointAngle  # no
 from pam_actuation.messages import Pressure, Reference, START_NS            # noqa: E402
 from pam_actuation.nodes.diagnostics import ERROR                           # noqa: E402
 from pam_actuation.nodes.interfaces import node_class                       # noqa: E402
-from pam_actuation.rigging.client import local_context                      # noqa: E402
-from pam_actuation.rigging.domain import DomainLock                         # noqa: E402
 from pam_actuation.slow_rise import LONGEST_STEP_S, RISE_PA_PER_S                           # noqa: E402
 from pam_sim.errors import InputError                                       # noqa: E402
 from pam_sim.units import P_ATM_PA                                          # noqa: E402
-import rclpy                                                                # noqa: E402
 from rclpy.parameter import Parameter                                       # noqa: E402
 from std_srvs.srv import Trigger                                            # noqa: E402
 
@@ -40,15 +37,6 @@ pytestmark = pytest.mark.ros
 SAFE = {'ppr': (0.0,), 'hsv': (0.0, 1.0)}
 FULL_PA = P_ATM_PA + 300e3
 EMPTY_PA = P_ATM_PA + 500.0
-
-
-@pytest.fixture(scope='module')
-def context():
-    lock = DomainLock()
-    opened = local_context(lock.domain_id)
-    yield opened
-    rclpy.try_shutdown(context=opened)
-    lock.release()
 
 
 class Run:
