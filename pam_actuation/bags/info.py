@@ -203,7 +203,7 @@ def _topic_infos(bag: Bag, remarks: list[str]) -> list[TopicInfo]:
     published = reported_counts(bag)
     # Of any other bag nobody knows that it began with the nodes.
     simulated = bool(experiment) and experiment.get('origin') != 'live'
-    length_m = cache(lambda: plausibility.recorded_length_m(experiment))
+    size_of = cache(lambda: plausibility.recorded_size(experiment))
     places = {name.rpartition('/')[0] for name in bag.topics if name != DIAGNOSTICS}
     infos = []
     for _, topic in sorted(bag.topics.items()):
@@ -212,7 +212,7 @@ def _topic_infos(bag: Bag, remarks: list[str]) -> list[TopicInfo]:
         if not recording and not simulated:
             count_from_first_report(info, topic, published)
         remarks += loss_remarks(info)
-        remarks += plausibility.topic_remarks(topic, info, stamp_ns, values, length_m)
+        remarks += plausibility.topic_remarks(topic, info, stamp_ns, values, size_of)
         infos.append(info)
     return infos
 

@@ -28,7 +28,7 @@ import numpy as np
 from pam_actuation.bags import renamed, series
 from pam_actuation.bags.markers import is_marker, markers_of
 from pam_actuation.bags.plausibility import (
-    Implausible, not_finite, recorded_length_m, topic_findings)
+    Implausible, not_finite, recorded_size, topic_findings)
 from pam_actuation.bags.rig_topics import is_read, is_rig_topic, namespaces
 from pam_actuation.bags.source import Bag, read_bag, TopicData
 from pam_actuation.messages import Marker, ReferenceTrajectory, VALVE_NAMES, valve_of
@@ -75,9 +75,9 @@ class RecordedRun(Run):
     @cached_property
     def findings(self) -> tuple[Implausible, ...]:
         """Return what cannot be right in the values, a tuple of Implausible; looked for once."""
-        length_m = cache(lambda: recorded_length_m(self.metadata))
+        size_of = cache(lambda: recorded_size(self.metadata))
         return tuple(found for short, series in self.topics.items() for found in topic_findings(
-            f'{self.namespace}/{short}', series.values, length_m))
+            f'{self.namespace}/{short}', series.values, size_of))
 
     @property
     def implausible(self) -> tuple[str, ...]:

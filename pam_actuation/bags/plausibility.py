@@ -24,6 +24,7 @@ from pam_actuation.topics.table import (
     BY_NAME, NEEDED, OF_A_RUN, OFTEN_EMPTY, RECORDED, RECORDED_OF_JOINT, short_name, Topic, USED)
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.joint.parameters import SIDES
+from pam_sim.muscle.geometry import MOST_STRAIN
 from pam_sim.units import allowed_range, gauge_kpa, P_ATM_PA
 
 if TYPE_CHECKING:
@@ -31,9 +32,9 @@ if TYPE_CHECKING:
     from pam_actuation.bags.topic_info import TopicInfo
     from pam_sim.rig import Rig
 
-Length = Callable[[], 'Size']          # gives length and largest contraction of the muscle
+SizeOf = Callable[[], 'Size']          # gives the size of the muscle, where that matters
 # What judges the finite values of a column, their lowest and highest.
-Check = Callable[[FloatArray, float, float, Length], tuple[str, bool]]
+Check = Callable[[FloatArray, float, float, SizeOf], tuple[str, bool]]
 MIN_RATE_HZ = 100.0
 RATE_TOLERANCE = 0.98
 GAP_LIMIT_S = 0.05                     # half of what makes a measurement invalid
@@ -43,7 +44,6 @@ ATMOSPHERE_MARGIN_PA = 5e3             # sensor offset and weather
 MOST_ZERO_PA = 20e3                    # the zero of a sensor of 10 bar, 2 % of its range
 MUSCLE_LENGTH_M = 0.300                # DMSP-5-300
 MAX_CONTRACTION = 0.25                 # of the length, data sheet limit
-MOST_STRAIN = 0.43                     # threads along the axis: 1 - 1 / sqrt(3) = 0.423
 CONTRACTION_MARGIN_M = 1e-3
 MAX_GAUGE_PA = 800e3
 MAX_VOLTAGE = 10.0
@@ -116,7 +116,7 @@ def size_of_rig(rig: 'Rig') -> Size:
     return Size(rig.muscle.length_m, rig.muscle.max_strain, 'rig')
 
 
-def recorded_length_m(metadata: Mapping[str, str]) -> Size:
+def recorded_size(metadata: Mapping[str, str]) -> Size:
     """
     Return the size of the muscle that a bag's rig tells, or what is known without one.
 
@@ -134,7 +134,7 @@ def recorded_length_m(metadata: Mapping[str, str]) -> Size:
 
 
 def topic_remarks(topic: 'TopicData', info: 'TopicInfo', stamp_ns: IntArray,
-                  values: Mapping[str, FloatArray], length_m: Length | None = None) -> list[str]:
+                  values: Mapping[str, FloatArray], size_of: SizeOf | None = None) -> list[str]:
     """
     Return sentences on one topic.
 
@@ -148,7 +148,7 @@ def topic_remarks(topic: 'TopicData', info: 'TopicInfo', stamp_ns: IntArray,
         Header stamps in file order.
     values : dict of str to ndarray
         SI values; empty for topics that are not a rig's.
-    length_m : callable, optional
+    size_of : callable, optional
         As of ``value_findings``.
 
     """
@@ -156,11 +156,11 @@ def topic_remarks(topic: 'TopicData', info: 'TopicInfo', stamp_ns: IntArray,
         return []
     remarks = _time_remarks(topic, info, stamp_ns) + repeat_remarks(
         topic.name, values, info.rate_hz)
-    return remarks + [one.sentence for one in topic_findings(topic.name, values, length_m)]
+    return remarks + [one.sentence for one in topic_findings(topic.name, values, size_of)]
 
 
 def topic_findings(topic: str, values: Mapping[str, FloatArray],
-                   length_m: Length | None = None) -> list[Implausible]:
+                   size_of: SizeOf | None = None) -> list[Implausible]:
     """Return what cannot be right in the values of a topic, a list of Implausible."""
     row = OF_A_RUN.get(short_name(topic))
     # Internals may be undefined, such as the time since the tick before the first.
@@ -170,7 +170,7 @@ def topic_findings(topic: str, values: Mapping[str, FloatArray],
     asks_force = topic.endswith('/reference') and 'force_n' in values
     return [found for name, column in values.items()
             if len(column) and (not asks_force or np.isfinite(column).any())
-            for found in value_findings(topic, name, column, length_m)]
+            for found in value_findings(topic, name, column, size_of)]
 
 
 def missing_topics(namespaces: Mapping[str, Collection[str]],
@@ -288,7 +288,7 @@ def _clock_remarks(name: str, delay_ns: IntArray) -> list[str]:
 
 
 def value_findings(topic: str, name: str, column: FloatArray,
-                   length_m: Length | None = None) -> list[Implausible]:
+                   size_of: SizeOf | None = None) -> list[Implausible]:
     """
     Return what cannot be right in one column of values, a list of Implausible.
 
@@ -300,7 +300,7 @@ def value_findings(topic: str, name: str, column: FloatArray,
         Of the value, with its unit, such as ``pressure_pa``.
     column : ndarray
         As read, in file order or by stamp.
-    length_m : callable, optional
+    size_of : callable, optional
         Gives the Size of the muscle; asked only where it matters.
 
     """
@@ -321,7 +321,7 @@ def value_findings(topic: str, name: str, column: FloatArray,
             f'{topic}: {name} from {low:.4g} to {high:.4g} leaves '
             f'{allowed_range(*limits, name=name)}.'))
     if len(finite) and check is not None:
-        sentence, unusable = check(finite, low, high, length_m or Size)
+        sentence, unusable = check(finite, low, high, size_of or Size)
         if sentence:
             found.append(Implausible(f'{topic}: {sentence}', unusable))
     return found
@@ -346,7 +346,7 @@ def _unit(low: float, high: float, unit: str, likely: str, fix: str) -> tuple[st
             f'{fix}'), True
 
 
-def _pressure(finite: FloatArray, low: float, high: float, length_m: Length) -> tuple[str, bool]:
+def _pressure(finite: FloatArray, low: float, high: float, size_of: SizeOf) -> tuple[str, bool]:
     if low >= P_ATM_PA - ATMOSPHERE_MARGIN_PA:
         if high <= P_ATM_PA + MAX_GAUGE_PA:
             return '', False
@@ -378,17 +378,17 @@ def _pressure(finite: FloatArray, low: float, high: float, length_m: Length) -> 
             f'gauge. {hint}'), is_gauge
 
 
-def _supply(finite: FloatArray, low: float, high: float, length_m: Length) -> tuple[str, bool]:
+def _supply(finite: FloatArray, low: float, high: float, size_of: SizeOf) -> tuple[str, bool]:
     if low >= P_ATM_PA - ATMOSPHERE_MARGIN_PA and high <= MOST_SUPPLY_PA:
         return '', False
-    return _pressure(finite, low, high, length_m)
+    return _pressure(finite, low, high, size_of)
 
 
 def _contraction(finite: FloatArray, low: float, high: float,
-                 length_m: Length) -> tuple[str, bool]:
+                 size_of: SizeOf) -> tuple[str, bool]:
     if low >= -CONTRACTION_MARGIN_M and high <= LEAST_LIMIT_M:
         return '', False
-    size = length_m()
+    size = size_of()
     if low >= -CONTRACTION_MARGIN_M and high <= size.stroke_m + CONTRACTION_MARGIN_M:
         return '', False
     largest = float(np.quantile(np.abs(finite), 0.99))
@@ -405,13 +405,13 @@ def _contraction(finite: FloatArray, low: float, high: float,
             f'{1e3 * size.stroke_m:.0f} mm ({size.said}).{hint}'), False
 
 
-def _force(finite: FloatArray, low: float, high: float, length_m: Length) -> tuple[str, bool]:
+def _force(finite: FloatArray, low: float, high: float, size_of: SizeOf) -> tuple[str, bool]:
     if max(-low, high) < MOST_N:
         return '', False
     return _unit(low, high, 'N', 'mN', 'Divide them by 1000; the topic is in N.')
 
 
-def _duty(finite: FloatArray, low: float, high: float, length_m: Length) -> tuple[str, bool]:
+def _duty(finite: FloatArray, low: float, high: float, size_of: SizeOf) -> tuple[str, bool]:
     if low >= 0.0 and high <= 1.0:
         return '', False
     if low >= 0.0 and 1.5 < high <= 100.0:
@@ -419,7 +419,7 @@ def _duty(finite: FloatArray, low: float, high: float, length_m: Length) -> tupl
     return f'a duty from {low:.3g} to {high:.3g} leaves 0 to 1.', False
 
 
-def _voltage(finite: FloatArray, low: float, high: float, length_m: Length) -> tuple[str, bool]:
+def _voltage(finite: FloatArray, low: float, high: float, size_of: SizeOf) -> tuple[str, bool]:
     if low >= 0.0 and high <= MAX_VOLTAGE:
         return '', False
     if low >= 0.0 and 1e2 < high <= 1e3 * MAX_VOLTAGE:

@@ -17,10 +17,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from pam_actuation.bags.plausibility import MOST_STRAIN, MUSCLE_LENGTH_M, Size
+from pam_actuation.bags.plausibility import MUSCLE_LENGTH_M, Size
 from pam_actuation.tables.mapping import ColumnMap, TableMapping
 from pam_actuation.tables.units import LENGTH, Unit, unit_of_text
 from pam_sim.annotations import FloatArray
+from pam_sim.muscle.geometry import MOST_STRAIN
 
 SHORTEST_M, LONGEST_M = 0.03, 3.0           # of muscles, at rest
 LEAST_KEPT = 0.5                            # of the length at rest: no muscle gets shorter

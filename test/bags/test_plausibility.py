@@ -102,8 +102,8 @@ def test_what_a_rig_measures_is_left_alone():
     # A long muscle may shorten by more.
     far = CONTRACTION_M * 5.0
     assert 'leaves 0 to 75 mm' in look('contraction_m', far)[0]
-    assert look('contraction_m', far, length_m=lambda: Size(0.5)) == ('', False)
-    assert look('contraction_m', far, length_m=Size)[1] is False
+    assert look('contraction_m', far, size_of=lambda: Size(0.5)) == ('', False)
+    assert look('contraction_m', far, size_of=Size)[1] is False
 
 
 def test_values_that_are_not_finite_are_counted():
