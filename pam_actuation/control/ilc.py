@@ -39,7 +39,7 @@ from pam_actuation.control.pid import command_of, tracking_error
 from pam_actuation.control.settings import checked_settings, parameter_record, setting
 from pam_actuation.control.static_inverse import inverse_pressure_pa
 from pam_sim.annotations import FloatArray
-from pam_sim.compiled import Compiled, compiled, entry_point, source_key
+from pam_sim.compiled import Compiled, compiled, entry_point, inlined, source_key
 from pam_sim.records import part, record
 from pam_sim.units import P_ATM_PA
 
@@ -176,7 +176,7 @@ def _learned_pa(par: np.record, errors: FloatArray, taught: FloatArray, st: np.r
     return min(max(total, -par.learning_limit_pa), par.learning_limit_pa)
 
 
-@compiled
+@inlined
 def _tick(par: np.record, inverse: FloatArray, memory: FloatArray, st: np.record,
           inp: np.record, out: np.record) -> float:
     """Run one tick; see ``ilc_step``."""
@@ -198,7 +198,7 @@ def _tick(par: np.record, inverse: FloatArray, memory: FloatArray, st: np.record
     return command_of(par, st, inp, out, error, offset, error, base, learned)
 
 
-@compiled
+@inlined
 def _step(par: FloatArray, inverse: FloatArray, memory: FloatArray, st: FloatArray,
           inp: FloatArray, out: FloatArray) -> float:
     """Run one tick on arrays; see ``ilc_step``."""

@@ -37,7 +37,7 @@ from pam_actuation.control.lqi_model import LinearModel
 from pam_actuation.control.observer import gains_at
 from pam_actuation.control.settings import checked_settings, parameter_record, setting
 from pam_sim.annotations import FloatArray
-from pam_sim.compiled import Compiled, compiled, entry_point, source_key
+from pam_sim.compiled import Compiled, compiled, entry_point, inlined, source_key
 from pam_sim.errors import InputError
 from pam_sim.records import part, record
 from pam_sim.units import P_ATM_PA
@@ -138,7 +138,7 @@ def _start(par: np.record, model: np.record, st: np.record, inp: np.record,
         model, st, par.reference_feedforward * y)
 
 
-@compiled
+@inlined
 def _tick(par: np.record, model: np.record, observer: FloatArray, st: np.record, inp: np.record,
           out: np.record) -> float:
     """Run one tick; see ``lqi_step``."""
@@ -201,7 +201,7 @@ def _tick(par: np.record, model: np.record, observer: FloatArray, st: np.record,
     return command
 
 
-@compiled
+@inlined
 def _step(par: FloatArray, model: FloatArray, observer: FloatArray, st: FloatArray,
           inp: FloatArray, out: FloatArray) -> float:
     """Run one tick on arrays; see ``lqi_step``."""

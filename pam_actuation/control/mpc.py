@@ -40,7 +40,7 @@ from pam_actuation.control.observer import gains_at
 from pam_actuation.control.settings import checked_settings, parameter_record, setting
 from pam_actuation.control.static_inverse import inverse_pressure_pa, inverse_to_mapping
 from pam_sim.annotations import FloatArray
-from pam_sim.compiled import Compiled, compiled, entry_point, source_key
+from pam_sim.compiled import Compiled, compiled, entry_point, inlined, source_key
 from pam_sim.errors import InputError
 from pam_sim.records import part, record
 from pam_sim.units import P_ATM_PA
@@ -177,7 +177,7 @@ def _plan(model: np.record, st: np.record) -> bool:
     return True
 
 
-@compiled
+@inlined
 def _tick(par: np.record, model: np.record, inverse: FloatArray, observer: FloatArray,
           st: np.record, inp: np.record, out: np.record) -> float:
     """Run one tick; see ``mpc_step``."""
@@ -255,7 +255,7 @@ def _tick(par: np.record, model: np.record, inverse: FloatArray, observer: Float
     return command
 
 
-@compiled
+@inlined
 def _step(par: FloatArray, model: FloatArray, inverse: FloatArray, observer: FloatArray,
           st: FloatArray, inp: FloatArray, out: FloatArray) -> float:
     """Run one tick on arrays; see ``mpc_step``."""

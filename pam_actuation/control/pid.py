@@ -32,7 +32,7 @@ from pam_actuation.control.law_parts import (
 from pam_actuation.control.settings import checked_settings, parameter_record, setting
 from pam_actuation.control.static_inverse import inverse_pressure_pa
 from pam_sim.annotations import FloatArray
-from pam_sim.compiled import Compiled, compiled, entry_point, source_key
+from pam_sim.compiled import Compiled, compiled, entry_point, inlined, source_key
 from pam_sim.records import part, record
 from pam_sim.units import P_ATM_PA
 
@@ -91,7 +91,7 @@ def _start(par: np.record, st: np.record, inp: np.record) -> None:
         st.integral_pa = st.command_pa - P_ATM_PA
 
 
-@compiled
+@inlined
 def tracking_error(par: np.record, st: np.record, inp: np.record, has_former: bool
                    ) -> tuple[float, float]:
     """
@@ -114,7 +114,7 @@ def tracking_error(par: np.record, st: np.record, inp: np.record, has_former: bo
     return error, offset
 
 
-@compiled
+@inlined
 def command_of(par: np.record, st: np.record, inp: np.record, out: np.record, error: float,
                offset: float, remembered: float, base_pa: float, added_pa: float) -> float:
     """
@@ -164,7 +164,7 @@ def _remembered(par: np.record, st: np.record, inp: np.record, error: float,
     return error + par.forget_catch_up * (settled_part(error, offset) - error)
 
 
-@compiled
+@inlined
 def _tick(par: np.record, inverse: FloatArray, st: np.record, inp: np.record,
           out: np.record) -> float:
     """Run one tick; see ``pid_step``."""
@@ -179,7 +179,7 @@ def _tick(par: np.record, inverse: FloatArray, st: np.record, inp: np.record,
     return command_of(par, st, inp, out, error, offset, remembered, base, 0.0)
 
 
-@compiled
+@inlined
 def _step(par: FloatArray, inverse: FloatArray, st: FloatArray, inp: FloatArray,
           out: FloatArray) -> float:
     """Run one tick on arrays; see ``pid_step``."""

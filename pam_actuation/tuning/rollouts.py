@@ -31,7 +31,7 @@ from pam_actuation.control.sofc.step import sofc_step
 from pam_actuation.tuning.loop_parts import (
     DISTURBANCE, drive, Driver, Plant, read, READINGS, RISE, risen, WANTED)
 from pam_sim.annotations import FloatArray
-from pam_sim.compiled import compiled, entry_point, source_key
+from pam_sim.compiled import entry_point, inlined, source_key
 from pam_sim.records import part, record
 from pam_sim.rollout import layout
 from pam_sim.rollout.kernel import step
@@ -48,7 +48,7 @@ LOG = record(
 )
 
 
-@compiled
+@inlined
 def sense(tick: int, plant: Plant, hsv: bool, driver: Driver, timing: tuple[int, int, int],
           reference: FloatArray, noise: FloatArray, quantum: FloatArray, disturbance: FloatArray,
           learn: FloatArray, rise: FloatArray, inputs: FloatArray, log: FloatArray) -> None:
@@ -103,7 +103,7 @@ def sense(tick: int, plant: Plant, hsv: bool, driver: Driver, timing: tuple[int,
     row.measured_m = inp.contraction_m
 
 
-@compiled
+@inlined
 def actuate(tick: int, command_pa: float, plant: Plant, hsv: bool, driver: Driver,
             timing: tuple[int, int, int], reference: FloatArray, noise: FloatArray,
             quantum: FloatArray, disturbance: FloatArray, learn: FloatArray, rise: FloatArray,

@@ -38,7 +38,7 @@ from pam_actuation.control.sofc.rule_table import contracting_share, layer, Tabl
 from pam_actuation.control.sofc.settings import PARAMETERS
 from pam_actuation.control.static_inverse import inverse_pressure_pa
 from pam_sim.annotations import FloatArray
-from pam_sim.compiled import Compiled, compiled, entry_point, source_key
+from pam_sim.compiled import Compiled, compiled, entry_point, inlined, source_key
 from pam_sim.records import part
 from pam_sim.units import P_ATM_PA
 
@@ -81,7 +81,7 @@ def _start(par: np.record, inverse: FloatArray, values: Tables, kept: Tables, ri
         st.integral_mean_pa = st.integral_pa
 
 
-@compiled
+@inlined
 def _follow(par: np.record, ring: Ring, st: np.record, inp: np.record, elapsed_s: float,
             out: np.record) -> tuple[float, bool, bool]:
     """
@@ -132,7 +132,7 @@ def _follow(par: np.record, ring: Ring, st: np.record, inp: np.record, elapsed_s
     return way, rate_jumped, lags
 
 
-@compiled
+@inlined
 def _fuzzify(par: np.record, values: Tables, st: np.record, way_m: float, out: np.record) -> None:
     """Find the active rules and their degrees."""
     _, feedforward, motion, _ = values
@@ -156,7 +156,7 @@ def _fuzzify(par: np.record, values: Tables, st: np.record, way_m: float, out: n
         motion.shape[1])
 
 
-@compiled
+@inlined
 def _model(par: np.record, inverse: FloatArray, path_rules: FloatArray, ring: Ring, st: np.record,
            inp: np.record, elapsed_s: float, way_m: float, lags: bool, out: np.record) -> None:
     """Let the model of the muscle observe and predict; without one all it adds is 0."""
@@ -193,7 +193,7 @@ def _model(par: np.record, inverse: FloatArray, path_rules: FloatArray, ring: Ri
         path_memory.settle(par, model, st.lead_m - ahead_m, st.moves_m_per_s)
 
 
-@compiled
+@inlined
 def _command(par: np.record, values: Tables, st: np.record, rate_jumped: bool,
              out: np.record) -> float:
     """Add all parts of the command within its limits; return what passes those of pressure."""
@@ -228,7 +228,7 @@ def _command(par: np.record, values: Tables, st: np.record, rate_jumped: bool,
     return float(inside)
 
 
-@compiled
+@inlined
 def _integrate(par: np.record, st: np.record, inp: np.record, inside_pa: float, lags: bool,
                out: np.record) -> None:
     """Advance the integral, with back-calculation against the limits of pressure."""
@@ -246,7 +246,7 @@ def _integrate(par: np.record, st: np.record, inp: np.record, inside_pa: float, 
     st.integral_pa = min(max(st.integral_pa + growth, -limit), limit)
 
 
-@compiled
+@inlined
 def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, fired: Tables,
           kept: Tables, ring: Ring, st: np.record, inp: np.record, out: np.record) -> float:
     """Run one tick; see ``sofc_step``."""
@@ -272,7 +272,7 @@ def _tick(par: np.record, inverse: FloatArray, values: Tables, initial: Tables, 
     return float(out.command_pa)
 
 
-@compiled
+@inlined
 def _guard(par: np.record, values: Tables, kept: Tables, st: np.record, inp: np.record,
            error: float, reason: int, out: np.record) -> None:
     """Watch over learning; a roll-back makes no step in the command."""
@@ -294,7 +294,7 @@ def _guard(par: np.record, values: Tables, kept: Tables, st: np.record, inp: np.
     out.times_rolled_back = st.times_rolled_back
 
 
-@compiled
+@inlined
 def _step(par: FloatArray, inverse: FloatArray, tables: Tables, ring: FloatArray,
           st: FloatArray, inp: FloatArray, out: FloatArray) -> float:
     """Run one tick on arrays; see ``sofc_step``."""
