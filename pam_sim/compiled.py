@@ -139,6 +139,16 @@ entry_point: Compiler = _Compiler('kept', _nrt=False)
 allocating_entry_point: Compiler = _Compiler('kept')
 
 
+def direct(function: Callable[P, R]) -> Callable[P, R]:
+    """
+    Return what is called a quarter of a microsecond faster: without the look at errors.
+
+    For a function that was compiled before, for the same types of arguments.
+    """
+    machine_code: Callable[P, R] = getattr(function, 'dispatcher', function)
+    return machine_code
+
+
 def interpreted(function: Callable[P, R]) -> Callable[P, R]:
     """Return the Python function behind a compiled one: for a single call, not worth compiling."""
     python: Callable[P, R] = getattr(function, 'py_func', function)

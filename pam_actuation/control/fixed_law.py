@@ -24,6 +24,7 @@ from collections.abc import Callable
 import numpy as np
 from pam_actuation.control.compiled_controller import CompiledController
 from pam_sim.annotations import FloatArray
+from pam_sim.compiled import direct
 from pam_sim.records import values_of
 
 
@@ -61,6 +62,7 @@ class FixedLawController(CompiledController):
         self._arguments = (
             self.parameters, knowledge, *more, self._state, self._inputs, self._outputs)
         self.step(0.0, 0.0, 0.0, 0.0, 0.0)      # compile now, not in the first real tick
+        self._step = direct(step)
         self.pause()
 
     def learning_reason(self) -> str:
