@@ -37,9 +37,13 @@ import sys
 import threading
 import time
 from types import FrameType
-from typing import Any
+from typing import Any, TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pam_actuation.exit_timer import ExitTimer
 
 EXIT_INTERRUPTED = 130
+EXIT_FAILED = 1                # as the interpreter ends with after a traceback
 ONE_REQUEST_S = 1.0            # several within this time are one
 AGAIN_S = 0.005             # until the end of an import
 # Where an exception from outside leaves something half done that is told of later, or never.
@@ -65,10 +69,10 @@ def leave_at_once(program: str, exit_code: int = EXIT_INTERRUPTED,
         signal.signal(number, leave)
 
 
-def leave_within(limit_s: float = LEAVE_S) -> None:
-    """Have the system end this process by SIGALRM after a time; 0: no more."""
-    signal.signal(signal.SIGALRM, signal.SIG_DFL)
-    signal.setitimer(signal.ITIMER_REAL, limit_s)
+def leave_within(exit_code: int) -> 'ExitTimer':
+    """Have the system end this process after ``LEAVE_S``, with this exit code."""
+    from pam_actuation.exit_timer import ExitTimer
+    return ExitTimer(exit_code, LEAVE_S)
 
 
 class Closing:
@@ -99,14 +103,14 @@ class Closing:
         while self._waiting:
             self._waiting.pop()()
 
-    def end(self) -> None:
-        """Close what waits; the system ends this process where that hangs."""
+    def end(self, exit_code: int) -> None:
+        """Close what waits; the system ends this process, with this code, where that hangs."""
         self._pid = 0
         if self._waiting:
-            atexit.register(leave_within)
-            leave_within()
+            atexit.register(leave_within, exit_code)
+            limit = leave_within(exit_code)
             self.now()
-            leave_within(0.0)
+            limit.cancel()
 
 
 closing = Closing()

@@ -24,9 +24,9 @@ from source_trees import parsed, statements_in
 ROOT = Path(__file__).resolve().parent.parent
 # From the bottom: a room imports from its own row and from those above it in this table.
 LAYERS = (
-    ('messages', 'topics', 'namespaces', 'resources', 'interrupts', 'kept_folders', 'parallel',
-     'random_levels', 'ros_missing', 'slow_rise', 'transport', 'control', 'drivers', 'loops',
-     'bags', 'hardware', 'plant_loop', 'workers'),
+    ('messages', 'topics', 'namespaces', 'resources', 'interrupts', 'exit_timer', 'kept_folders',
+     'parallel', 'random_levels', 'ros_missing', 'slow_rise', 'transport', 'control', 'drivers',
+     'loops', 'bags', 'hardware', 'plant_loop', 'workers'),
     ('experiments', 'replay', 'tuning', 'valves', 'rules', 'tables', 'rig_files'),
     ('report', 'models', 'view'),
     ('campaign',),

@@ -119,11 +119,22 @@ close('before the next')
 interrupts.closing.now()
 close('last')
 print('result', flush=True)
-interrupts.closing.end()
+interrupts.closing.end(0)
 close('at once')
 """
     assert run(code, tmp_path) == (
         0, ['at once', 'in a child', 'before the next', 'result', 'last', 'at once'], '')
+
+
+def test_what_hangs_at_the_end_changes_no_exit_code(tmp_path):
+    """It hangs with the lock of the interpreter held: first as it is closed, then after that."""
+    hangs = 'lambda: ctypes.PyDLL(None).sleep(600)'
+    begin = ('import atexit, ctypes\n' + BEGIN
+             + 'interrupts.LEAVE_S = 0.5\ninterrupts.closing.wait()\n')
+    for end in (f'interrupts.closing.close({hangs})',
+                f'atexit.register({hangs}); interrupts.closing.close(int)'):
+        code = f'{begin}{end}\nprint("result", flush=True)\ninterrupts.closing.end(1)\n'
+        assert run(code, tmp_path) == (1, ['result'], '')
 
 
 def test_what_was_asked_too_late_does_not_end_the_process(tmp_path):

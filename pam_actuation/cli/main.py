@@ -78,6 +78,7 @@ def main(argv: list[str] | None = None) -> int:
     interrupts.closing.wait()
     # Modules are no garbage: to look for some while they are imported takes a tenth of the time.
     gc.set_threshold(*GC_THRESHOLD)
+    code = interrupts.EXIT_FAILED       # of an error of this program
     try:
         try:
             code = _run_verb(None, interrupts.Worker)
@@ -86,7 +87,7 @@ def main(argv: list[str] | None = None) -> int:
     except KeyboardInterrupt:       # while the verb said its last words
         code = interrupts.EXIT_INTERRUPTED
     finally:
-        interrupts.closing.end()    # the result is out
+        interrupts.closing.end(code)    # the result is out
     if code == interrupts.EXIT_INTERRUPTED:
         interrupts.end_interrupted()
     return code

@@ -118,11 +118,12 @@ def run(node_class: type[ManagedNode], args: Sequence[str] | None = None) -> int
     answered = arguments.answer(node_class.NAME, sys.argv[1:]) if args is None else None
     if answered is not None:
         return answered
-    atexit.register(leave_within)       # what comes after may hang as well
-    stopper = _Stopper()
+    stopper, code = _Stopper(), interrupts.EXIT_FAILED
     try:
-        return _run(node_class, args, stopper)
+        code = _run(node_class, args, stopper)
+        return code
     finally:
+        atexit.register(leave_within, code)     # what comes after may hang as well
         # What comes now, as by an impatient user, must not change the exit code any more.
         interrupts.ignore(SIGNALS)
 
@@ -163,7 +164,7 @@ def _run(node_class: type[ManagedNode], args: Sequence[str] | None, stopper: '_S
         node.finish(why)
         stopper.safe.set()
         code = node.exit_code or node.result_code
-        leave_within()
+        limit = leave_within(code)
         ended.set()
         executor.wake()
         serving.join(timeout=SERVICE_END_S)
@@ -177,7 +178,7 @@ def _run(node_class: type[ManagedNode], args: Sequence[str] | None, stopper: '_S
         executor.shutdown()
         node.destroy_node()
         rclpy.try_shutdown()
-        leave_within(0.0)
+        limit.cancel()
     return code
 
 

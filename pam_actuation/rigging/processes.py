@@ -142,14 +142,8 @@ class NodeProcess:
 
     @property
     def exit_code(self) -> int | None:
-        """
-        Return the exit code, negative for a signal, None while the process runs.
-
-        A node that hangs on the way out, with everything safe and sent, has ended in order. It
-        set the alarm that ended it.
-        """
-        code = self._process.poll()
-        return 0 if code == -signal.SIGALRM else code
+        """Return the exit code, negative for a signal, None while the process runs."""
+        return self._process.poll()
 
     @property
     def running(self) -> bool:

@@ -23,7 +23,8 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from pam_actuation.rigging.domain import DomainLock                         # noqa: E402, I100
+from pam_actuation.cli.common import EXIT_BAD_INPUT                           # noqa: E402, I100
+from pam_actuation.rigging.domain import DomainLock                         # noqa: E402
 from pam_actuation.rigging.processes import node_environment, NodeProcess   # noqa: E402
 
 pytestmark = [pytest.mark.ros, pytest.mark.shared]
@@ -111,7 +112,7 @@ def test_pam_tells_its_result_and_leaves_though_the_middleware_hangs(tmp_path):
     finally:
         lock.release()
     assert f'no node of a rig found in ROS domain {lock.domain_id}' in done.stderr
-    assert done.returncode == -signal.SIGALRM
+    assert done.returncode == EXIT_BAD_INPUT
 
 
 # As ros2 launch does, which leaves its nodes behind when SIGTERM or SIGKILL ends it.
