@@ -23,7 +23,7 @@ def answer_to(**effects):
     """Return what `pam gap` answers on the nominal rig with effects, each name=parameters."""
     rig = nominal().with_(effects=[
         {'name': name, 'parameters': values} for name, values in effects.items()])
-    result = find_gap(recorded(rig, voltages(16.0, seed=5), seed=5), nominal())
+    result = find_gap(recorded(rig, voltages(10.0, seed=5), seed=5), nominal())
     assert_form(result)
     return result
 
