@@ -33,7 +33,7 @@ LOOK_ALIKES = ['creep', 'contraction_bias', 'bladder_stiffness', 'end_taper']
 
 @pytest.fixture(scope='module')
 def run():
-    return recorded(nominal().with_(effects=[CREEP, BIAS]), voltages(24.0))
+    return recorded(nominal().with_(effects=[CREEP, BIAS]), voltages(15.0))
 
 
 def test_the_true_pair_promises_most(run):
