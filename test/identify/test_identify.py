@@ -169,7 +169,7 @@ def test_a_missing_effect_widens_the_intervals_and_is_said():
 
 
 def test_nothing_is_missing_where_far_less_than_the_noise_is_left():
-    found = identify(record(RIG, hold_s=2.0, noise=0.0), RIG, ['mass_kg'])
+    found = identify(record(RIG, hold_s=1.0, noise=0.0), RIG, ['mass_kg'])
     assert not found.incomplete and inside(found['mass_kg'], 5.0)
 
 
