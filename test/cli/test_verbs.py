@@ -142,18 +142,17 @@ def test_replay_with_another_tuning_tells_the_difference(bags, tmp_path, capsys)
 
 
 def test_report_is_one_file_without_network(bags, tmp_path):
-    done = pam('report', bags / 'ppr', bags / 'hsv', '--out', tmp_path / 'page.html')
-    assert done.returncode == 0, done.stderr
+    assert pam_here('report', bags / 'ppr', bags / 'hsv', '--out', tmp_path / 'page.html') == 0
     page = (tmp_path / 'page.html').read_text()
     assert not re.search(r'<(script|link|img|iframe)\b[^>]*(src|href)=', page)
     assert 'Tracking RMSE' in page and 'kPa' in page
 
 
-def test_gap_writes_its_folder(bags, tmp_path):
-    done = pam('gap', bags / 'ppr', '--model', 'dmsp_5_300_hanging_mass', '--effects',
-               'hysteresis', '--out', tmp_path / 'gap', '--json')
-    assert done.returncode == 0, done.stderr          # the realistic rig differs: an answer
-    assert json.loads(done.stdout)['signals']['contraction']['rmse_before'] > 1e-4
+def test_gap_writes_its_folder(bags, tmp_path, capsys):
+    code = pam_here('gap', bags / 'ppr', '--model', 'dmsp_5_300_hanging_mass', '--effects',
+                    'hysteresis', '--out', tmp_path / 'gap', '--json')
+    assert code == 0                                  # the realistic rig differs: an answer
+    assert json.loads(capsys.readouterr().out)['signals']['contraction']['rmse_before'] > 1e-4
     made = {path.name for path in (tmp_path / 'gap').iterdir()}
     # Rivals that are left bring the experiment that tells them apart.
     assert made - {'next_experiment.yaml'} == {
