@@ -59,9 +59,10 @@ print(json.dumps({
     'values': [one.settings[name] for one in all_three],
     'compiled': [compiled(one) for one in all_three], 'mistake': mistake}))
 """
-# The node with a file that sets it.
+# The node with a file that sets it, then its page.
 NODE = """
 import sys
+from pam_actuation.cli.main import main
 from pam_actuation.nodes.interfaces import node_class
 from pam_actuation.rigging.client import local_context
 from pam_actuation.rigging.domain import DomainLock
@@ -75,6 +76,7 @@ node.trigger_configure()
 print(node.controller.settings['extra_gain_pa_per_m'])
 node.destroy_node()
 lock.release()
+assert main(['nodes', sys.argv[1]]) == 0
 """
 
 
@@ -119,6 +121,6 @@ def test_the_node_takes_it_and_its_page_has_it(house, tmp_path, kind):
     pytest.importorskip('rclpy')
     file = tmp_path / 'own.yaml'
     file.write_text(f'controller: {kind}\nsettings: {{extra_gain_pa_per_m: 42.0}}\n')
-    assert run(house, '-c', NODE, f'{kind}_controller', file).splitlines()[-1] == '42.0'
-    page = run(house, '-m', 'pam_actuation.cli.main', 'nodes', f'{kind}_controller')
+    gain, _, page = run(house, '-c', NODE, f'{kind}_controller', file).partition('\n')
+    assert gain == '42.0'
     assert '| `extra_gain_pa_per_m` | `25` | Pa/m | 0 to 100 | gain of the test |' in page
