@@ -58,10 +58,15 @@ def pytest_collection_modifyitems(items):
 
 @pytest.hookimpl(hookwrapper=True)
 def pytest_collection():
-    """Collect without a look for garbage: it takes a third of the time, and all of this stays."""
+    """
+    Collect without a look for garbage: it takes a third of the time, and all of this stays.
+
+    The tests then look for it more rarely: imports and compiled code stay as well.
+    """
     gc.disable()
     yield
     gc.freeze()
+    gc.set_threshold(20_000, 20, 50)
     gc.enable()
 
 
