@@ -62,8 +62,10 @@ def rig_to_yaml(rig: 'Rig') -> str:
     """Return the text of a model file that gives an equal rig."""
     known = rig_parameters(rig.load)
     data = {'name': rig.name, **_base(rig), 'valve': rig.valve, 'fidelity': rig.fidelity}
+    base = _PRESETS.read(data['rig']) if 'rig' in data else {}
+    nominal = {p.name: p.default for p in known} | dict(base.get('parameters') or {})
     changed = {p.name: rig.parameters[p.name] for p in known
-               if rig.parameters[p.name] != p.default}
+               if rig.parameters[p.name] != nominal[p.name]}
     tolerance = {p.name: plain_tolerance(rig.tolerance[p.name]) for p in known
                  if rig.tolerance[p.name] != p.tolerance}
     tolerance.update({name: plain_tolerance(value) for name, value in rig.tolerance.items()

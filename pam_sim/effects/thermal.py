@@ -20,8 +20,8 @@ The air in the muscle is not isothermal; it exchanges heat with the wall.
 with p V = m R T, wall and supply at T_0 = 293.15 K, hA = m_ref cv / tau and
 m_ref = 8e-5 kg, so that tau is the time constant at that mass. Linear in T,
 hence solved by an exponential with the coefficients of the middle of the step.
-The vent flow grows with sqrt(T_0 / T) (ISO 6358). A time constant of zero is
-the isothermal rig, a very long one the adiabatic one.
+The flow out of the vent grows with sqrt(T_0 / T) (ISO 6358); air let in has T_0.
+A time constant of zero is the isothermal rig, a very long one the adiabatic one.
 """
 
 from collections.abc import Mapping
@@ -89,6 +89,9 @@ EFFECT = Effect(
 def air_rt(mass_kg: float, inflow_kg_per_s: float, outflow_kg_per_s: float, pressure_pa: float,
            volume_m3: float, elapsed_s: float, state: np.record, par: np.record) -> float:
     """Return R T of the air ``elapsed_s`` into the step."""
+    if outflow_kg_per_s < 0.0:          # air of the room through an open vent
+        inflow_kg_per_s -= outflow_kg_per_s
+        outflow_kg_per_s = 0.0
     before = state.rt_j_per_kg
     start_m3 = mass_kg * before / pressure_pa
     # The balance of energy less that of mass, divided by m cv: dT/dt = a - b T.

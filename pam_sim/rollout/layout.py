@@ -88,6 +88,7 @@ PARAMETERS = record(
     'rt_j_per_kg',
     'conductance_kg_per_s_pa',
     'critical_ratio',
+    'intake_kg_per_s_pa',           # conductance of the vent valve for air that flows in
     'supply_pa',                    # absolute
     'gain_ppr_pa_per_v',
     'lowest_ppr_v',

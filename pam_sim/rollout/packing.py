@@ -145,6 +145,7 @@ def _pack_base(rig: 'Rig', numbers: Numbers, state: FloatArray, par: FloatArray)
     if rig.valve == 'hsv':
         valve = (layout.HSV_SWITCHING if rig.fidelity == 'switching'
                  else layout.HSV_AVERAGED)
+    conductance = value['C'] * RHO_REFERENCE * _DENSITY_FACTOR
     mass = value.get('mass_kg', 1.0)
     law, load = _LAW_CODES[muscle.law.name], _LOAD_CODES[rig.load]
     put(par, layout.PARAMETERS, {
@@ -165,8 +166,9 @@ def _pack_base(rig: 'Rig', numbers: Numbers, state: FloatArray, par: FloatArray)
         'inverse_4_pi_n2': inverse_4_pi_n2,
         'dead_volume_m3': value['V_dead'],
         'rt_j_per_kg': _RT_J_PER_KG,
-        'conductance_kg_per_s_pa': value['C'] * RHO_REFERENCE * _DENSITY_FACTOR,
+        'conductance_kg_per_s_pa': conductance,
         'critical_ratio': value['b'],
+        'intake_kg_per_s_pa': value['vent_intake'] * conductance,
         'supply_pa': value['supply_pa'],
         'gain_ppr_pa_per_v': value['K_m'],
         'lowest_ppr_v': value['ppr_lowest_v'],

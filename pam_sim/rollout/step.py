@@ -85,7 +85,11 @@ def load_force(x: float, v: float, dx: float, elapsed: float, external: float, b
 @inlined
 def valve_flows(fill: float, vent: float, p: float, supply: float, altered: bool, beyond: int,
                 state: np.record, par: np.record) -> tuple[float, float]:
-    """Return (fill, vent) mass flow [kg/s] of the HSV pair at mean openings 0..1."""
+    """
+    Return (fill, vent) mass flow [kg/s] of the HSV pair at mean openings 0..1.
+
+    The vent flow is negative where air flows in, into a muscle below the atmosphere.
+    """
     flow_in = 0.0
     flow_out = 0.0
     if fill > 0.0:
@@ -94,6 +98,9 @@ def valve_flows(fill: float, vent: float, p: float, supply: float, altered: bool
     if vent > 0.0:
         flow_out = vent * mass_flow_kg_per_s(
             p, par.atmosphere_pa, par.conductance_kg_per_s_pa, par.critical_ratio)
+        if p < par.atmosphere_pa and par.intake_kg_per_s_pa > 0.0:
+            flow_out = -vent * mass_flow_kg_per_s(
+                par.atmosphere_pa, p, par.intake_kg_per_s_pa, par.critical_ratio)
     if altered:
         return hooks.valve_flow(flow_in, flow_out, p, supply, beyond, state, par)
     return flow_in, flow_out

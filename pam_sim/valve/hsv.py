@@ -25,8 +25,10 @@ from pam_sim.parameters import Parameter
 
 NAME = 'hsv'
 SENTENCE = 'Pair of high-speed on/off valves: one fills from the supply, one vents.'
-EQUATION = ('dp/dt = (R T (d_f mdot(p_s, p) - d_v mdot(p, p_atm)) - p dV/dt) / (V + V_dead), '
-            'mdot(p1, p2) = C rho0 p1 sqrt(T0 / T) psi(p2 / p1)')
+EQUATION = ('dp/dt = (R T (d_f mdot(p_s, p) - d_v (mdot(p, p_atm) - vent_intake mdot(p_atm, p))) '
+            '- p dV/dt) / (V + V_dead), mdot(p1, p2) = C rho0 p1 sqrt(T0 / T) psi(p2 / p1), '
+            'psi(r) = 1 for r <= b, sqrt(1 - ((r - b) / (1 - b))^2) for b < r < 0.999, linear in '
+            '1 - r from there on, 0 for r >= 1')
 SOURCE = 'ISO 6358-1:2013 (choked and unchoked flow); mass balance of an isothermal ideal gas.'
 SIGNAL_NAMES = ('fill_duty', 'vent_duty')
 FIDELITIES = ('averaged', 'switching')
@@ -45,6 +47,9 @@ PARAMETERS = (
               'Supply pressure, absolute.', 'design value'),
     Parameter('pwm_period_s', 's', 0.010, 0.001, 0.1, 0.0,
               'Period of the pulse width modulation.', 'design value'),
+    Parameter('vent_intake', '-', 1.0, 0.0, 1.0, 0.0,
+              'Share of C with which an open vent valve lets air in while the muscle is below the '
+              'atmosphere; 0 is a vent with a check valve.', 'open passage: 1'),
 )
 
 
