@@ -116,7 +116,9 @@ def early_sentences(runs: Iterable[Run]) -> list[str]:
 
 class EndWatch:
     """
-    Follows a live run by what reference generator and valve driver say on /diagnostics.
+    Follows a run by what reference generator and valve driver say on /diagnostics.
+
+    The live recorder hears them, and so does a simulation.
 
     Parameters
     ----------
@@ -170,6 +172,14 @@ class EndWatch:
         elif status.name in self._vented:
             since_s, why = self._vented.pop(status.name)
             self._vents.setdefault(status.name, []).append((since_s, at_s - since_s, why))
+
+    @property
+    def faults(self) -> list[str]:
+        """Return a sentence ``NODE: REASON`` on each vent of a driver, equal ones once."""
+        told = [(since_s, f'{name}: {why}') for name, vents in self._vents.items()
+                for since_s, _, why in vents]
+        told += [(since_s, f'{name}: {why}') for name, (since_s, why) in self._vented.items()]
+        return list(dict.fromkeys(text for _, text in sorted(told)))
 
     def _vents_in_words(self) -> str:
         found = []

@@ -86,12 +86,15 @@ class Size(NamedTuple):
         Largest contraction, as a fraction of it.
     known_by : {'', 'rig', 'length'}
         What says so: the rig, or the length alone; '' where it is taken for a DMSP-5-300.
+    simulated : bool
+        Whether the values are of a simulation. A simulated muscle may be below the atmosphere.
 
     """
 
     length_m: float = MUSCLE_LENGTH_M
     max_strain: float = MAX_CONTRACTION
     known_by: str = ''
+    simulated: bool = False
 
     @property
     def stroke_m(self) -> float:
@@ -125,12 +128,15 @@ def recorded_size(metadata: Mapping[str, str]) -> Size:
     """
     from pam_sim import load_rig
     from pam_sim.errors import InputError
+    origin = metadata.get('origin')
     try:
-        return size_of_rig(load_rig(metadata['rig']))
+        size = size_of_rig(load_rig(metadata['rig']))
     except (InputError, KeyError):
-        if metadata.get('origin') != 'imported':
-            return Size()
-        return Size(float(metadata.get('length_m') or MOST_M / MOST_STRAIN), MOST_STRAIN, 'length')
+        size = Size()
+    size = size._replace(simulated='software_version' in metadata and not origin)
+    if size.known_by or origin != 'imported':
+        return size
+    return Size(float(metadata.get('length_m') or MOST_M / MOST_STRAIN), MOST_STRAIN, 'length')
 
 
 def topic_remarks(topic: 'TopicData', info: 'TopicInfo', stamp_ns: IntArray,
@@ -362,6 +368,8 @@ def _pressure(finite: FloatArray, low: float, high: float, size_of: SizeOf) -> t
                            if largest < limit)
         return _unit(low, high, 'Pa absolute', likely,
                      f'{fix}, and add 101325 Pa if they are gauge; the topic is absolute, in Pa.')
+    if size_of().simulated:
+        return '', False        # absolute, by whoever wrote it
     below = int((finite < P_ATM_PA - ATMOSPHERE_MARGIN_PA).sum())
     # A muscle may be vented most of the time, and its sensor have a zero.
     if usual < P_ATM_PA and not (low >= P_ATM_PA - MOST_ZERO_PA and largest > P_ATM_PA):

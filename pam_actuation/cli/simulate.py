@@ -20,7 +20,7 @@ import shlex
 import time
 
 from pam_actuation.cli.common import (
-    add_experiment_options, emit, EXIT_DONE, load_setup, progress, tell_remarks)
+    add_experiment_options, emit, EXIT_DONE, EXIT_FINDING, load_setup, progress, tell_remarks)
 from pam_actuation.cli.options import number, out_path, Parser
 
 HELP = 'Simulate an experiment without ROS, faster than real time, recorded as a bag.'
@@ -38,7 +38,7 @@ def add_arguments(parser: Parser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Simulate and say what was recorded."""
+    """Simulate and say what was recorded; exit code 1 if a driver vented on a fault."""
     from pam_actuation.bags.place import check_bag_target
     from pam_actuation.experiments.offline import simulate_experiment
     from pam_sim.rig_text import rig_title
@@ -56,8 +56,9 @@ def run(args: argparse.Namespace) -> int:
     result['wall_s'] = time.perf_counter() - started
     result['remarks'] = remarks
     said = ''.join(f'remark: {text}\n' for text in remarks)
+    said += ''.join(f'finding: {text}\n' for text in result['findings'])
     emit(args, result, (
         f'simulated {result["duration_s"]:.1f} s of "{experiment.name}" on {rig_title(rig)}, '
         f'{rig.valve}, in {result["wall_s"]:.1f} s\nbag: {result["bag"]}\n{said}'
         f'next: pam report {shlex.quote(str(result["bag"]))}'))
-    return EXIT_DONE
+    return EXIT_FINDING if result['findings'] else EXIT_DONE

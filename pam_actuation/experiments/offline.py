@@ -28,7 +28,7 @@ from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
 from pam_actuation import interrupts
-from pam_actuation.bags.ending import COMPLETE, Ending, INTERRUPTED
+from pam_actuation.bags.ending import Ending, EndWatch, FINISHED, INTERRUPTED, PLAYING, REFERENCE
 from pam_actuation.bags.message_writer import MessageWriter
 from pam_actuation.bags.metadata import experiment_metadata
 from pam_actuation.bags.writer import BagWriter
@@ -41,7 +41,7 @@ from pam_actuation.experiments.reference import ReferenceLoop
 from pam_actuation.loops.bus import Bus, every
 from pam_actuation.loops.wiring import (
     attach, attach_plant, controller_tick, driver_tick, reference_tick)
-from pam_actuation.messages import START_NS, Status
+from pam_actuation.messages import LEVEL_OK, START_NS, Status
 from pam_actuation.namespaces import JOINT, MUSCLE
 from pam_actuation.plant_loop import PlantLoop
 from pam_sim.errors import InputError
@@ -68,7 +68,9 @@ class _Loops:
             ticks: Mapping[str, Iterable[int]], changes: Mapping[str, object] | None,
             preview_s: float | None) -> None:
         self._recorder = recorder
-        self._status_ns: dict[str, int] = {}    # by the place of a driver, when recorded last
+        # By the place of a driver, when it was recorded last and with which level.
+        self._told: dict[str, tuple[int, int]] = {}
+        self.watch = EndWatch(recorder.namespace)
         self.bus = bus = Bus(transport_ns, recorder.write)
         self.reached_ns = 0
         changes = {**(controller and controller.driver or {}), **(changes or {})}
@@ -97,11 +99,21 @@ class _Loops:
                 self._tell, place, driver)), driver.rate_hz)
 
     def _tell(self, place: str, driver: DriverLoop, now_ns: int) -> None:
-        """Record the status of a driver from time to time."""
-        if now_ns - self._status_ns.get(place, -STATUS_EVERY_NS) >= STATUS_EVERY_NS:
-            self._status_ns[place], status = now_ns, driver.status()
+        """Record the status of a driver from time to time, and at once when its level changes."""
+        told_ns, told_level = self._told.get(place, (-STATUS_EVERY_NS, LEVEL_OK))
+        level, _ = driver.state()
+        if now_ns - told_ns >= STATUS_EVERY_NS or level != told_level:
+            self._told[place], status = (now_ns, level), driver.status()
             self._recorder.write(
                 'diagnostics', replace(status, name=f'{place}{status.name}'), now_ns)
+            self.watch.hear([replace(
+                status, name=f'{self._recorder.namespace}/{place}{status.name}')])
+
+    def say(self, word: str, elapsed_s: float) -> None:
+        """Tell the watch of the run how far the reference is, as a live reference does."""
+        self.watch.hear([Status(
+            START_NS + round(elapsed_s * 1e9), LEVEL_OK,
+            f'{self._recorder.namespace}/{REFERENCE}', word, (('elapsed_s', f'{elapsed_s}'),))])
 
     def run(self, end_ns: int, progress: Callable[[int], object] | None,
             stopped: Callable[[], bool]) -> None:
@@ -166,7 +178,8 @@ def simulate_experiment(
     Returns
     -------
     dict
-        ``bag`` (path), ``duration_s``, ``counts`` per topic.
+        ``bag`` (path), ``duration_s``, ``counts`` per topic, ``findings``: a sentence on each
+        reason for which a driver vented.
 
     Raises
     ------
@@ -201,7 +214,8 @@ def simulate_experiment(
             if not ending.reached_s:
                 raise KeyboardInterrupt
             writer.add_to_experiment(ending.texts())
-            if ending.early:
+            interrupted = ending.ended == INTERRUPTED
+            if interrupted:
                 writer.replace_nothing()
             writer.close()
     except OSError as error:
@@ -209,14 +223,14 @@ def simulate_experiment(
     finally:
         if writer is not None:
             writer.discard()        # what is not finished; a whole bag stays
-    if stopped() and not ending.early:
+    if stopped() and not interrupted:
         raise KeyboardInterrupt(f'stopped; the bag {writer.directory} is whole')
-    if ending.early:
+    if interrupted:
         raise KeyboardInterrupt(
             f'stopped; the bag {writer.directory} holds {ending.reached_s:.1f} of '
             f'{ending.planned_s:.1f} s')
     return {'bag': os.fspath(out), 'duration_s': experiment.duration_s,
-            'counts': writer.counts}
+            'counts': writer.counts, 'findings': loops.watch.faults}
 
 
 def _names(rig: 'Rig | JointRig', namespace: str | None) -> tuple[str, str]:
@@ -231,17 +245,19 @@ def _recorded(loops: _Loops, recorder: MessageWriter, experiment: 'Experiment',
               progress: Callable[..., Any] | None, stopped: Callable[..., Any]) -> Ending:
     """Run the loops to the end or to an interrupt; return the Ending."""
     end = START_NS + round(experiment.duration_s * 1e9)
-    ended, said = COMPLETE, 'finished'
+    said, told = FINISHED, None
+    loops.say(PLAYING, 0.0)
     try:
         loops.run(end, progress, stopped)
-        reached_s = experiment.duration_s
+        loops.say(FINISHED, experiment.duration_s)
     except KeyboardInterrupt:
-        ended, said, reached_s = INTERRUPTED, 'interrupted', max(loops.reached_ns, 0) * 1e-9
+        said, told = 'interrupted', Ending(ended=INTERRUPTED)
         end = START_NS + max(loops.reached_ns, 0)
+        loops.say(PLAYING, (end - START_NS) * 1e-9)
     # The last status: the counts as a node states them.
     published = tuple((f'published.{name}', str(count))
                       for name, count in recorder.bag.counts.items()
                       if not name.endswith('/diagnostics'))
     recorder.write('diagnostics', Status(
         end, 0, f'{recorder.namespace}/simulation', said, published), end)
-    return Ending(experiment.duration_s, reached_s, ended)
+    return loops.watch.ending(experiment.duration_s, told)

@@ -207,6 +207,16 @@ def test_a_live_run_is_judged_by_what_its_nodes_say(heard, ending):
     assert watch(*heard).ending(8.0) == ending
 
 
+def test_each_reason_of_a_vent_is_told_once_in_order():
+    stale = said('valve_driver', 'stale', 13.0, 2)
+    made = watch(PLAYING, said('flexor/valve_driver', 'stopped', 12.5, 2), VENTED,
+                 said('valve_driver', 'following', 12.6), stale,
+                 said('valve_driver', 'following', 13.1), stale)
+    assert made.faults == ['/muscle/valve_driver: vented because the reading is above the limit',
+                           '/muscle/flexor/valve_driver: stopped', '/muscle/valve_driver: stale']
+    assert watch(PLAYING).faults == [] == watch(VENTED).faults
+
+
 def test_who_ended_the_run_knows_better():
     told = Ending(ended='error', because='sofc_controller was ended by SIGKILL.')
     found = watch(PLAYING, VENTED).ending(8.0, told)

@@ -322,7 +322,8 @@ def test_values_that_cannot_be_true(tmp_path, short, message, words):
         fields = {field: getattr(message, field) for field in message.__slots__}
         return type(message)(**{**fields, 'stamp_ns': given.stamp_ns})
 
-    info = bag_info(write_bag(tmp_path / 'run', 30, change=change))
+    measured = {**METADATA, 'origin': 'live'}
+    info = bag_info(write_bag(tmp_path / 'run', 30, metadata=measured, change=change))
     assert said(info, f'/muscle/{short}', *words)
 
 

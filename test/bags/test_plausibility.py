@@ -20,7 +20,8 @@ import numpy as np
 from pam_actuation.bags.info import bag_info
 from pam_actuation.bags.load import load_run
 from pam_actuation.bags.load_joint import load_recording
-from pam_actuation.bags.plausibility import repeat_remarks, Size, value_findings
+from pam_actuation.bags.plausibility import (
+    recorded_size, repeat_remarks, Size, value_findings)
 from pam_actuation.bags.source import read_bag
 from pam_actuation.bags.writer import BagWriter
 from pam_actuation.cli.main import main
@@ -232,3 +233,13 @@ def test_page_json_and_gap_carry_the_sentence(bags, tmp_path, capsys):
     assert 'What cannot be right in the data' in page and 'likely kPa' in page
     health = check_health(load_run(bags['kpa']), 'ppr')
     assert health.problems == [sentence.rstrip('.')]     # and not that the pressure hardly moves
+
+
+def test_a_simulated_muscle_may_be_below_the_atmosphere():
+    """Only a simulation of ours knows its units: a live or imported one does not."""
+    low = np.linspace(P_ATM_PA - 36e3, P_ATM_PA, 99)
+    told = {'software_version': '1.0.0'}
+    for metadata, sound in ((told, True), ({**told, 'origin': 'live'}, False),
+                            ({**told, 'origin': 'imported'}, False), ({}, False)):
+        sentence, _ = look('pressure_pa', low, size_of=lambda: recorded_size(metadata))
+        assert (sentence == '') is sound, metadata
