@@ -68,7 +68,9 @@ EFFECT = Effect(
     source='Formulation of our own after the observation of Chou and Hannaford (1996), IEEE '
            'Trans. Robotics and Automation 12(1). Sizes: design values.',
     equation='F -= (F0 + k_p p_g) (d sgn(v) + (1 - d) h), '
-             'h = h_t + 2 sgn(dx) (1 - exp(-|x - x_t| / 2 W)) since the turn (x_t, h_t)',
+             'h = sgn(dx) (1 - exp(-|x - x_0| / W)) from the start x_0 to the first turn, '
+             'h = h_t + 2 sgn(dx) (1 - exp(-|x - x_t| / 2 W)) since the last turn (x_t, h_t); '
+             'a cycle that closes is forgotten, and h goes on along the branch before it',
     parameters=(
         *level_parameters('full friction'),
         Parameter('width_m', 'm', 0.75e-3, 1e-5, 2e-2,

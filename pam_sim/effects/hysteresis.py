@@ -54,7 +54,8 @@ EFFECT = Effect(
     subsystem='muscle',
     sentence='The force depends on the path: presliding friction of the braid with memory.',
     source='Maxwell slip, Al-Bender et al. 2005; Vo-Minh et al. 2011.',
-    equation='F -> F - (F_0 + k_p p_g) sum_j w_j z_j, dz_j = dx / W_j clipped to -1 <= z_j <= 1',
+    equation='F -> F - (F_0 + k_p p_g) sum_j w_j z_j, dz_j = dx / W_j clipped to -1 <= z_j <= 1, '
+             'W_j = 0.1, 0.4, 1.2, 3.0 mm times width_scale, w_j = 0.25, 0.30, 0.25, 0.20',
     parameters=(
         *level_parameters(),
         Parameter('width_scale', '-', 1.0, 0.1, 10.0,

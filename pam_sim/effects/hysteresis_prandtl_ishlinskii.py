@@ -79,8 +79,9 @@ EFFECT = Effect(
     source='Prandtl-Ishlinskii, e.g. Visintin (1994), Differential Models of Hysteresis; on the '
            'pressure of a muscle Liu et al. (2017), J. Mechanical Engineering 63(1). Sizes: '
            'design values.',
-    equation='F = F_map(p_g + sum w_j (y_j - p_g), eps), y_j: play of half width '
-             'rho_j (b + k p_g) on p_g',
+    equation='F = F_map(p_g + sum_j w_j (y_j - p_g), eps), y_j = min(max(y_j, p_g - r_j), '
+             'p_g + r_j), r_j = rho_j (b + k p_g), rho_j = 0.1, 0.4, 1, 2.5, w_j = 0.25 each, '
+             'b = half_width_pa, k = half_width_per_pa',
     parameters=(
         Parameter('half_width_pa', 'Pa', 2e3, 0.0, 100e3,
                   description='Half width of the pressure loop at zero gauge pressure.'),

@@ -62,8 +62,10 @@ EFFECT = Effect(
              'heat.',
     source='First law for an open volume, e.g. Richer and Hurmuzlu (2000), ASME J. Dynamic '
            'Systems, Measurement, and Control 122(3).',
-    equation='d(m cv T)/dt = mdot_fill cp T_0 - mdot_vent cp T - p dV/dt + hA (T_0 - T), hA '
-             '= m_ref cv / tau',
+    equation='d(m cv T)/dt = mdot_fill cp T_0 - mdot_vent cp T - p dV/dt + hA (T_0 - T), '
+             'p (V + V_dead) = m R T, mdot_vent -> mdot_vent sqrt(T_0 / T), hA = m_ref cv / tau, '
+             'T_0 = 293.15 K, m_ref = 8e-5 kg, cv = R / 0.4, cp = 1.4 cv; air that the vent lets '
+             'in has T_0',
     parameters=(
         Parameter('heat_exchange_time_s', 's', 0.2, 0.0, 1e3,
                   description='Time constant of the heat exchange at 8e-5 kg; 0 is isothermal.'),

@@ -46,11 +46,15 @@ def tension_n(gauge_pa: float, strain: float, par: np.record) -> float:
 
 
 class TonduLopez(MuscleLaw):
-    """F = p pi D0^2/4 (3 (1 - k eps)^2 / tan^2 a0 - 1 / sin^2 a0), eq. 4.7."""
+    """
+    F = p pi D0^2/4 (3 (1 - k eps)^2 / tan^2 a0 - 1 / sin^2 a0), eq. 4.7.
+
+    1 - k eps ends at 0: beyond k eps = 1 the square would rise again.
+    """
 
     NAME = 'tondu_lopez'
     EQUATION = '4.7'
-    FORMULA = ('F = p (pi D0^2 / 4) (3 (1 - k eps)^2 / tan^2 a0 - 1 / sin^2 a0), '
+    FORMULA = ('F = p (pi D0^2 / 4) (3 max(0, 1 - k eps)^2 / tan^2 a0 - 1 / sin^2 a0), '
                'k = k0 + k_rise exp(-p / k_pressure_pa)')
     SOURCE = 'Tondu and Lopez 2000, IEEE Control Systems Magazine 20(2)'
     PARAMETERS = GEOMETRY + (
