@@ -38,7 +38,6 @@ import os
 from typing import Any, TYPE_CHECKING
 
 from pam_actuation.control.compiled_controller import CompiledController
-from pam_actuation.control.controller_text import INDEX_FORMS
 from pam_actuation.control.laws import Asked, LAWS
 from pam_actuation.control.made_for import check_made_for, read_facts
 from pam_actuation.control.modes.files import KEYS as MODE_KEYS, read_mode
@@ -149,7 +148,7 @@ def _built(tree: Located, rig: 'JointRig | Rig | None', folder: str) -> Controll
     for key in tree:
         if key not in _NAMES + names_of(law.keys):
             raise tree.error(f'a {kind} controller has no `{key}`', key)
-    settings, where = _settings(tree, kind)
+    settings, where = _settings(tree)
     if isinstance(rig, JointRig) and not law.wrapped:
         raise InputError(f'{rig.name} is a joint, which has no {kind} controller', tree.where())
     mode = read_mode(tree, rig, law.wrapped)
@@ -160,13 +159,9 @@ def _built(tree: Located, rig: 'JointRig | Rig | None', folder: str) -> Controll
     return controller if mode is None else mode.wrap(controller)
 
 
-def _settings(tree: Located, kind: str) -> tuple[dict[str, Any], Callable[..., str]]:
-    """Return the settings of a file as numbers, and what tells where each of them stands."""
+def _settings(tree: Located) -> tuple[dict[str, Any], Callable[..., str]]:
+    """Return the settings of a file, and what tells where each of them stands."""
     located = tree.get('settings', dict)
     if located is None:
         return {}, tree.where
-    settings = dict(located.plain())
-    if kind == 'sofc' and isinstance(settings.get('index_form'), str):
-        form = located.require('index_form', str, choices=INDEX_FORMS)
-        settings['index_form'] = float(INDEX_FORMS.index(form))
-    return settings, located.where
+    return dict(located.plain()), located.where

@@ -29,7 +29,7 @@ from pam_actuation.control.inputs import INPUT
 from pam_actuation.control.law_parts import (
     faded_offset, filtered_change, first_command_pa, held_offset, integral_growth, limited,
     settled_part)
-from pam_actuation.control.settings import checked_settings, parameter_record, setting
+from pam_actuation.control.settings import checked_settings, parameter_record, setting, switch
 from pam_actuation.control.static_inverse import inverse_pressure_pa
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import Compiled, compiled, entry_point, inlined, source_key
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 SETTINGS = (
     setting('rate_hz', 'Hz', 200.0, 20.0, 1000.0, 'control rate'),
     setting('lead_s', 's', 0.0, 0.0, 0.5, 'preview of the static inverse'),
-    setting('use_static_inverse', '-', 0.0, 0.0, 1.0, '1 = add the static inverse'),
+    switch('use_static_inverse', 0.0, ('no', 'yes'), 'whether the static inverse is added'),
     setting('proportional_pa_per_m', 'Pa/m', 2e6, 0.0, 5e7, 'proportional gain'),
     setting('integral_pa_per_m_s', 'Pa/(m s)', 2.5e7, 0.0, 1e9, 'integral gain'),
     setting('derivative_pa_s_per_m', 'Pa s/m', 1.5e5, 0.0, 5e6, 'derivative gain'),

@@ -15,8 +15,10 @@
 """Settings of a controller: named numbers with unit, default and allowed range."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from pam_sim.declared import shown
 from pam_sim.errors import InputError
 from pam_sim.parameters import check_parameters, Parameter
 from pam_sim.records import record
@@ -28,6 +30,45 @@ def setting(name: str, unit: str, default: float, lower: float, upper: float,
             description: str) -> Parameter:
     """Declare one number a controller can be given."""
     return Parameter(name, unit, default, lower, upper, description=description)
+
+
+@dataclass(frozen=True)
+class Switch(Parameter):
+    """
+    A setting that chooses: 0 the first of its ``choices``, 1 the second.
+
+    A file states the word or the number; the law gets the number.
+    """
+
+    @property
+    def allowed(self) -> str:
+        """Return numbers and words: ``0 or linear, 1 or table``."""
+        return ', '.join(f'{number} or {word}' for number, word in enumerate(self.choices))
+
+    def check(self, value: object, where: str = '') -> float:
+        """
+        Return the number of a choice.
+
+        Raises
+        ------
+        InputError
+            Neither a word nor a number of a choice.
+
+        """
+        if value in self.choices:
+            return float(self.choices.index(str(value)))
+        if isinstance(value, str):
+            raise InputError(f'`{self.name}` is {shown(value)}; allowed {self.allowed}', where)
+        number = super().check(value, where)
+        if not number.is_integer():
+            raise InputError(f'`{self.name}` is {number:g}; allowed {self.allowed}', where)
+        return number
+
+
+def switch(name: str, default: float, choices: tuple[str, ...], description: str) -> Parameter:
+    """Declare a setting that is one of some words, in the order of their numbers from 0."""
+    return Switch(name, '-', default, 0.0, len(choices) - 1.0, description=description,
+                  choices=choices)
 
 
 def parameter_record(

@@ -99,6 +99,6 @@ def _parameters(parameters: Sequence[Parameter], live: Collection[str] = ()) -> 
 def _settings(settings: Iterable[Parameter]) -> str:
     lines = [row(('setting', 'default', 'unit', 'allowed', 'meaning')), '|---|---|---|---|---|']
     lines += [row((f'`{one.name}`', f'`{one.default:g}`', escaped(one.unit.strip('-')),
-                   f'{one.lower:g} to {one.upper:g}', escaped(one.description)))
-              for one in settings]
+                   one.allowed if one.choices else f'{one.lower:g} to {one.upper:g}',
+                   escaped(one.description))) for one in settings]
     return '\n'.join(lines)

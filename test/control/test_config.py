@@ -20,6 +20,8 @@ import numpy as np
 from pam_actuation import warm_up
 from pam_actuation.control.config import load_controller
 from pam_actuation.control.laws import LAWS
+from pam_actuation.control.pid import SETTINGS as PID_SETTINGS
+from pam_actuation.control.sofc.settings import SETTINGS as SOFC_SETTINGS
 from pam_actuation.tuning.closed_loop import _rollout_of, ROLLOUTS
 from pam_actuation.tuning.problem import rebuild
 from pam_actuation.tuning.space import AXES_OF, default_axes
@@ -71,6 +73,34 @@ def test_mistakes_name_file_line_and_what_is_allowed(text, line, words, tmp_path
         load_controller(str(path), StraightRig())
     assert caught.value.where == f'{path}:{line}'
     assert words in str(caught.value)
+
+
+SWITCHES = [(kind, one) for kind, law in (('sofc', SOFC_SETTINGS), ('pid', PID_SETTINGS))
+            for one in law if one.choices]
+
+
+@pytest.mark.parametrize('kind, one', SWITCHES, ids=[one.name for _, one in SWITCHES])
+def test_a_switch_takes_its_words_and_numbers_and_nothing_between(kind, one, tmp_path):
+    path = tmp_path / 'mine.yaml'
+
+    def load(value):
+        path.write_text(f'controller: {kind}\nsettings:\n  {one.name}: {value}\n')
+        return load_controller(str(path), StraightRig())
+
+    for number, word in enumerate(one.choices):
+        assert load(word).settings[one.name] == load(number).settings[one.name] == number
+        assert load_controller(load(word).to_yaml()).settings[one.name] == number
+    for value in (0.3, 0.7, 2, -1, '.nan', 'round', 'true', "'1'", '[]'):
+        with pytest.raises(InputError) as caught:
+            load(value)
+        assert caught.value.where == f'{path}:3'
+        for number, word in enumerate(one.choices):
+            assert f'{number} or {word}' in str(caught.value)
+
+
+def test_the_settings_that_choose_are_switches():
+    assert {one.name for _, one in SWITCHES} == {
+        'index_form', 'membership_form', 'jump_form', 'jump_announced', 'use_static_inverse'}
 
 
 @pytest.mark.parametrize('kind', LAWS)

@@ -23,7 +23,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from pam_actuation.control.settings import parameter_record, setting
+from pam_actuation.control.controller_text import INDEX_FORMS
+from pam_actuation.control.settings import parameter_record, setting, switch
 from pam_actuation.control.sofc.path_memory import path_widths_m
 from pam_actuation.control.sofc.rule_text import MOST_SETS
 from pam_sim.annotations import FloatArray
@@ -45,8 +46,8 @@ SETTINGS = (
     setting('change_filter_s', 's', 0.02, 0.0, 0.5, 'low pass on the change of error'),
     setting('direction_blend_m', 'm', 3e-4, 1e-6, 0.1,
             'way after a reversal over which one direction takes over from the other'),
-    setting('index_form', '-', 0.0, 0.0, 1.0,
-            'performance index: 0 linear, 1 the 13-level table'),
+    switch('index_form', 0.0, INDEX_FORMS,
+           'performance index: linear, or the 13-level table'),
     setting('index_tau_s', 's', 0.06, 0.0, 2.0, 'wanted decay time of the error'),
     setting('index_limit_m', 'm', 2e-3, 1e-6, 0.1, 'bound of the performance index'),
     setting('dead_zone_m', 'm', 1e-5, 0.0, 0.01, 'no learning below this error'),
@@ -85,8 +86,8 @@ SETTINGS = (
     setting('motion_rate_upper_m_per_s', 'm/s', 0.12, 1e-3, 5.0, 'last rate of the motion rules'),
     setting('motion_rate_fine_m_per_s', 'm/s', 2e-3, 1e-5, 5.0,
             'rates below are spaced evenly, those above logarithmically'),
-    setting('membership_form', '-', 0.0, 0.0, 1.0,
-            'membership functions of error and change: 0 triangular, 1 Gaussian'),
+    switch('membership_form', 0.0, ('triangular', 'gaussian'),
+           'membership functions of error and change'),
     setting('membership_width', '-', 0.4, 0.2, 1.0,
             'standard deviation of a Gaussian set, in distances of two sets'),
     setting('valve_lag_s', 's', 0.0, 0.0, 0.5,
@@ -126,8 +127,8 @@ SETTINGS = (
     setting('slack_force_n', 'N', 1.0, -1.0, 1e3, 'force below which the muscle is slack'),
     setting('valve_gap_pa', 'Pa', 4e4, 1e3, 1e6,
             'expected minus measured pressure that freezes learning and integral'),
-    setting('jump_form', '-', 0.0, 0.0, 1.0,
-            'move made of a jump: 0 minimum jerk, 1 without jerk at its ends'),
+    switch('jump_form', 0.0, ('minimum_jerk', 'no_jerk_at_ends'),
+           'move made of a jump: of minimum jerk, or without jerk at its ends'),
     setting('jump_acceleration', '-', 0.0, 0.0, 1.0,
             'acceleration of such a move: 0 through acceleration_filter_s, 1 exactly'),
     setting('settling_passes', '-', 1.0, 0.0, 20.0,
@@ -143,8 +144,8 @@ SETTINGS = (
             'share with which the disturbance follows its residual while such a move lasts'),
     setting('jump_forgetting', '-', 0.0, 0.0, 10.0,
             'such a move leaves exp(-this) of the disturbance of the rest before it'),
-    setting('jump_announced', '-', 1.0, 0.0, 1.0,
-            'whether both hold after an announced jump too: 0 no, 1 yes'),
+    switch('jump_announced', 1.0, ('no', 'yes'),
+           'whether both hold after an announced jump too'),
     setting('path_sets', '-', 0.0, 0.0, float(MOST_SETS),
             'path rules: sets of the path, the first for any path; 0 = none'),
     setting('path_shortest_m', 'm', 1.4e-4, 1e-6, 0.1, 'shortest path they tell apart'),
