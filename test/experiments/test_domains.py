@@ -14,6 +14,7 @@
 
 """What experiments send in each domain, offline, and what a rig refuses."""
 
+import numpy as np
 from pam_actuation.bags.load import load_run
 from pam_actuation.control.config import load_controller
 from pam_actuation.control.modes.force_surface import highest_force_n
@@ -21,6 +22,7 @@ from pam_actuation.experiments import load_experiment, ReferenceLoop
 from pam_actuation.experiments.offline import simulate_experiment
 from pam_actuation.messages import ValveSignal
 import pam_sim
+from pam_sim import load_rig
 from pam_sim.errors import InputError
 import pytest
 
@@ -273,3 +275,20 @@ def test_a_controller_is_up_before_the_experiment_as_it_is_live(tmp_path):
     assert first - run.topics['controller_state'].stamp_ns[0] == 100 * MS
     before = run.topics['pressure_command']
     assert (before.values['pressure_pa'][before.stamp_ns < first] == 101_325.0).all()
+
+
+def test_less_load_at_constant_pressure_shortens_the_muscle(tmp_path):
+    """The second test of section 4.1: each load rests where the force map has it."""
+    rig = load_rig('dmsp_5_300_hanging_mass')
+    simulate_experiment(load_experiment('load_decrements'), rig, None, tmp_path / 'bag')
+    run = load_run(tmp_path / 'bag')
+    contraction, force = run['contraction'], run['force']
+    rests_m = []
+    for step in range(9):
+        at = run.start_ns + round((8.9 + 3.5 * step) * 1e9)         # the end of each hold
+        found = contraction.values['contraction_m'][np.searchsorted(contraction.stamp_ns, at)]
+        load_n = force.values['force_n'][np.searchsorted(force.stamp_ns, at)]
+        assert load_n == pytest.approx(5.0 * 9.80665 + 40.0 - 10.0 * step, abs=0.05)
+        assert found == pytest.approx(rig.static_contraction_m(601_325.0, load_n), abs=2e-5)
+        rests_m.append(found)
+    assert np.all(np.diff(rests_m) > 2e-3)
