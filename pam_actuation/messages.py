@@ -21,7 +21,7 @@ pressures absolute. ``stamp_ns`` is the ``header.stamp``: the time of the measur
 nanoseconds.
 """
 
-from collections.abc import Iterable
+from collections.abc import Collection
 from dataclasses import dataclass, make_dataclass
 import math
 from typing import Protocol
@@ -33,7 +33,7 @@ VALVE_NAMES = {'ppr': ('ppr_voltage',), 'hsv': ('fill_duty', 'vent_duty')}
 SAFE_EFFORTS = {'ppr': (0.0,), 'hsv': (0.0, 1.0)}
 
 
-def valve_of(names: Iterable[str]) -> str:
+def valve_of(names: Collection[str]) -> str:
     """Return 'ppr' or 'hsv' by the names of the efforts of a valve signal, '' for others."""
     for valve, own in VALVE_NAMES.items():
         if names == own:        # as nearly always; sets take longer

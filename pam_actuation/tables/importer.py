@@ -79,8 +79,7 @@ class Recording:
     @property
     def valve(self) -> str:
         """Return 'ppr' or 'hsv' by the valve signals, '' without any."""
-        return messages.valve_of(
-            own for names in of_muscles(self.signals).values() for own in names)
+        return messages.valve_of(set().union(*of_muscles(self.signals).values()))
 
     @property
     def is_of_joint(self) -> bool:

@@ -14,6 +14,8 @@
 
 """What stands over a column: name and unit in several forms and languages."""
 
+import json
+
 import numpy as np
 from pam_actuation.bags.load import load_run
 from pam_actuation.cli.main import main
@@ -127,3 +129,18 @@ def test_either_of_two_signals_is_answered_at_a_terminal(tmp_path, monkeypatch, 
     assert main(['import', 'm.csv', '--out', 'bag']) == 0
     assert "'bar_gauge' is not one of them" in capsys.readouterr().out
     assert load_run('bag')['pressure']['pressure_pa'].max() == pytest.approx(501_325.0, rel=1e-3)
+
+
+def test_duties_are_the_command_of_the_valve(tmp_path, monkeypatch, capsys):
+    """Output, --json and bag of an import of duties say that the valves are on/off."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'm.csv').write_text('t in s,p [bar(g)],x in mm,fill_duty,vent_duty\n' + ''.join(
+        f'{0.01 * k:.2f},{p:.4f},{3.0 * p:.4f},{0.25 * p:.4f},{1.0 - 0.25 * p:.4f}\n'
+        for k, p in enumerate(WAVE)))
+    main(['import', 'm.csv', '--map', 'fill_duty=fill_duty:1', '--map', 'vent_duty=vent_duty:1',
+          '--out', 'bag', '--json'])
+    assert json.loads(capsys.readouterr().out)['valve'] == 'hsv'
+    assert load_run('bag').metadata['valve'] == 'hsv'
+    main(['import', 'm.csv', '--map', 'fill_duty=fill_duty:1', '--map', 'vent_duty=vent_duty:1',
+          '--out', 'again'])
+    assert 'no command of the valve' not in capsys.readouterr().out
