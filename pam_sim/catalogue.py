@@ -18,7 +18,7 @@ Everything the simulator knows, as plain data: laws, muscles, valves, loads, eff
 Read from the registries when asked, so that what is added there is listed here.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 import sys
 from types import ModuleType
@@ -77,7 +77,7 @@ def catalogue() -> list[dict[str, Any]]:
     ]
 
 
-def find(entries: Iterable[dict[str, Any]], name: str) -> list[dict[str, Any]]:
+def find(entries: Collection[dict[str, Any]], name: str) -> list[dict[str, Any]]:
     """
     Return the entries of a name.
 

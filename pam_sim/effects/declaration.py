@@ -14,7 +14,7 @@
 
 """What an effect file declares is checked when it is read, so that no search fails of it."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 import math
 from typing import TYPE_CHECKING
 
@@ -47,7 +47,7 @@ def check_declaration(effect: 'Effect') -> None:
         raise InputError(f'effect `{effect.name}` {problem}')
 
 
-def check_names(effect: 'Effect', found: Mapping[str, 'Effect'], of_rig: Iterable[str],
+def check_names(effect: 'Effect', found: Mapping[str, 'Effect'], of_rig: Collection[str],
                 where: str) -> None:
     """
     Refuse an effect that names other effects, or numbers of a rig, that there are not.

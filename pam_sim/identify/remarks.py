@@ -14,7 +14,7 @@
 
 """What is said beside the numbers that were identified, a sentence each."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Sequence
 import math
 
 from pam_sim.gap.criteria import CRITERIA
@@ -32,7 +32,7 @@ Squares = list[tuple[SubsystemProblem, str, float]]
 
 
 def remarks_on(rig: Rig, problems: Sequence[SubsystemProblem], wanted: Sequence[Number],
-               found: Sequence[Found], left: Squares, at_rest: Iterable[str]) -> list[str]:
+               found: Sequence[Found], left: Squares, at_rest: Collection[str]) -> list[str]:
     """
     Return what weakens the numbers, and what none of the recordings shows.
 

@@ -14,7 +14,7 @@
 
 """How the signals of a protocol answer to numbers and effects, before measuring."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 import math
 
@@ -137,7 +137,7 @@ class Sensitivities:
 
     """
 
-    def __init__(self, rig: Rig, recording: Recording, only: Iterable[str] | None = None,
+    def __init__(self, rig: Rig, recording: Recording, only: Collection[str] | None = None,
                  criteria: Criteria = CRITERIA) -> None:
         self.rig, self.criteria = rig, criteria
         self.problems = subsystem_problems(rig, [recording], holds_certify=False)

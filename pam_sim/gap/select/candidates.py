@@ -53,7 +53,7 @@ def is_limit_at(candidate: Candidate, values: Mapping[str, float]) -> bool:
     return turned is not None and turned(values)
 
 
-def candidates(rig: Rig, outputs: Sequence[str], only: Iterable[str] | None = None,
+def candidates(rig: Rig, outputs: Sequence[str], only: Collection[str] | None = None,
                supply_stands: bool = False) -> list[Candidate]:
     """
     Return the candidates that can show on a rig.
@@ -116,7 +116,7 @@ def why_not(name: str, rig: Rig, outputs: Sequence[str], supply_stands: bool = F
     return ''
 
 
-def left_out(only: Iterable[str] | None, pool: Collection[Candidate], rig: Rig,
+def left_out(only: Collection[str] | None, pool: Collection[Candidate], rig: Rig,
              outputs: Sequence[str], supply_stands: bool = False) -> list[str]:
     """
     Return a sentence for every name asked for that is not tried, with the reason.
@@ -182,7 +182,7 @@ def relatives(rig: Rig, outputs: Sequence[str], name: str) -> list[Candidate]:
         effect.name for effect in effects().values() if name in effect.relative_of])
 
 
-def split_refinements(pool: Iterable[Candidate]) -> tuple[list[Candidate], list[Candidate]]:
+def split_refinements(pool: Collection[Candidate]) -> tuple[list[Candidate], list[Candidate]]:
     """
     Return (candidates to begin with, refinements of some of them).
 
