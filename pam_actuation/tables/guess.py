@@ -164,7 +164,7 @@ def _of_lengths(tables: Collection[Table], mapping: TableMapping, missing: Colle
 def _chosen(name: str, candidates: dict[str, tuple[ColumnMap, str] | Question]
             ) -> tuple[ColumnMap, str] | Question:
     """Return the one column that is a signal, or the question which of several is."""
-    exported = [one for column, one in candidates.items() if _is_exported(column, BY_NAME[name])]
+    exported = [one for column, one in candidates.items() if is_exported(column, BY_NAME[name])]
     measured = {column: one for column, one in candidates.items() if not _is_output(one)}
     candidates = measured or candidates
     if exported or len(candidates) == 1:
@@ -231,7 +231,7 @@ def _heading_of(table: Table, column: str) -> Heading:
 
 def _signals_of(table: Table, column: str) -> list[Signal]:
     """Return the signals that a column may be by its name and unit; two where that is open."""
-    exported = next((one for one in BY_NAME.values() if _is_exported(
+    exported = next((one for one in BY_NAME.values() if is_exported(
         _name_of(table, column), one)), None)
     if exported is not None:
         return [exported]
@@ -246,7 +246,7 @@ def _signals_of(table: Table, column: str) -> list[Signal]:
     return []
 
 
-def _is_exported(column: str, signal: Signal) -> bool:
+def is_exported(column: str, signal: Signal) -> bool:
     """Return whether a column has the name that ``pam export`` gives a signal; it is in SI."""
     name = f'{signal.topic}.{signal.field}'
     # As a MAT file and an HDF5 file have it.
@@ -256,7 +256,7 @@ def _is_exported(column: str, signal: Signal) -> bool:
 def _of_column(table: Table, column: str, signal: Signal, missing: Collection[str]
                ) -> tuple[ColumnMap, str] | Question | None:
     """Return what a column is and why, a question, or None for one that is another quantity."""
-    if _is_exported(column, signal):
+    if is_exported(column, signal):
         si = si_unit(signal.quantity)
         return ColumnMap(column, si), f'unit {si.name} by name'
     text = unit_of_column(table, column)

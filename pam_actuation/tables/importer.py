@@ -29,7 +29,7 @@ from pam_actuation.bags.writer import BagWriter
 from pam_actuation.messages import START_NS, VALVE_NAMES
 from pam_actuation.namespaces import JOINT, MUSCLE, namespace_of
 from pam_actuation.tables.clock import clock_of
-from pam_actuation.tables.guess import unit_of_column
+from pam_actuation.tables.guess import is_exported, unit_of_column
 from pam_actuation.tables.lengths import size_of_mapping
 from pam_actuation.tables.mapping import TableMapping
 from pam_actuation.tables.plausible import Doubt, doubts
@@ -153,13 +153,20 @@ def recording_of(tables: Sequence[Table], mapping: TableMapping, *, size: Size,
         result.found += _without_gain(table, mapping, held)
         for name, column in held.items():
             values = mapping.signals[name].to_si(table.numbers(column, missing)[clock.rows])
-            pieces.setdefault(name, []).append((clock.stamp_ns, values, table.source))
+            pieces.setdefault(name, []).append((*_said(
+                clock.stamp_ns, values, is_exported(column, BY_NAME[name])), table.source))
     for name, one in mapping.signals.items():
         if name not in pieces:
             raise InputError(no_column_in(tables, one.column), one.where or name)
         result.signals[name] = _joined(name, pieces[name])
     _check(result, size, accept)
     return result
+
+
+def _said(stamp_ns: IntArray, values: FloatArray, exported: bool) -> tuple[IntArray, FloatArray]:
+    """Return the stamps at which a topic has a message, and its values there."""
+    there = np.isfinite(values)     # ``pam export`` leaves the rows of other topics empty
+    return (stamp_ns[there], values[there]) if exported and there.any() else (stamp_ns, values)
 
 
 def _without_gain(table: Table, mapping: TableMapping, held: Mapping[str, str]) -> list[Doubt]:

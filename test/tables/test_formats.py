@@ -62,10 +62,10 @@ def bag(tmp_path_factory):
 def test_export_and_import_are_inverse(bag, tmp_path, ending, capsys):
     table = str(tmp_path / f'table.{ending}')
     assert main(['export', str(bag), '--out', table]) == 0
-    code = main(['import', table, '--out', str(tmp_path / 'back')])
+    # A topic with another rate leaves rows empty, and no value is missing.
+    assert main(['import', table, '--out', str(tmp_path / 'back')]) == 0
     said = capsys.readouterr().out
-    # Where a topic has no message the table is empty, which is said.
-    assert code == 1 and '100 of 200 values are missing' in said
+    assert 'missing' not in said and 'by name), 100 values' in said
     first, second = load_run(bag), load_run(tmp_path / 'back')
     assert set(first.topics) == set(second.topics)
     for name, series in first.topics.items():
@@ -77,7 +77,7 @@ def test_export_and_import_are_inverse(bag, tmp_path, ending, capsys):
 def test_a_workbook_keeps_stamps_and_fifteen_digits(bag, tmp_path):
     table = str(tmp_path / 'table.xlsx')
     assert main(['export', str(bag), '--out', table]) == 0
-    assert main(['import', table, '--out', str(tmp_path / 'back')]) == 1
+    assert main(['import', table, '--out', str(tmp_path / 'back')]) == 0
     first, second = load_run(bag), load_run(tmp_path / 'back')
     for name, series in first.topics.items():
         np.testing.assert_array_equal(second[name].stamp_ns, series.stamp_ns)
