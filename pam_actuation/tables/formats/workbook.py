@@ -17,6 +17,7 @@ from collections.abc import Callable, Collection
 from datetime import date, datetime, time
 from functools import partial
 import io
+import math
 from typing import Any, TYPE_CHECKING
 import zipfile
 
@@ -68,7 +69,8 @@ def _as_text(sheet: Any) -> bytes:
     first, last = min(used), max(used)
     while rows and not any(rows[-1]):
         rows.pop()
-    return ''.join('\t'.join(row[first:last + 1]) + '\n' for row in rows).encode()
+    short = [''] * last                 # a row may end with its last cell that is not empty
+    return ''.join('\t'.join((row + short)[first:last + 1]) + '\n' for row in rows).encode()
 
 
 def _cell(value: Any) -> str:
@@ -83,12 +85,28 @@ def _cell(value: Any) -> str:
 
 
 def write(frame: 'pd.DataFrame', path: str) -> None:
-    """Write a data frame as the one sheet of a workbook."""
-    needs('openpyxl', 'openpyxl', 'an Excel file')
+    """Write a data frame as the one sheet of a workbook, numbers to their last bit."""
+    openpyxl = needs('openpyxl', 'openpyxl', 'an Excel file')
     most = 1_048_575                # rows of a sheet below the names
     if len(frame) > most:
         raise InputError(f'has {len(frame)} rows; a sheet holds {most}. Export fewer with '
                          '--rate, or another kind of file', path)
+    book = openpyxl.Workbook(write_only=True)
+    sheet = book.create_sheet('Sheet1')
+    number = partial(_number, openpyxl.cell.WriteOnlyCell, sheet)
+    sheet.append([str(name) for name in frame.columns])
     # Whole numbers beyond 2^53 would lose digits in a spreadsheet: stamps go as texts.
-    frame.astype({name: str for name in frame.columns if frame[name].dtype.kind in 'iu'}
-                 ).to_excel(path, index=False, engine='openpyxl')
+    columns = [map(number if frame[name].dtype.kind == 'f' else str, frame[name].tolist())
+               for name in frame.columns]
+    for row in zip(*columns):
+        sheet.append(row)
+    book.save(path)
+
+
+def _number(cell_of: Callable[[Any, str], Any], sheet: Any, value: float) -> Any:
+    """Return a cell that holds all digits of a number; openpyxl writes 16 of a float."""
+    if not math.isfinite(value):
+        return None
+    cell = cell_of(sheet, repr(value))
+    cell.data_type = 'n'
+    return cell
