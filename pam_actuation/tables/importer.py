@@ -33,9 +33,9 @@ from pam_actuation.tables.guess import is_exported, unit_of_column
 from pam_actuation.tables.lengths import size_of_mapping
 from pam_actuation.tables.mapping import TableMapping
 from pam_actuation.tables.plausible import Doubt, doubts
-from pam_actuation.tables.signals import are_of_joint, BY_NAME, of_muscles
+from pam_actuation.tables.signals import are_of_joint, BY_NAME, of_muscles, Signal
 from pam_actuation.tables.table import no_column_in, Table
-from pam_actuation.tables.units import of_output
+from pam_actuation.tables.units import ANGLE, LENGTH, of_output
 from pam_actuation.tables.words import unit_in
 from pam_actuation.topics.contents import Make
 from pam_actuation.topics.table import topic_of
@@ -203,6 +203,7 @@ def _check(result: Recording, size: Size, accept: bool) -> None:
                          'angle="COLUMN:deg"', '--map')
     for place, names in of_muscles(result.signals).items():
         _check_muscle(place, names, result.is_of_joint)
+    _check_rates([BY_NAME[name] for name in result.signals])
     found = doubts(result.signals, result.mapping.signals, size)
     wrong = next((one for one in found if one.is_wrong), None)
     if wrong is not None and not accept:
@@ -225,6 +226,17 @@ def _check_muscle(place: str, names: set[str], is_joint: bool) -> None:
         other, = {*VALVE_NAMES['hsv']} - duties
         raise InputError(f'{place}{duties.pop()} is mapped, {place}{other} is not; a valve signal '
                          'has both', '--map')
+
+
+def _check_rates(signals: Sequence[Signal]) -> None:
+    """Raise InputError where a rate has no position beside it."""
+    for one in signals:
+        if one.is_rate and not any(
+                other.topic == one.topic and other.quantity in (LENGTH, ANGLE)
+                for other in signals):
+            position, _, _ = one.name.rpartition('_')
+            raise InputError(f'{one.name} is mapped, {position} is not; a message with a rate '
+                             'has both', '--map')
 
 
 def write_bag(recording: Recording, path: StrPath, *, rig: Any = None, namespace: str = '',
@@ -301,18 +313,20 @@ def _streams(signals: Mapping[str, tuple[IntArray, FloatArray]]) -> list[_Stream
     streams = []
     for name in dict.fromkeys(signal.topic for signal in BY_NAME.values()):
         topic = topic_of(name)
-        held = [(signal.field, *signals[signal.name]) for signal in BY_NAME.values()
+        held = [signal for signal in BY_NAME.values()
                 if signal.topic == name and signal.name in signals]
         if not held or topic.numeric is None:
             continue
-        said = [(stamps[np.isfinite(values)], values[np.isfinite(values)])
-                for _, stamps, values in held]
-        stamps = np.unique(np.concatenate([own for own, _ in said]))
+        said = [(one[np.isfinite(values)], values[np.isfinite(values)])
+                for one, values in (signals[signal.name] for signal in held)]
+        stamps = np.unique(np.concatenate([
+            own for signal, (own, _) in zip(held, said) if not signal.is_rate]))
         values = np.full((len(stamps), len(said)), np.nan)
         for column, (own, finite) in enumerate(said):
-            values[np.searchsorted(stamps, own), column] = finite
+            there = np.isin(own, stamps)
+            values[np.searchsorted(stamps, own[there]), column] = finite[there]
         streams.append(_Stream(name, stamps, values, topic.numeric.maker(
-            tuple(field for field, *_ in held))))
+            tuple(signal.field for signal in held))))
     return streams
 
 

@@ -282,4 +282,4 @@ def _number(text: str, key: str, where: str) -> float:
 def usual_unit(quantity: str) -> str:
     """Return the unit in which most programs write a quantity."""
     return {'pressure': 'kPa_gauge', 'length': 'mm', 'force': 'N', 'voltage': 'V',
-            'duty': '1', 'angle': 'deg'}[quantity]
+            'duty': '1', 'angle': 'deg', 'speed': 'mm/s', 'angular rate': 'deg/s'}[quantity]

@@ -169,7 +169,7 @@ def _of_values(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Size
     no_gauge = GAUGE_HINT if mapped.unit.name.endswith(GAUGE) else ''
     found = [Doubt(one.sentence.partition(': ')[2].removesuffix(no_hint).removesuffix(
         no_gauge).rstrip('.') + _longer(signal, finite, size)) for one in wrong]
-    if finite.min() == finite.max():
+    if finite.min() == finite.max() and not signal.is_rate:
         return [*found, Doubt(f'the value never changes ({_shown(signal, float(finite.min()))}): '
                               'is the sensor connected?')]
     looks = (_hardly_moves, _pulls_much, _pushes, _moves_no_muscle, _gauge_or_absolute,

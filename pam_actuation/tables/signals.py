@@ -24,7 +24,8 @@ from dataclasses import dataclass, replace
 import re
 
 from pam_actuation.tables.parts import name_of_parts, quantities_of
-from pam_actuation.tables.units import ANGLE, DUTY, FORCE, LENGTH, PRESSURE, VOLTAGE
+from pam_actuation.tables.units import (
+    ANGLE, DUTY, FORCE, LENGTH, PRESSURE, RATE, SPEED, VOLTAGE)
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.joint.parameters import SIDES
 
@@ -56,11 +57,17 @@ class Signal:
     words: str
     meaning: str
 
+    @property
+    def is_rate(self) -> bool:
+        """Return whether it stands beside a position in one message, which may lack it."""
+        return self.quantity in (SPEED, RATE)
+
     def is_named(self, words: str) -> bool:
         """Return whether the words of a column's name, in lower case, are those of the signal."""
         return re.fullmatch(self.words, words) is not None
 
 
+_NO_WORDS = r'(?!)'                 # known by the name of an export, or stated
 # Of two that fit a name the first counts.
 SIGNALS = (
     Signal('supply_pressure', 'supply_pressure', 'pressure_pa', PRESSURE,
@@ -102,6 +109,10 @@ SIGNALS = (
            r'(ppr|(prop(ortional)? )?(valve|regulator)|command|control|analog out|dac|'
            r'ao) ?(voltage|volt|v|signal|u|cmd|command|set ?point|input)|'
            r'voltage ?(ppr|valve|cmd|command|out)?', 'voltage to the regulator'),
+    Signal('contraction_velocity', 'contraction', 'velocity_m_per_s', SPEED, _NO_WORDS,
+           'rate of the contraction'),
+    Signal('reference_velocity', 'reference', 'velocity_m_per_s', SPEED, _NO_WORDS,
+           'rate of the wanted contraction'),
 )
 ANGLES = (
     Signal('reference_angle', 'joint_reference', 'angle_rad', ANGLE,
@@ -110,11 +121,13 @@ ANGLES = (
            'wanted angle'),
     Signal('angle', 'joint_state', 'angle_rad', ANGLE,
            r'(joint |knee |elbow |ankle |hip |measured |actual )?(angle|theta|phi|q)'
-           r' ?(1|is|ist|act|actual|meas|measured|joint|knee)?', 'angle of the joint'))
+           r' ?(1|is|ist|act|actual|meas|measured|joint|knee)?', 'angle of the joint'),
+    Signal('reference_angle_rate', 'joint_reference', 'rate_rad_per_s', RATE, _NO_WORDS,
+           'rate of the wanted angle'))
 JOINT_SIGNALS = (*ANGLES, *(
     replace(one, name=f'{side}/{one.name}', topic=f'{side}/{one.topic}',
             meaning=f'{one.meaning}, {side}')
-    for side in SIDES for one in SIGNALS if one.name not in ('reference', 'reference_force')))
+    for side in SIDES for one in SIGNALS if one.topic != 'reference'))
 BY_NAME = {signal.name: signal for signal in (*SIGNALS, *JOINT_SIGNALS)}
 ALLOWED = (f'{", ".join(one.name for one in SIGNALS)}; of a joint '
            f'{" and ".join(one.name for one in ANGLES)}, and those of a muscle after '

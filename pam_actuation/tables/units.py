@@ -22,8 +22,8 @@ from pam_sim.annotations import FloatArray
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.units import P_ATM_PA
 
-PRESSURE, LENGTH, FORCE, VOLTAGE, DUTY, ANGLE, TIME = (
-    'pressure', 'length', 'force', 'voltage', 'duty', 'angle', 'time')
+PRESSURE, LENGTH, FORCE, VOLTAGE, DUTY, ANGLE, TIME, SPEED, RATE = (
+    'pressure', 'length', 'force', 'voltage', 'duty', 'angle', 'time', 'speed', 'angular rate')
 # Size of one unit in SI, by quantity. psi, lbf, kgf, mmHg, in: exact or as NIST SP 811 has them.
 FACTORS: dict[str, dict[str, float]] = {
     PRESSURE: {'Pa': 1.0, 'hPa': 1e2, 'mbar': 1e2, 'kPa': 1e3, 'bar': 1e5, 'MPa': 1e6,
@@ -35,6 +35,8 @@ FACTORS: dict[str, dict[str, float]] = {
     VOLTAGE: {'V': 1.0, 'mV': 1e-3},
     DUTY: {'1': 1.0, '%': 1e-2},
     ANGLE: {'rad': 1.0, 'mrad': 1e-3, 'deg': math.pi / 180.0},
+    SPEED: {'m/s': 1.0, 'cm/s': 1e-2, 'mm/s': 1e-3},
+    RATE: {'rad/s': 1.0, 'deg/s': math.pi / 180.0},
     TIME: {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'min': 60.0, 'h': 3600.0}}
 GAUGE, ABSOLUTE = 'gauge', 'abs'
 DATE = 'date'                       # of a time: text such as 2026-11-25T09:30:00.125
@@ -70,7 +72,8 @@ _OTHER_STEPS = set("""
 _RANGE = re.compile(r'[\s.]+(dc|fs|fso|f\.s\.?|rms|of (range|full scale|span))$', re.IGNORECASE)
 # What is left to be filled in, in the answer to a question.
 ZERO, GAIN = 'ZERO', 'GAIN'
-_FILLED = {PRESSURE: 'bar_gauge', LENGTH: 'mm', FORCE: 'N', ANGLE: 'deg', VOLTAGE: 'V', DUTY: '%'}
+_FILLED = {PRESSURE: 'bar_gauge', LENGTH: 'mm', FORCE: 'N', ANGLE: 'deg', VOLTAGE: 'V', DUTY: '%',
+           SPEED: 'mm/s', RATE: 'deg/s'}
 
 
 @dataclass(frozen=True)
@@ -139,7 +142,7 @@ def checked_unit(text: str, quantity: str, where: str) -> Unit:
     unit = unit_of_text(text, quantity)
     if unit is None:
         names = names_of(quantity)
-        article = 'an' if quantity == ANGLE else 'a'
+        article = 'an' if quantity[0] == 'a' else 'a'
         raise InputError(
             f'{text!r} is no unit of {article} {quantity}'
             + (f'; {said}' if (said := of_output(text, quantity)) else did_you_mean(text, names))

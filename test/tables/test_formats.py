@@ -52,6 +52,7 @@ def bag(tmp_path_factory):
             if number % 2:
                 said['contraction'] = messages.Contraction(stamp_ns, 0.01 + 1e-3 * noise.normal())
                 said['force'] = messages.Force(stamp_ns, 40.0 + noise.normal())
+                said['reference'] = messages.Reference(stamp_ns, *(0.01 * noise.uniform(size=2)))
             for name, message in said.items():
                 writer.add_topic(f'/muscle/{name}', topic_of(name).type_name)
                 writer.write(f'/muscle/{name}', encode(name, message), stamp_ns, stamp_ns)
@@ -78,6 +79,20 @@ def test_export_and_import_are_inverse(bag, tmp_path, ending, capsys):
 def test_what_another_program_alone_writes_is_read_only(bag, tmp_path, ending, capsys):
     assert main(['export', str(bag), '--out', str(tmp_path / f'table.{ending}')]) == 2
     assert f"the ending '.{ending}' is unknown; allowed: .csv, .tsv" in capsys.readouterr().err
+
+
+def test_a_rate_stands_beside_its_position(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'm.csv').write_text('t_s,x [mm],ref [mm],v ref [mm/s]\n' + ''.join(
+        f'{0.01 * k:.2f},{k % 7},{k % 9},{"" if k % 2 else k % 5}\n' for k in range(100)))
+    call = ['import', 'm.csv', '--map', 'reference_velocity=v ref [mm/s]:mm/s', '--out']
+    main([*call, 'bag'])
+    series = load_run('bag')['reference']
+    assert len(series) == 100 and np.isnan(series['velocity_m_per_s'][1])
+    np.testing.assert_allclose(series['velocity_m_per_s'][::2], 1e-3 * (np.arange(0, 100, 2) % 5))
+    capsys.readouterr()
+    assert main([*call, 'other', '--leave-out', 'ref [mm]']) == 2
+    assert 'reference_velocity is mapped, reference is not' in capsys.readouterr().err
 
 
 def test_the_same_table_gives_the_same_bag(bag, tmp_path):
