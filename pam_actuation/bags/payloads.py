@@ -77,6 +77,13 @@ class Payloads:
             self._parts.append((first + self._count, moved, rows))
         self._count += len(other)
 
+    def placed(self, places: IntArray) -> 'Payloads':
+        """Return the messages in another order: number i of these at ``places[i]``."""
+        moved = Payloads()
+        moved._parts = [(0, places[indices], rows) for indices, rows in self.tables()]
+        moved._count = self._count
+        return moved
+
     def tables(self) -> Iterator[tuple[IntArray, ByteArray]]:
         """
         Iterate over tables of messages of one length: pairs (indices, rows).

@@ -151,7 +151,7 @@ def topic_remarks(topic: 'TopicData', info: 'TopicInfo', stamp_ns: IntArray,
     info : TopicInfo
         Its rate, gaps and stamp counts.
     stamp_ns : ndarray of int64
-        Header stamps in file order.
+        Header stamps by log time.
     values : dict of str to ndarray
         SI values; empty for topics that are not a rig's.
     size_of : callable, optional
@@ -305,7 +305,7 @@ def value_findings(topic: str, name: str, column: FloatArray,
     name : str
         Of the value, with its unit, such as ``pressure_pa``.
     column : ndarray
-        As read, in file order or by stamp.
+        As read, by log time or by stamp.
     size_of : callable, optional
         Gives the Size of the muscle; asked only where it matters.
 

@@ -64,9 +64,10 @@ def _no_times() -> IntArray:
 @dataclass
 class TopicData:
     """
-    The N messages of one topic as bytes, in file order, with their times [ns], shape (N,).
+    The N messages of one topic as bytes, by log time, with their times [ns], shape (N,).
 
-    ``recorded_name`` is its name in the file, which may be another one.
+    Those of one log time are in file order. ``recorded_name`` is its name in the file, which may
+    be another one.
     """
 
     name: str
@@ -298,6 +299,11 @@ def _join(topic: TopicData, pieces: Sequence[MessageColumns]) -> None:
     topic.payloads = unpacked_messages(topic.payloads)
     topic.log_time_ns = joined([messages.log_time_ns for messages in pieces])
     topic.publish_time_ns = joined([messages.publish_time_ns for messages in pieces])
+    if (np.diff(topic.log_time_ns) < 0).any():      # files may hold messages in any order
+        order = np.argsort(topic.log_time_ns, kind='stable')
+        topic.payloads = topic.payloads.placed(np.argsort(order))
+        topic.log_time_ns, topic.publish_time_ns = (
+            times[order] for times in (topic.log_time_ns, topic.publish_time_ns))
 
 
 def _full_type_name(name: str) -> str:

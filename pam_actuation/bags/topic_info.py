@@ -88,7 +88,7 @@ def topic_info(topic: TopicData,
 
 def _stamps_and_values(topic: TopicData,
                        remarks: list[str]) -> tuple[IntArray, dict[str, FloatArray]]:
-    """Return header stamps in file order (receive times if these tell more) and values."""
+    """Return header stamps by log time (receive times if these tell more) and values."""
     short = short_name(topic.name)
     row = BY_NAME.get(short)
     if row is not None and row.numeric is not None and is_joint_topic(topic):

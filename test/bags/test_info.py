@@ -24,6 +24,7 @@ from pam_actuation.bags.info import bag_info, render_text
 from pam_actuation.bags.metadata import experiment_metadata, UNITS
 from pam_actuation.bags.recorder import RecorderCore
 from pam_actuation.bags.renamed import may_be, may_be_in
+from pam_actuation.bags.source import read_bag
 from pam_actuation.bags.writer import BagWriter
 from pam_actuation.cli.main import main
 from pam_actuation.topics import codec
@@ -354,6 +355,20 @@ def test_stamps_that_cannot_be_true(tmp_path):
     assert said(slow, '/muscle/pressure', 'goes back 29 times')
     frozen = bag_info(write_bag(tmp_path / 'd', 30, change=restamped(lambda i: -i * STEP_NS)))
     assert said(frozen, '/muscle/pressure', '29 messages repeat')
+
+
+def test_messages_stored_in_any_order_are_read_by_log_time(tmp_path):
+    """As an SQLite bag and all readers of MCAP deliver them."""
+    stamps = START_NS + STEP_NS * np.random.default_rng(0).permutation(60)
+    with BagWriter(tmp_path / 'run', {}) as writer:
+        writer.add_topic('/muscle/pressure', BY_NAME['pressure'].type_name)
+        for stamp_ns in stamps.tolist():
+            raw = codec.encode('pressure', messages.Pressure(stamp_ns, 2e5 + stamp_ns % 1000))
+            writer.write('/muscle/pressure', raw, stamp_ns + 1000, stamp_ns)
+    topic = read_bag(tmp_path / 'run').topics['/muscle/pressure']
+    sent_ns = [codec.decode('pressure', raw).stamp_ns for raw in topic.payloads]
+    assert sent_ns == sorted(stamps) == topic.publish_time_ns.tolist()
+    assert not said(bag_info(tmp_path / 'run'), '/muscle/pressure', 'goes back')
 
 
 def test_slow_and_missing_topics(tmp_path):
