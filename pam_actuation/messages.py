@@ -192,6 +192,7 @@ class ControllerState:
     values: tuple[float, ...]
 
 
+HARDWARE_ID = 'pam_actuation'       # of a status: who speaks
 LEVEL_OK, LEVEL_WARN, LEVEL_ERROR, LEVEL_STALE = 0, 1, 2, 3      # of a status
 # Of a status: a node that waits to be activated, and one that has not ticked since.
 CONFIGURED, ACTIVE, DEACTIVATED = 'configured, not active', 'active', 'deactivated'

@@ -41,7 +41,7 @@ from pam_actuation.experiments.reference import ReferenceLoop
 from pam_actuation.loops.bus import Bus, every
 from pam_actuation.loops.wiring import (
     attach, attach_plant, controller_tick, driver_tick, reference_tick)
-from pam_actuation.messages import LEVEL_OK, START_NS, Status
+from pam_actuation.messages import HARDWARE_ID, LEVEL_OK, START_NS, Status
 from pam_actuation.namespaces import JOINT, MUSCLE
 from pam_actuation.plant_loop import PlantLoop
 from pam_sim.errors import InputError
@@ -104,10 +104,10 @@ class _Loops:
         level, _ = driver.state()
         if now_ns - told_ns >= STATUS_EVERY_NS or level != told_level:
             self._told[place], status = (now_ns, level), driver.status()
-            self._recorder.write(
-                'diagnostics', replace(status, name=f'{place}{status.name}'), now_ns)
-            self.watch.hear([replace(
-                status, name=f'{self._recorder.namespace}/{place}{status.name}')])
+            named = replace(status, name=f'{self._recorder.namespace}/{place}{status.name}',
+                            hardware_id=HARDWARE_ID)
+            self._recorder.write('diagnostics', named, now_ns)
+            self.watch.hear([named])
 
     def say(self, word: str, elapsed_s: float) -> None:
         """Tell the watch of the run how far the reference is, as a live reference does."""
@@ -259,5 +259,5 @@ def _recorded(loops: _Loops, recorder: MessageWriter, experiment: 'Experiment',
                       for name, count in recorder.bag.counts.items()
                       if not name.endswith('/diagnostics'))
     recorder.write('diagnostics', Status(
-        end, 0, f'{recorder.namespace}/simulation', said, published), end)
+        end, 0, f'{recorder.namespace}/simulation', said, published, HARDWARE_ID), end)
     return loops.watch.ending(experiment.duration_s, told)

@@ -26,7 +26,8 @@ from collections.abc import Callable
 import re
 from typing import Any, TYPE_CHECKING
 
-from pam_actuation.messages import LEVEL_ERROR, LEVEL_OK, LEVEL_STALE, LEVEL_WARN, Status
+from pam_actuation.messages import (
+    HARDWARE_ID, LEVEL_ERROR, LEVEL_OK, LEVEL_STALE, LEVEL_WARN, Status)
 from pam_actuation.nodes.console import Console
 from pam_actuation.nodes.endpoints import CountedPublisher
 from pam_actuation.nodes.ros_messages import class_of
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
     from pam_actuation.nodes.managed import ManagedNode
 
 Values = tuple[tuple[str, Any], ...]       # of a status: keys, and what becomes a text
-TOPIC, HARDWARE_ID = '/diagnostics', 'pam_actuation'
+TOPIC = '/diagnostics'
 OK, WARN, ERROR, STALE = LEVEL_OK, LEVEL_WARN, LEVEL_ERROR, LEVEL_STALE
 WORDS = {OK: 'INFO', WARN: 'WARN', ERROR: 'ERROR', STALE: 'WARN'}     # of the logger of ROS
 DIGITS = re.compile('[0-9]+')
