@@ -213,10 +213,13 @@ def load_setup(args: argparse.Namespace) -> 'tuple[Experiment, Any, Any]':
 
 def tell_remarks(args: SimpleNamespace | argparse.Namespace, experiment: 'Experiment', valve: str,
                  rig: 'Rig | None' = None,
-                 controller: Any = None) -> list[str]:
+                 controller: Any = None, model: str | None = None) -> list[str]:
     """Return what a person should read before an experiment runs; say it on stderr."""
     from pam_actuation.experiments.limits import unknown_remarks
+    from pam_sim.idle import idle_remarks
     remarks = [*experiment.remarks(valve, rig, controller), *unknown_remarks(rig)]
+    if model is not None and rig is not None:
+        remarks += idle_remarks(model, rig)
     say_remarks(args, remarks)
     return remarks
 

@@ -54,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
     from pam_actuation.rigging.session import run_experiment
     from pam_sim.rig_text import rig_title
     experiment, rig, controller = load_setup(args)
-    remarks = tell_remarks(args, experiment, rig.valve, rig, controller)
+    remarks = tell_remarks(args, experiment, rig.valve, rig, controller, args.rig)
     out = args.out or os.path.join(
         'runs', f'{experiment.name}_{rig.valve}_{time.strftime("%Y%m%d-%H%M%S")}')
     check_bag_target(out, args.overwrite)

@@ -43,7 +43,7 @@ def run(args: argparse.Namespace) -> int:
     from pam_actuation.experiments.offline import simulate_experiment
     from pam_sim.rig_text import rig_title
     experiment, rig, controller = load_setup(args)
-    remarks = tell_remarks(args, experiment, rig.valve, rig, controller)
+    remarks = tell_remarks(args, experiment, rig.valve, rig, controller, args.rig)
     out = args.out or os.path.join('runs', f'{experiment.name}_{rig.valve}')
     check_bag_target(out, args.overwrite)
     started = time.perf_counter()

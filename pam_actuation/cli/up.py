@@ -159,7 +159,7 @@ def _tell_remarks(args: argparse.Namespace) -> None:
     rig = None
     if args.what == 'rig':
         rig = load_rig(args.model or 'dmsp_5_300_realistic', valve=args.valve)
-    tell_remarks(args, load_experiment(args.experiment), args.valve, rig)
+    tell_remarks(args, load_experiment(args.experiment), args.valve, rig, model=args.model)
 
 
 def _played(args: argparse.Namespace) -> str:
