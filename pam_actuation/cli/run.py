@@ -58,6 +58,7 @@ def run(args: argparse.Namespace) -> int:
     out = args.out or os.path.join(
         'runs', f'{experiment.name}_{rig.valve}_{time.strftime("%Y%m%d-%H%M%S")}')
     check_bag_target(out, args.overwrite)
+    started = time.perf_counter()
     with viewed(args) as domain_id, progress(
             args, experiment.duration_s, ' s', experiment.name) as bar:
         result = run_experiment(
@@ -65,6 +66,7 @@ def run(args: argparse.Namespace) -> int:
             seed=args.seed, domain_id=domain_id, namespace=args.namespace,
             overwrite=args.overwrite, progress=lambda done, total: bar.update(done - bar.n),
             tell=lambda text: bar.write(f'pam run: {text}', file=sys.stderr))
+    wall_s = time.perf_counter() - started
     # A node that was killed could not report its last count.
     counted = '' if result.failure else f', {sum(result.published.values())} published'
     recorded = sum(result.recorded.values())
@@ -83,7 +85,8 @@ def run(args: argparse.Namespace) -> int:
     elif result.stopped:
         lines = ['nothing is recorded']
     emit(args, {
-        'bag': result.bag, 'complete': result.complete, 'failure': result.failure,
+        'bag': result.bag, 'duration_s': result.duration_s, 'counts': result.recorded,
+        'wall_s': wall_s, 'complete': result.complete, 'failure': result.failure,
         'findings': result.findings, 'remarks': remarks, 'published': result.published,
         'recorded': result.recorded, 'exit_codes': result.exit_codes,
         'cpu_share': result.cpu_share}, '\n'.join(lines))

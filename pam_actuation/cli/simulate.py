@@ -54,7 +54,10 @@ def run(args: argparse.Namespace) -> int:
             preview_s=args.preview)
         bar.update(experiment.duration_s - bar.n)
     result['wall_s'] = time.perf_counter() - started
-    result['remarks'] = remarks
+    # The keys of `pam run`, so that one program reads both.
+    result |= {'complete': True, 'failure': '', 'findings': [], 'remarks': remarks,
+               'published': result['counts'], 'recorded': result['counts'], 'exit_codes': {},
+               'cpu_share': {}}
     said = ''.join(f'remark: {text}\n' for text in remarks)
     said += ''.join(f'finding: {text}\n' for text in result['findings'])
     emit(args, result, (

@@ -14,12 +14,14 @@
 
 """What the verbs write: looked at before the work, whole or not at all, nothing of yours lost."""
 
+import json
 import os
 from pathlib import Path
 import subprocess
 import sys
 
 from pam_actuation.cli.main import main
+from pam_actuation.rigging import node_template, session
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -35,6 +37,21 @@ def bags(tmp_path_factory):
     for name in ('first', 'second'):
         assert main(['simulate', str(folder / 'push.yaml'), '--out', str(folder / name)]) == 0
     return folder
+
+
+def test_one_program_reads_what_run_and_simulate_say(bags, tmp_path, monkeypatch, capsys):
+    said = call(capsys, 'simulate', bags / 'push.yaml', '--out', tmp_path / 'a', '--json')
+    simulated = json.loads(said)
+    monkeypatch.setattr(node_template, 'prepare_template', lambda: None)
+    monkeypatch.setattr(session, 'run_experiment', lambda *_, **__: session.Result(
+        str(tmp_path / 'a'), 0.41, '', [], simulated['counts'], simulated['counts'],
+        {'valve_driver': 0}, {'valve_driver': 0.1}))
+    run = json.loads(call(capsys, 'run', bags / 'push.yaml', '--out', tmp_path / 'b', '--json'))
+    assert run.keys() == simulated.keys() and run['duration_s'] == 0.41
+    for key, value in simulated.items():
+        assert type(run[key]) is type(value), key
+    assert run['counts'] == run['recorded'] and simulated['recorded'] == simulated['counts']
+    assert run['complete'] and simulated['complete'] and not simulated['exit_codes']
 
 
 def listed(folder):
