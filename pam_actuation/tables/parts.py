@@ -21,7 +21,7 @@ only where every word of it is known: a `spring force` is no force of the muscle
 
 from pam_actuation.tables.languages import plain
 from pam_actuation.tables.units import (
-    ANGLE, bare, FACTORS, FORCE, is_output, LENGTH, PRESSURE, unit_of_text, VOLTAGE)
+    ANGLE, bare, DUTY, FACTORS, FORCE, is_output, LENGTH, PRESSURE, unit_of_text, VOLTAGE)
 
 # What is measured.
 _HEADS = {
@@ -34,6 +34,7 @@ _HEADS = {
 _HEADS_BY_UNIT = {
     'tension': {FORCE, VOLTAGE}, 'effort': {FORCE}, 'last': {FORCE}, 'load': {FORCE},
     'course': {LENGTH}, 'travel': {LENGTH}, 'v': {VOLTAGE}}
+_SHARES = {'duty': DUTY, 'pwm': DUTY}
 _LENGTHS = {'length', 'l', 'len'}
 _FILLERS = set('the of a an de del der des die das du di da do la le el il lo les los en et am im '
                'in vom von an auf al am for to from pour para per fur at on'.split())
@@ -69,7 +70,7 @@ def quantities_of(unit: str) -> set[str]:
 
 def measured_by(words: str) -> set[str]:
     """Return the quantities that words such as `pressure` name, whatever else they say."""
-    return {_HEADS[word] for word in _said(words) if word in _HEADS}
+    return {one for word in _said(words) if (one := _HEADS.get(word) or _SHARES.get(word))}
 
 
 def name_of_parts(words: str, unit: str = '') -> str:

@@ -99,10 +99,12 @@ SIGNALS = (
            r'force ?(1|x|z|is|act|actual|meas|measured|sensor|cell)?|load ?cell|load|tension|'
            r'(measured|muscle|pam|actual) force', 'force along the muscle'),
     Signal('fill_duty', 'valve_signal', 'fill_duty', DUTY,
-           r'(duty |d |pwm )?(fill|in|inlet|charge|supply)( duty| pwm| valve)?|fill duty',
+           r'(duty |d |pwm )?(fill|in|inlet|charge|supply)( valve)?( duty| pwm)?|'
+           r'valve (fill|inlet|charge)( duty| pwm)?',
            'duty of the fill valve'),
     Signal('vent_duty', 'valve_signal', 'vent_duty', DUTY,
-           r'(duty |d |pwm )?(vent|out|outlet|exhaust|discharge)( duty| pwm| valve)?|vent duty',
+           r'(duty |d |pwm )?(vent|out|outlet|exhaust|discharge)( valve)?( duty| pwm)?|'
+           r'valve (vent|outlet|exhaust|discharge)( duty| pwm)?',
            'duty of the vent valve'),
     Signal('ppr_voltage', 'valve_signal', 'ppr_voltage', VOLTAGE,
            r'u|u ?(ppr|valve|cmd|command|ctrl|control|soll)|v|v ?(ppr|valve|cmd|command|out)|'

@@ -53,7 +53,7 @@ _OTHER_NAMES = {'µm': 'um', 'μm': 'um', 'µs': 'us', 'μs': 'us', 'sec': 's', 
                 'grad': 'deg', 'radian': 'rad', 'radians': 'rad', 'prozent': '%', 'zoll': 'in',
                 'pascal': 'Pa', 'kilopascal': 'kPa', 'sekunde': 's', 'sekunden': 's',
                 'secondes': 's', 'segundos': 's', 'millisekunden': 'ms', 'milliseconds': 'ms',
-                'millimeters': 'mm', 'milímetros': 'mm', 'millimètres': 'mm'}
+                'millimeters': 'mm', 'milímetros': 'mm', 'millimètres': 'mm', 'pct': '%'}
 
 
 # What sensors put out: where that begins, and how far it goes.
@@ -180,9 +180,9 @@ def is_output(text: str, quantity: str) -> bool:
 
 
 def bare(text: str) -> str:
-    """Return what a sensor puts out without words on its range: ``V`` for ``Volt DC``."""
+    """Return what a sensor puts out in usual words: ``V`` for ``Volt DC``, ``%`` for ``pct``."""
     own = _RANGE.sub('', text.strip().strip('[]()').strip())
-    return _spelled(own, VOLTAGE) or own
+    return _spelled(own, VOLTAGE) or ('%' if _spelled(own, DUTY) == '%' else own)
 
 
 def ends_a_name(text: str) -> bool:

@@ -51,6 +51,10 @@ def of_heading(name, unit=''):
     ('s/mm', 'contraction mm'), ('s in mm', 'contraction mm'), ('Weg in Zoll', 'contraction in'),
     ('x in', 'contraction in'), ('displacement in in', 'contraction in'),
     ('desplazamiento en mm', 'contraction mm'), ('Spannung/V', 'ppr_voltage V'),
+    ('fill_pct', 'fill_duty %'), ('vent_pct', 'vent_duty %'), ('fill_duty_pct', 'fill_duty %'),
+    ('inlet_pct', 'fill_duty %'), ('Outlet [pct]', 'vent_duty %'), ('valve_fill_%', 'fill_duty %'),
+    ('valve_vent [%]', 'vent_duty %'), ('fill valve duty (%)', 'fill_duty %'),
+    ('duty_in_%', 'fill_duty %'), ('duty_in [%]', 'fill_duty %'), ('duty_out_pct', 'vent_duty %'),
     ('flexor/pressure/bar', 'flexor/pressure bar_gauge'), ('x_mm (soll)', 'reference mm'),
     # Of the supply, by their own words.
     ('Versorgungsdruck in bar', 'supply_pressure bar_gauge'),
@@ -58,7 +62,7 @@ def of_heading(name, unit=''):
     ('p_in [bar]', 'supply_pressure bar_gauge'), ('p_in in bar', 'supply_pressure bar_gauge'),
     # Of something else.
     ('Federkraft in N', ''), ('x in mm/s', ''), ('p in bar/s', ''), ('duty in %', ''),
-    ('temperature in C', '')])
+    ('temperature in C', ''), ('humidity_pct', ''), ('valve_out_mm', '')])
 def test_a_name_and_its_unit(name, read):
     _, found = of_heading(name)
     assert not found.questions
@@ -87,7 +91,8 @@ def test_in_may_be_the_inlet_and_is_asked(name, unit):
 
 @pytest.mark.parametrize('name, signal', [
     ('p_in', 'supply_pressure'), ('pressure in', 'supply_pressure'), ('p_m', 'pressure'),
-    ('p_s', 'supply_pressure'), ('F_m', 'force'), ('u_in', 'ppr_voltage')])
+    ('p_s', 'supply_pressure'), ('F_m', 'force'), ('u_in', 'ppr_voltage'),
+    ('duty_in', 'fill_duty'), ('duty_out', 'vent_duty')])
 def test_an_index_is_no_unit_of_another_quantity(name, signal):
     question, = of_heading(name)[1].questions
     assert question.signal == signal and 'in which unit' in question.text
@@ -95,7 +100,7 @@ def test_an_index_is_no_unit_of_another_quantity(name, signal):
 
 @pytest.mark.parametrize('name', [
     'Kontraktion in %', 'Verkürzung in Prozent', 'contraction in %', 'Kontraktion in % von L0',
-    'contraction [% of L0]'])
+    'contraction [% of L0]', 'contraction_pct', 'x_percent'])
 def test_a_share_of_the_length_is_asked_for(name):
     question, = of_heading(name)[1].questions
     assert 'how long is the muscle at rest' in question.text
@@ -105,6 +110,7 @@ def test_a_share_of_the_length_is_asked_for(name):
     ('Seilzug', 'mV', 'contraction="Seilzug:mm:zero=ZERO:gain=GAIN"'),
     ('Seilzug', 'mV', 'force="Seilzug:N:zero=ZERO:gain=GAIN"'),
     ('Stellsignal [%]', '', 'pressure_command="Stellsignal [%]:bar_gauge:zero=ZERO:gain=GAIN"'),
+    ('Stellsignal_pct', '', 'pressure_command="Stellsignal_pct:bar_gauge:zero=ZERO:gain=GAIN"'),
     ('Sollstrom (mA)', '', 'pressure_command="Sollstrom (mA):bar_gauge:zero=ZERO:gain=GAIN"'),
     ('Drahtlänge (mm)', '', 'contraction="Drahtlänge (mm):mm"'),
     ('p_bar [filt]', '', 'pressure="p_bar [filt]:bar_gauge"')])
