@@ -16,9 +16,12 @@
 
 from pathlib import Path
 import re
+import shlex
 import struct
 import sys
 
+from pam_actuation.cli.main import build_parser
+from pam_actuation.cli.overview import FIRST_STEPS
 from pam_sim.errors import InputError
 import pytest
 
@@ -72,3 +75,22 @@ def test_without_a_browser_it_says_so(generator, monkeypatch, tmp_path):
     with pytest.raises(InputError, match='apt install chromium'):
         generator.photograph(tmp_path / 'page.html', tmp_path / 'picture.png')
     assert not list(tmp_path.iterdir())
+
+
+def test_commands_in_a_row_do_not_collide():
+    """No command writes what another one wrote; each reads what is there or what the text says."""
+    block = re.findall(r'^    (pam [a-z].*)$', README, re.M)
+    first_steps = [command for command, _ in FIRST_STEPS if 'VERB' not in command]
+    written, missing = {}, []
+    for line in (*first_steps, *block):
+        words = shlex.split(line, comments=True)
+        args = vars(build_parser(words[1]).parse_args(words[1:]))
+        own = [args.get('out'), args.get('save')]
+        for path in re.findall(r'runs/\w+|found/[\w.]+|\w+\.(?:yaml|csv|json)', ' '.join(words)):
+            there = any(path == one or path.startswith(f'{one}/') for one in written)
+            if not there and path not in own and f'your {path}' not in line:
+                missing.append(line)
+        for target in filter(None, own):
+            assert target not in written, (line, written[target])
+            written[target] = line
+    assert len(block) > 15 and not missing

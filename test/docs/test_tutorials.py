@@ -162,7 +162,7 @@ def test_one_folder_holds_the_readme_and_all_tutorials():
             again = name in owner and (content is None or content != held[name])
             assert not again, f'{name} is made by {owner[name]} and by {page}'
             owner[name], held[name] = page, content
-    assert {'runs/first', 'runs/learning', 'my_rig.yaml', 'gap_real', 'moves.yaml',
+    assert {'runs/hsv', 'runs/learning', 'my_rig.yaml', 'gap_real', 'moves.yaml',
             'first_run.png', 'wrong.yaml'} <= set(owner)
 
 
