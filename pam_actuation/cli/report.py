@@ -53,7 +53,9 @@ def run(args: argparse.Namespace) -> int:
     note_implausible(args, runs)
     write = joint_report if any(MEASURED in run for run in runs) else bag_report
     summary = write(runs, out, of=origin(args.bag, out))
-    early = early_sentences(runs)
-    emit(args, {'report': out, 'remarks': early, **summary},
-         '\n'.join([*(f'remark: {text}' for text in early), f'report: {out}']))
+    remarks = early_sentences(runs) + [
+        f'{title}: {said}' for title, facts in summary.items()
+        for said in facts.get('learned_worse', ())]
+    emit(args, {'report': out, 'remarks': remarks, **summary},
+         '\n'.join([*(f'remark: {text}' for text in remarks), f'report: {out}']))
     return EXIT_DONE

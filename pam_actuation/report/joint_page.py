@@ -21,10 +21,12 @@ from typing import Any
 
 import numpy as np
 from pam_actuation.report import errors, figures, metrics, signals
+from pam_actuation.report.learning import learned_worse, times_rolled_back
 from pam_actuation.report.page import plot, render, Section, table
 from pam_actuation.report.pages import cycle_numbers, default_titles, early_section
 from pam_actuation.report.sections.markers import markers_sections
-from pam_actuation.report.sections.metrics_table import each_part, interrupted_text
+from pam_actuation.report.sections.metrics_table import (
+    each_part, interrupted_text, rolled_back_text, told_of_learning)
 from pam_actuation.report.sections.provenance import provenance
 from pam_actuation.report.sections.timing import timing
 from pam_sim.annotations import FloatArray
@@ -59,6 +61,8 @@ class JointMetrics:
     interruptions: tuple[int, float] | None
     timing: tuple[Any, ...]
     cycle_parts: tuple[errors.Cycles, ...] = ()
+    times_rolled_back: int | None = None
+    learned_worse: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Return the main numbers as plain data."""
@@ -68,6 +72,8 @@ class JointMetrics:
                 'cycle_parts': errors.parts_as_data(self.cycle_parts),
                 'co_contraction_pa': self.co_contraction_pa,
                 'interruptions': self.interruptions and self.interruptions[0],
+                'times_rolled_back': self.times_rolled_back,
+                'learned_worse': list(self.learned_worse),
                 'loop_period_s': {one.topic: one.median_s for one in self.timing},
                 'loop_jitter_s': {one.topic: one.jitter_s for one in self.timing}}
 
@@ -95,7 +101,8 @@ def joint_metrics(run: Run) -> JointMetrics:
         metrics.interruptions(run),
         tuple(found for topic in run.topics
               if (found := metrics.loop_timing(run, topic)) is not None),
-        errors.counted(parts, cycles))
+        errors.counted(parts, cycles), times_rolled_back(run),
+        learned_worse(run, np.degrees(errors.joined(cycles)), errors.counted(parts, cycles), '°'))
 
 
 def joint_report(runs: Sequence[Run], out_path: str | os.PathLike[str],
@@ -156,10 +163,11 @@ def _merits(named: Sequence[tuple[str, JointMetrics]]) -> Section:
             m.cycle_rmse_rad, m.cycle_parts, lambda cycles: _degrees(cycles[-1])))),
         ('Mean pressure of both muscles', cells(lambda m: (
             None if m.co_contraction_pa is None else f'{m.co_contraction_pa * 1e-3:.1f} kPa'))),
-        ('Vented for missing or old input', cells(interrupted_text))]
+        ('Vented for missing or old input', cells(interrupted_text)),
+        ('Rules rolled back', cells(rolled_back_text))]
     body = table(['', *(title for title, _ in named)],
                  [[name, *row] for name, row in rows if any(cell is not None for cell in row)])
-    return Section('metrics', 'Figures of merit', body)
+    return Section('metrics', 'Figures of merit', body + told_of_learning(named))
 
 
 def _key_numbers(named: Sequence[tuple[str, JointMetrics]]) -> list[tuple[str, str, str, str]]:

@@ -32,6 +32,7 @@ from pam_actuation.report import signals
 from pam_actuation.report.command_path import command_path
 from pam_actuation.report.errors import (
     counted, Cycles, difference, find_parts, joined, part_rmse, parts_as_data, rmse, Signal)
+from pam_actuation.report.learning import learned_worse, times_rolled_back
 from pam_sim.annotations import FloatArray
 from pam_sim.short_repr import short_repr
 from pam_sim.units import RHO_REFERENCE
@@ -94,6 +95,8 @@ class RunMetrics:
     path: 'PathEstimate | None' = None       # from command to pressure
     command_variation_pa_per_s: float | None = None
     cycle_parts: tuple[Cycles, ...] = ()     # whose cycles follow one another above
+    times_rolled_back: int | None = None
+    learned_worse: tuple[str, ...] = ()      # sentences
 
     def to_dict(self) -> dict[str, Any]:
         """Return the main numbers as plain data, SI."""
@@ -107,6 +110,8 @@ class RunMetrics:
                 'steps': [asdict(step) for step in self.steps],
                 'command_variation_pa_per_s': self.command_variation_pa_per_s,
                 'interruptions': self.interruptions and self.interruptions[0],
+                'times_rolled_back': self.times_rolled_back,
+                'learned_worse': list(self.learned_worse),
                 'saturation_high': self.saturation_high, 'air_use_kg': self.air_use_kg,
                 'air_fed_kg': self.air_fed_kg, 'saturation_low': self.saturation_low,
                 'loop_period_s': {t.topic: t.median_s for t in self.timing},
@@ -357,4 +362,7 @@ def run_metrics(run: 'Run', parts: Sequence[Cycles] | None = None,
         rmse_n=None if pulled is None else rmse(pulled[1]),
         max_error_n=None if pulled is None else float(np.max(np.abs(pulled[1]))),
         cycle_rmse_n=joined(cycles_n), cycle_parts=counted(parts, cycles_m, cycles_n),
-        path=command_path(run, rig), command_variation_pa_per_s=command_variation(run))
+        path=command_path(run, rig), command_variation_pa_per_s=command_variation(run),
+        times_rolled_back=times_rolled_back(run),
+        learned_worse=(*learned_worse(run, 1e3 * joined(cycles_m), counted(parts, cycles_m), 'mm'),
+                       *learned_worse(run, joined(cycles_n), counted(parts, cycles_n), 'N')))

@@ -236,3 +236,54 @@ def test_decimation_of_a_held_signal_keeps_both_ends_of_plateaus():
 def test_decimation_leaves_out_what_is_not_finite():
     x, y = decimate_min_max([0, 1, 2, 3], [1.0, np.nan, np.inf, 2.0])
     assert list(x) == [0, 3] and list(y) == [1.0, 2.0]
+
+
+def learning_run(amplitudes_m, learning=1.0, rolled_back=(0.0, 0.0), pushed_n=None):
+    """Return a run of a controller that learns, with these errors in its cycles."""
+    run = tracking_run(amplitudes_m, metadata={'experiment': (
+        'name: sine\ndomain: contraction\nsegments:\n  - rest: {duration_s: 3.0}\n'
+        '  - sine: {center_m: 0.014, amplitude_m: 0.008, frequency_hz: 0.25, cycles: '
+        f'{len(amplitudes_m)}}}\n')})
+    stamp_ns = run['reference'].stamp_ns
+    run.topics['controller_state'] = Series(stamp_ns, {
+        'learning': np.full(len(stamp_ns), learning),
+        'times_rolled_back': np.resize(np.repeat(rolled_back, 5), len(stamp_ns))})
+    if pushed_n is not None:
+        run.topics['external_force'] = Series(stamp_ns, {
+            'force_n': np.full(len(stamp_ns), pushed_n)})
+    return run
+
+
+SPOILED_M = np.array([0.9, 0.5, 0.25, 0.15, 0.15, 0.17, 0.3, 0.5]) * 1e-3 * np.sqrt(2.0)
+
+
+def test_rules_that_learning_spoiled_are_told_with_what_to_do():
+    found = metrics.run_metrics(learning_run(SPOILED_M, rolled_back=(2.0, 3.0)))
+    said, = found.learned_worse
+    assert 'learned itself worse: 0.35 mm in the last 3 cycles, 0.16 mm in cycles 4 to 6' in said
+    assert 'pam tune --model RIG' in said and 'learning_rate' in said
+    assert found.to_dict()['learned_worse'] == [said]
+    body = metrics_table.metrics([('first', found)]).body
+    assert f'first: {said}.' in body and 'Rules rolled back' in body
+
+
+@pytest.mark.parametrize('amplitudes_m, more', [
+    (SPOILED_M[:6], {}), (SPOILED_M, {'learning': 0.0}), (SPOILED_M[3:6:2], {}),
+    (SPOILED_M, {'pushed_n': 10.0}), (0.05 * SPOILED_M, {})])
+def test_learning_is_not_blamed(amplitudes_m, more):
+    assert metrics.run_metrics(learning_run(amplitudes_m, **more)).learned_worse == ()
+
+
+def test_roll_backs_are_counted_within_a_run():
+    def counted(*values):
+        return metrics.run_metrics(learning_run(SPOILED_M, rolled_back=values)).times_rolled_back
+    run = tracking_run(SPOILED_M)
+    assert metrics.run_metrics(run).times_rolled_back is None
+    assert counted(4.0, 4.0) == 0
+    stamp_ns = run['reference'].stamp_ns
+    state = np.zeros(len(stamp_ns))
+    state[100:200], state[200:300], state[400:] = 1.0, 3.0, 1.0         # rules reset between
+    run.topics['controller_state'] = Series(stamp_ns, {'times_rolled_back': state})
+    assert metrics.run_metrics(run).times_rolled_back == 4
+    assert ('Rules rolled back', '4 times') in [
+        (name, cell(metrics.run_metrics(run))) for name, cell in metrics_table._ROWS]

@@ -45,6 +45,7 @@ def metrics(named: 'Sequence[tuple[str, RunMetrics]]', key: str = 'metrics',
     rows = [[name, *(cell(m) for _, m in named)] for name, cell in _ROWS]
     body = table([''] + [name for name, _ in named], [
         row for row in rows if any(cell is not None for cell in row[1:])])
+    body += told_of_learning(named)
     if any(m.air_use_kg is not None for _, m in named):
         body += paragraph(
             'Air is the sum of all increases of the air mass in the muscle, from measured '
@@ -114,6 +115,18 @@ def interrupted_text(m: 'RunMetrics | JointMetrics') -> str | None:
     return 'never' if not count else f'{count} times, {seconds:.2f} s in all'
 
 
+def rolled_back_text(m: 'RunMetrics | JointMetrics') -> str | None:
+    """Return in words how often rules were taken back; None where it does not tell."""
+    count = m.times_rolled_back
+    return None if count is None else f'{count} times' if count else 'never'
+
+
+def told_of_learning(named: 'Sequence[tuple[str, RunMetrics | JointMetrics]]') -> str:
+    """Return the paragraphs on runs in which learning made the tracking worse."""
+    return ''.join(paragraph(f'{title}: {said}.') for title, m in named
+                   for said in m.learned_worse)
+
+
 def _air(value: float | None) -> str | None:
     if value is None:
         return None
@@ -148,6 +161,7 @@ _ROWS: 'tuple[tuple[str, Callable[[RunMetrics], str | int | None]], ...]' = (
     ('Valve at its upper limit', lambda m: _percent(m.saturation_high)),
     ('Valve at its lower limit', lambda m: _percent(m.saturation_low)),
     ('Vented for missing or old input', interrupted_text),
+    ('Rules rolled back', rolled_back_text),
     ('Air filled into the muscle', lambda m: _air(m.air_use_kg)),
     ('Air through the fill valve', lambda m: _air(m.air_fed_kg)),
     ('From command to pressure', lambda m: None if m.path is None else m.path.text()),
