@@ -54,6 +54,17 @@ def test_noise_alone_is_no_gap():
         assert signal.rmse_before < 1.1 * signal.noise_floor
 
 
+@pytest.mark.parametrize('bias_pa, names', [(-60e3, ['pressure_bias']), (-97e3, [])])
+def test_what_ends_at_the_end_of_its_range_is_no_certain_name(bias_pa, names):
+    run = recorded(nominal(), voltages(14.0))
+    run['pressure'].values['pressure_pa'] += bias_pa
+    result = find_gap(run, nominal(), effects=['pressure_bias'], unnamed=())
+    assert [e['name'] for e in result.effects] == names
+    told = '`pressure_bias` would need bias = -9'
+    assert any(one.startswith(told) for one in result.remarks) == (not names)
+    assert (result.verdict == 'effects') == bool(names)
+
+
 def test_two_effects_are_named_with_their_sizes(two_effects):
     _, result = two_effects
     assert result.verdict == 'effects'
@@ -256,7 +267,7 @@ def test_the_folder_holds_what_others_rely_on(two_effects):
     found = json.loads((folder / 'gap.json').read_text())
     assert found['schema'] == 1 and found['verdict'] == result.verdict
     assert set(found) == {
-        'schema', 'verdict', 'subsystems', 'proposal', 'surrogate', 'effects', 'parameters',
+        'schema', 'verdict', 'model', 'subsystems', 'proposal', 'surrogate', 'effects', 'parameters',
         'ambiguity_set', 'next_experiment', 'where', 'signals', 'unexplained_fraction',
         'fingerprint', 'minimum_detectable', 'runtime_s', 'simulations', 'reason',
         'numbers_first', 'not_judged'}

@@ -17,9 +17,10 @@
 from collections.abc import Sequence
 
 from pam_sim.gap.select.rival import NamedEffect
+from pam_sim.gap.verify.at_end import at_end
 from pam_sim.gap.verify.harm import Harm, without_harm
 from pam_sim.gap.verify.own_runs import OwnRuns
-from pam_sim.gap.verify.refutation import refute, refuted_alone, unconfirmed
+from pam_sim.gap.verify.refutation import less, refute, refuted_alone, unconfirmed
 from pam_sim.gap.verify.validation import Validation
 
 UNCONFIRMED = ('What {} would explain of the recordings is not found again in the certify data, '
@@ -30,6 +31,8 @@ def confirmed(named: Sequence[NamedEffect], validation: Validation
               ) -> tuple[list[NamedEffect], Validation, list[Harm], list[str]]:
     """
     Leave out, one by one, what the certify data contradict, do not find again, or follow worse.
+
+    Before that, what is certain only by a number at the end of its range.
 
     Parameters
     ----------
@@ -47,13 +50,17 @@ def confirmed(named: Sequence[NamedEffect], validation: Validation
     harms : list of Harm
         What would make a signal worse.
     remarks : list of str
-        A sentence for each name that is not found again.
+        A sentence for each name that is not found again, or is at the end of its range.
 
     """
     kept, final = refute(named, validation)
     if final is not validation.final:
         validation = validation.of(final)
     remarks = []
+    for gone, why in at_end(kept, validation.estimator, validation.final):
+        remarks.append(why)
+        kept = [w for w in kept if w.name != gone]
+        validation = validation.of(less([gone], validation))
     while kept:
         name, without = unconfirmed(kept, validation)
         if name is None and validation.recording.unseen_s > 0.0:
