@@ -18,7 +18,8 @@ from collections.abc import Mapping
 
 from pam_sim import load_rig
 from pam_sim.errors import InputError
-from pam_sim.joint import load_joint
+from pam_sim.joint import load_joint, load_rig_or_joint
+from pam_sim.rig import Rig
 from pam_sim.rig_text import rig_title
 
 NOT_RECORDED = 'not recorded'
@@ -45,6 +46,19 @@ def recorded_rig_title(metadata: Mapping[str, str] | None) -> str:
         return load_joint(content).name
     except InputError:
         return _stated_name(content)
+
+
+def recorded_muscle(metadata: Mapping[str, str] | None, namespace: str = '') -> Rig | None:
+    """
+    Return the rig of a recorded muscle, by its namespace that of one side of a joint.
+
+    None where none is recorded, or where this version cannot read it.
+    """
+    try:
+        muscles = load_rig_or_joint((metadata or {})['rig']).muscles
+    except (InputError, KeyError):
+        return None
+    return muscles.get('') or muscles.get(f'{namespace.rpartition("/")[2]}/')
 
 
 def _stated_name(content: str) -> str:

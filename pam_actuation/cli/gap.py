@@ -41,9 +41,10 @@ MODEL = 'dmsp_5_300_hanging_mass'
 def add_arguments(parser: Parser) -> None:
     """Declare the options of the verb."""
     parser.add_argument('run', type=source, nargs='*', help='recorded bags')
-    parser.add_argument('--model', type=source, default=MODEL, metavar='NAME|FILE',
+    parser.add_argument('--model', type=source, default=None, metavar='NAME|FILE',
                         help='model YAML or preset of a rig or a joint to hold against the '
-                        'recording (default: %(default)s)')
+                        'recording (default: the rig that the first bag holds; without a bag '
+                        f'{MODEL})')
     parser.add_argument('--out', type=out_path, default=None, metavar='DIR',
                         help='folder for the results; those of the same bags and model are '
                         'made again')
@@ -77,6 +78,7 @@ def add_arguments(parser: Parser) -> None:
 def run(args: argparse.Namespace) -> int | None:
     """Find the gap; exit code 1 only where the data cannot be used or cannot be right."""
     from pam_actuation.report.joint_gap import questions
+    from pam_actuation.report.model_held import recorded_model
     from pam_sim.errors import InputError
     if args.explain is not None:
         return _explain(args)
@@ -86,7 +88,9 @@ def run(args: argparse.Namespace) -> int | None:
         raise InputError('needs at least one recorded bag and --out DIR')
     found: dict[str, GapResult] = {}
     lines: list[str] = []
-    for question in questions(args.model, args.run[0], args.namespace, args.renamed):
+    effect_names(args)      # a mistake in them is told before the bag is read
+    model = args.model or recorded_model(args.run[0])
+    for question in questions(model, args.run[0], args.namespace, args.renamed):
         out = os.path.join(args.out, question.side) if question.side else args.out
         found[question.side], runs = _ask(args, question, out)
         result = found[question.side]
@@ -109,7 +113,7 @@ def _ask(args: argparse.Namespace, question: 'Question', out: str
     from pam_sim.files import check_folder
     names = effect_names(args) or None
     page = os.path.join(out, 'report.html')
-    of = origin(args.run, page, 'gap', args.model, args.certify)
+    of = origin(args.run, page, 'gap', args.model or '', args.certify)
     check_folder(out, FILES, args.overwrite or is_of(page, of))
     runs = [question.load(path) for path in args.run]
     certify = question.load(args.certify) if args.certify else None
@@ -149,6 +153,7 @@ def _plan(args: argparse.Namespace) -> int:
     from pam_sim import load_rig
     from pam_sim.files import check_folder, whole_files, write_text
     from pam_sim.located_yaml import dump_yaml
+    args.model = args.model or MODEL
     rig = load_rig(args.model, valve=args.valve)
     names = effect_names(args) or None
     if args.out is not None:
@@ -172,30 +177,35 @@ def _plan(args: argparse.Namespace) -> int:
 
 def _explain(args: argparse.Namespace) -> int:
     """Say what an effect is, from which size on it shows, and what looks like it."""
+    from pam_actuation.bags.facts import recorded_muscle
     from pam_actuation.bags.load import load_run
     from pam_actuation.experiments.separating import identification_run
     from pam_actuation.models.text import in_full
     from pam_actuation.report.gap import model_for
+    from pam_actuation.report.model_held import recorded_model
     from pam_sim import load_rig
     from pam_sim.catalogue import catalogue, find
     from pam_sim.gap.plan.look_alikes import look_alikes
+    from pam_sim.rig_text import rig_title
     from pam_sim.units import behind_number
     entry = find(catalogue(), args.explain)
     if args.run:
         run = load_run(args.run[0], args.namespace, topics=args.renamed)
         note_implausible(args, [run], must_be_right=True)
-        rig = model_for(run, args.model)
+        own = None if args.model else recorded_muscle(run.metadata, run.namespace)
+        rig = own or model_for(run, args.model or recorded_model(args.run[0]))
     else:
-        rig = load_rig(args.model)
+        rig = load_rig(args.model or MODEL)
         run = identification_run(rig)
     found = look_alikes(run, rig, args.explain)
     least = found['least']
-    lines = [in_full(entry)]
+    lines = [in_full(entry), f'model: {rig_title(rig)}, valve {rig.valve}']
     if least:
         unit = behind_number(least['unit'])
         lines.append(f'shows from {least["quantity"]} = {least["value"]:.3g}{unit} on '
                      '(one noise floor, rms, after calibration)')
     lines.append('looks like: ' + (', '.join(
         f'{name} ({cosine:.2f})' for name, cosine in found['alike']) or 'no other effect here'))
-    emit(args, {'schema': 1, 'effect': args.explain, **found}, '\n'.join(lines))
+    emit(args, {'schema': 1, 'effect': args.explain, 'model': rig_title(rig), **found},
+         '\n'.join(lines))
     return EXIT_DONE

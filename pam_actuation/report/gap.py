@@ -32,6 +32,7 @@ import numpy as np
 from pam_actuation.bags.ending import early_sentences
 from pam_actuation.bags.writer import BagWriter
 from pam_actuation.experiments.separating import cell_would_tell, next_experiment, not_played
+from pam_actuation.report.model_held import model_held
 from pam_actuation.report.next_run import command_on_rig, is_of_muscle
 from pam_actuation.report.page import render
 from pam_actuation.report.pages import FOOTER
@@ -124,6 +125,7 @@ def gap_of(runs: 'Sequence[Run]', model: 'StrPath | Rig', certify: 'Run | None' 
     if not runs:
         raise InputError('a gap look needs at least one recording')
     rig = model_for(runs[0], model)
+    held = model_held(rig, runs)
     # Now, for a gain that is unknown is another one after its identification.
     runs, certify, remarks = all_commanded(runs, certify, rig)
     began, told = time.perf_counter(), options.pop('progress', lambda done: None)
@@ -132,6 +134,7 @@ def gap_of(runs: 'Sequence[Run]', model: 'StrPath | Rig', certify: 'Run | None' 
                                         lambda done: told(share * done))
     result = find_gap(runs, rig, certify, spent_s=time.perf_counter() - began,
                       progress=lambda done: told(share + (1.0 - share) * done), **options)
+    result.model = held
     result.remarks += remarks + sayings
     if found is not None:
         result.numbers_first, result.first_lines = numbers_block(found), numbers_text(found)

@@ -95,7 +95,7 @@ def questions(model: str, bag: str, namespace: str | None = None,
     Parameters
     ----------
     model : str
-        Preset or path of a rig, or of a joint.
+        Preset, path or YAML text of a rig, or of a joint.
     bag : path
         The first recording; it tells the namespace of a joint.
     namespace : str, optional
@@ -129,7 +129,7 @@ def questions(model: str, bag: str, namespace: str | None = None,
 
 
 def _may_be_joint(model: str) -> bool:
-    return model in joint_preset_names() or os.path.isfile(model)
+    return model in joint_preset_names() or '\n' in model or os.path.isfile(model)
 
 
 def _namespace_of(bag: str, wanted: str | None) -> str:

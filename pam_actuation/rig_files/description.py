@@ -20,10 +20,11 @@ from typing import Any
 
 from pam_actuation.rig_files.numbers import Stated
 from pam_sim.errors import InputError
-from pam_sim.muscle.geometry import (
-    BORE_M as NOMINAL_BORE_M, BRAID_ANGLE_RAD, most_strain)
+from pam_sim.model_file import load_rig, preset_names
+from pam_sim.muscle.geometry import BRAID_ANGLE_RAD, most_strain
 from pam_sim.muscle.muscle import DIMENSIONS, get_muscle, muscle_names
 from pam_sim.parameters import Parameter
+from pam_sim.rig import Rig
 from pam_sim.rig_parameters import rig_parameters
 from pam_sim.tolerance import AbsoluteSd, Tolerance, UNKNOWN
 from pam_sim.valve.regulator_presets import get_regulator
@@ -31,9 +32,10 @@ from pam_sim.valve.regulator_presets import get_regulator
 TYPE_TOLERANCE = 0.15        # of a force map of the type: muscles of a type differ by 10 to 20 %
 BY_BORE_TOLERANCE = 0.2      # of a force map taken from a muscle of another bore
 LAG_TOLERANCE = 0.5          # of the lag of a regulator that nobody stated
-DAMPING_TOLERANCE = 0.5      # of the damping of a muscle of another bore that nobody stated
+BY_SIZE_TOLERANCE = 0.5      # of damping and valve by the size of the muscle
 ZERO_SHARE = 0.02            # of the range; by data sheets 1 % each of regulator and sensor
 DAMPING = 'damping_n_s_per_m'
+NOMINAL_MUSCLE = 'dmsp_5_300'
 ZERO = 'ppr_zero_pa'
 NOT_STATED = 'not stated: that of the nominal regulator, yours may differ'
 REGULATOR_NUMBERS = ('K_m', 'ppr_lowest_v', 'ppr_highest_v', ZERO)
@@ -113,7 +115,7 @@ class Description:
             self.muscle = self._nearest()
         self._scale_force_map()
         self._doubt_force_map()
-        self._scale_damping()
+        self._by_size()
         if self.valve == 'ppr':
             self._regulator()
         elif self.regulator or self.volts or self.gauge_pa:
@@ -128,7 +130,7 @@ class Description:
     def _nearest(self) -> str:
         bore = self.dimensions.get('bore_m')
         if bore is None:
-            return 'dmsp_5_300'
+            return NOMINAL_MUSCLE
         return min(muscle_names(), key=lambda n: abs(math.log(bore / get_muscle(n).bore_m)))
 
     def _scale_force_map(self) -> None:
@@ -157,18 +159,27 @@ class Description:
             self._add(name, 1.0, TYPE_TOLERANCE, 'of the type, not measured on this muscle: '
                       'muscles of a type differ by 10 to 20 %')
 
-    def _scale_damping(self) -> None:
-        """Take the damping of the nominal muscle by cross-section, where the bore is another."""
+    def _by_size(self) -> None:
+        """Take damping and on/off valves by the size of the muscle, where nobody stated them."""
         assert self.muscle is not None
-        nominal = next(p for p in self.parameters if p.name == DAMPING)
-        ratio = self.dimensions.get('bore_m', get_muscle(self.muscle).bore_m) / NOMINAL_BORE_M
-        said = self.numbers.get(DAMPING)
-        if ratio == 1.0 or self.load == 'isometric' or said and said.value is not None:
-            return
-        value = min(max(nominal.default * ratio ** 2, nominal.lower), nominal.upper)
-        self._add(DAMPING, float(f'{value:.3g}'), DAMPING_TOLERANCE,
-                  'not stated: that of the nominal muscle by cross-section, yours may differ by '
-                  'half')
+        preset = f'{self.muscle}_hanging_mass'
+        model = load_rig(preset if preset in preset_names() else f'{NOMINAL_MUSCLE}_hanging_mass')
+        like = model.muscle
+        bore = self.dimensions.get('bore_m', get_muscle(self.muscle).bore_m) / like.bore_m
+        length = self.dimensions.get('length_m', get_muscle(self.muscle).length_m) / like.length_m
+        if self.load != 'isometric' and (bore != 1.0 or self.muscle != NOMINAL_MUSCLE):
+            self._add_by_size(model, DAMPING, bore ** 2, 'cross-section')
+        if self.valve == 'hsv':
+            self._add_by_size(model, 'C', bore ** 2 * length, 'volume')
+            self._add_by_size(model, 'V_dead', bore ** 2, 'cross-section')
+
+    def _add_by_size(self, model: Rig, name: str, ratio: float, by: str) -> None:
+        said = self.numbers.get(name)
+        if said is None or said.value is None:
+            parameter = next(p for p in self.parameters if p.name == name)
+            value = min(max(model.parameters[name] * ratio, parameter.lower), parameter.upper)
+            self._add(name, float(f'{value:.3g}'), BY_SIZE_TOLERANCE,
+                      f'not stated: that of {model.name} by {by}, yours may differ by half')
 
     def _regulator(self) -> None:
         volts, gauge_pa, source = self.volts, self.gauge_pa, 'as stated'
@@ -222,6 +233,6 @@ class Description:
                              'one of them out', f'{name}={said.value:g}')
         parameter = next(p for p in self.parameters if p.name == name)
         known = tolerance if said is None else said.tolerance
-        where = 'muscle' if name in ('force_map_gain', DAMPING) else 'regulator'
+        where = 'regulator' if name in (*REGULATOR_NUMBERS, 'T_m') else 'muscle'
         self.numbers[name] = Stated(parameter.check(value, where), known)
         self.notes[name] = note

@@ -213,6 +213,9 @@ class GapResult:
         By ``valve`` or ``muscle``, why the recordings tell nothing of it.
     noticed : list of Notice
         What is no noise, where it makes an answer ``unknown``.
+    model : dict, optional
+        Which model was held against the recordings, and which rig they name: the entry of
+        gap.json.
     numbers_first : dict, optional
         What was found of unknown numbers before the look: the entry of gap.json.
     first_lines : list of str
@@ -250,6 +253,7 @@ class GapResult:
     subsystems: dict[str, SubsystemVerdict] = field(default_factory=dict)
     not_judged: dict[str, str] = field(default_factory=dict)
     noticed: list[Any] = field(default_factory=list)
+    model: dict[str, Any] | None = None
     numbers_first: dict[str, Any] | None = None
     first_lines: list[str] = field(default_factory=list)
     proposal: Any = None
@@ -260,9 +264,20 @@ class GapResult:
         """Return in one sentence where the disagreement lives; empty where there is none."""
         return self.where[0].text() if self.where else ''
 
+    @property
+    def model_lines(self) -> list[str]:
+        """Return sentences on the model that was held against the recordings, if that is told."""
+        told = self.model
+        if told is None:
+            return []
+        beside = ', the rig that the recording holds' if told['is_recorded'] else (
+            f'; the recording names {told["recorded"]}' if told['recorded'] else '')
+        return [f'Model: {told["name"]}, valve {told["valve"]}{beside}.',
+                *([told['remark']] if told['remark'] else [])]
+
     def text(self) -> str:
         """Return the result in lines for a person."""
-        rows = [*self.first_lines, *([self.place] if self.place else []),
+        rows = [*self.model_lines, *self.first_lines, *([self.place] if self.place else []),
                 f'{self.verdict}: {self.reason}',
                 *(f'  {name}: {found.text()}' for name, found in self.subsystems.items())]
         rows += [f'  {s}: not judged: {why}' for s, why in self.not_judged.items()]
@@ -277,7 +292,7 @@ class GapResult:
     def to_dict(self) -> dict[str, Any]:
         """Return what gap.json holds, plain data without NaN."""
         return finite({
-            'schema': SCHEMA, 'verdict': self.verdict,
+            'schema': SCHEMA, 'verdict': self.verdict, 'model': self.model,
             'subsystems': {name: one.to_dict() for name, one in self.subsystems.items()},
             'not_judged': self.not_judged,
             'proposal': self.proposal.to_dict() if self.proposal else None,

@@ -187,7 +187,8 @@ def test_every_verb_that_reads_bags_takes_the_names(silent, tmp_path, capsys):
     bag = str(silent[0])
     more = {'tune': ['--out', str(tmp_path / 'tuned.yaml')],
             'identify': ['--rig', 'dmsp_5_300_hanging_mass'],
-            **{verb: ['--out', str(tmp_path / verb)] for verb in ('gap', 'characterise')},
+            'gap': ['--model', 'dmsp_5_300_hanging_mass', '--out', str(tmp_path / 'gap')],
+            'characterise': ['--out', str(tmp_path / 'characterise')],
             'export': ['--out', str(tmp_path / 'table.csv')]}
     for verb in ('info', 'replay', 'report', 'gap', 'tune', 'identify', 'export', 'characterise'):
         assert main([verb, bag, *more.get(verb, []), '--topic', 'pressure=/daq/p2']) == 2

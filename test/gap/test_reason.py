@@ -17,7 +17,7 @@
 import time
 from types import SimpleNamespace
 
-from gap_runs import nominal, recorded, voltages
+from gap_runs import NOMINAL, nominal, recorded, voltages
 import numpy as np
 from pam_actuation.cli import gap as gap_verb
 from pam_actuation.cli.main import main
@@ -276,6 +276,6 @@ def test_an_answer_ends_with_0_and_what_is_wrong_with_the_data_with_1(
     monkeypatch.setattr('pam_actuation.report.origin.origin', lambda *given: '')
     monkeypatch.setattr('pam_actuation.report.gap.write_gap',
                         lambda *given, **more: GapResult(verdict, 'Because.'))
-    assert main(['gap', 'bag', '--out', str(tmp_path / 'gap')]) == code
+    assert main(['gap', 'bag', '--model', NOMINAL, '--out', str(tmp_path / 'gap')]) == code
     said = capsys.readouterr().out
     assert f'{verdict}: Because.' in said and all(one in said for one in implausible)

@@ -56,6 +56,7 @@ def gap_section(result: 'GapResult', key: str = 'gap', title: str = 'Recording a
 
     """
     body = paragraph(remark) if remark else ''
+    body += ''.join(map(paragraph, result.model_lines))
     body += paragraph(result.place) if result.place else ''
     body += paragraph(f'{VERDICT_TEXT.get(result.verdict, result.verdict)}. {result.reason}')
     body += _subsystems(result)
