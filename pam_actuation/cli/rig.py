@@ -226,11 +226,12 @@ def _one_of(option: str, value: str, allowed: Any) -> str:
 
 
 def _check(args: argparse.Namespace) -> int:
+    from pam_actuation.rig_files.by_size import nominal_beside_size
     from pam_sim import load_rig
     from pam_sim.idle import idle_remarks
     from pam_sim.rig_text import rig_title
     rig = load_rig(args.file)
-    remarks = idle_remarks(args.file, rig)
+    remarks = [*nominal_beside_size(rig), *idle_remarks(args.file, rig)]
     lines = [rig_title(rig), f'load {rig.load}, valve {rig.valve}', *_numbers_text(rig),
              *(f'remark: {text}' for text in remarks)]
     emit(args, {'rig': rig.name, 'load': rig.load, 'valve': rig.valve, **_numbers(rig),

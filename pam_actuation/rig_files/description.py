@@ -18,13 +18,13 @@ from dataclasses import dataclass, field
 import math
 from typing import Any
 
+from pam_actuation.rig_files.by_size import BySize, by_size, DAMPING, nearest_muscle
 from pam_actuation.rig_files.numbers import Stated
 from pam_sim.errors import InputError
-from pam_sim.model_file import load_rig, preset_names
-from pam_sim.muscle.geometry import BRAID_ANGLE_RAD, most_strain
-from pam_sim.muscle.muscle import DIMENSIONS, get_muscle, muscle_names
+from pam_sim.muscle.geometry import (
+    BORE_M as NOMINAL_BORE_M, BRAID_ANGLE_RAD, most_strain)
+from pam_sim.muscle.muscle import DIMENSIONS, get_muscle
 from pam_sim.parameters import Parameter
-from pam_sim.rig import Rig
 from pam_sim.rig_parameters import rig_parameters
 from pam_sim.tolerance import AbsoluteSd, Tolerance, UNKNOWN
 from pam_sim.valve.regulator_presets import get_regulator
@@ -34,8 +34,6 @@ BY_BORE_TOLERANCE = 0.2      # of a force map taken from a muscle of another bor
 LAG_TOLERANCE = 0.5          # of the lag of a regulator that nobody stated
 BY_SIZE_TOLERANCE = 0.5      # of damping and valve by the size of the muscle
 ZERO_SHARE = 0.02            # of the range; by data sheets 1 % each of regulator and sensor
-DAMPING = 'damping_n_s_per_m'
-NOMINAL_MUSCLE = 'dmsp_5_300'
 ZERO = 'ppr_zero_pa'
 NOT_STATED = 'not stated: that of the nominal regulator, yours may differ'
 REGULATOR_NUMBERS = ('K_m', 'ppr_lowest_v', 'ppr_highest_v', ZERO)
@@ -115,7 +113,7 @@ class Description:
             self.muscle = self._nearest()
         self._scale_force_map()
         self._doubt_force_map()
-        self._by_size()
+        self._fill_by_size()
         if self.valve == 'ppr':
             self._regulator()
         elif self.regulator or self.volts or self.gauge_pa:
@@ -130,8 +128,8 @@ class Description:
     def _nearest(self) -> str:
         bore = self.dimensions.get('bore_m')
         if bore is None:
-            return NOMINAL_MUSCLE
-        return min(muscle_names(), key=lambda n: abs(math.log(bore / get_muscle(n).bore_m)))
+            return 'dmsp_5_300'
+        return nearest_muscle(bore)
 
     def _scale_force_map(self) -> None:
         assert self.muscle is not None
@@ -159,27 +157,24 @@ class Description:
             self._add(name, 1.0, TYPE_TOLERANCE, 'of the type, not measured on this muscle: '
                       'muscles of a type differ by 10 to 20 %')
 
-    def _by_size(self) -> None:
+    def by_size(self) -> dict[str, BySize]:
+        """Return damping and numbers of on/off valves by the size of the muscle."""
+        like = get_muscle(self.muscle or self._nearest())
+        return by_size(self.dimensions.get('bore_m', like.bore_m),
+                       self.dimensions.get('length_m', like.length_m), self.muscle or '')
+
+    def _fill_by_size(self) -> None:
         """Take damping and on/off valves by the size of the muscle, where nobody stated them."""
         assert self.muscle is not None
-        preset = f'{self.muscle}_hanging_mass'
-        model = load_rig(preset if preset in preset_names() else f'{NOMINAL_MUSCLE}_hanging_mass')
-        like = model.muscle
-        bore = self.dimensions.get('bore_m', get_muscle(self.muscle).bore_m) / like.bore_m
-        length = self.dimensions.get('length_m', get_muscle(self.muscle).length_m) / like.length_m
-        if self.load != 'isometric' and (bore != 1.0 or self.muscle != NOMINAL_MUSCLE):
-            self._add_by_size(model, DAMPING, bore ** 2, 'cross-section')
+        bore_m = self.dimensions.get('bore_m', get_muscle(self.muscle).bore_m)
+        wanted = {DAMPING} if self.load != 'isometric' and bore_m != NOMINAL_BORE_M else set()
         if self.valve == 'hsv':
-            self._add_by_size(model, 'C', bore ** 2 * length, 'volume')
-            self._add_by_size(model, 'V_dead', bore ** 2, 'cross-section')
-
-    def _add_by_size(self, model: Rig, name: str, ratio: float, by: str) -> None:
-        said = self.numbers.get(name)
-        if said is None or said.value is None:
-            parameter = next(p for p in self.parameters if p.name == name)
-            value = min(max(model.parameters[name] * ratio, parameter.lower), parameter.upper)
-            self._add(name, float(f'{value:.3g}'), BY_SIZE_TOLERANCE,
-                      f'not stated: that of {model.name} by {by}, yours may differ by half')
+            wanted |= {'C', 'V_dead'}
+        for name, (value, source) in self.by_size().items():
+            said = self.numbers.get(name)
+            if name in wanted and (said is None or said.value is None):
+                self._add(name, value, BY_SIZE_TOLERANCE,
+                          f'not stated: that of {source}, yours may differ by half')
 
     def _regulator(self) -> None:
         volts, gauge_pa, source = self.volts, self.gauge_pa, 'as stated'

@@ -68,8 +68,9 @@ def ask_description(ask: Ask, tell: Tell) -> Description:
         _regulator(ask, tell, found)
         _stated(ask, tell, found, 'T_m')
     else:
+        sizes = found.by_size()
         for name in ('C', 'V_dead', 'supply_pa'):
-            _stated(ask, tell, found, name)
+            _stated(ask, tell, found, name, sizes[name].value if name in sizes else None)
     for parameter in SENSOR_PARAMETERS:
         if parameter.name in SENSORS:
             value = _again(ask, tell, _question(parameter), _scaled(parameter, 1.0))
@@ -101,8 +102,11 @@ def _regulator(ask: Ask, tell: Tell, found: Description) -> None:
         found.gauge_pa = 1e3 * low, 1e3 * high
 
 
-def _stated(ask: Ask, tell: Tell, found: Description, name: str) -> None:
+def _stated(ask: Ask, tell: Tell, found: Description, name: str,
+            default: float | None = None) -> None:
     parameter = next(p for p in found.parameters if p.name == name)
+    if default is not None:
+        parameter = replace(parameter, default=default)
 
     def read(said: str) -> None:
         if said:

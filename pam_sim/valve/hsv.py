@@ -37,7 +37,8 @@ SIGNAL_RANGE = (0.0, 1.0, '')         # a duty
 
 PARAMETERS = (
     Parameter('C', 'm3/(s Pa)', 2.0e-10, 1e-12, 1e-8, 0.02,
-              'Sonic conductance of each valve with its restrictor.',
+              'Sonic conductance of each valve with its restrictor; the nominal one suits a 5 mm '
+              'muscle.',
               'ISO 6358; fitted restrictor'),
     Parameter('b', '-', 0.38, 0.05, 0.9, 0.0,
               'Critical pressure ratio of each valve.', 'ISO 6358; MHJ10-class valves'),

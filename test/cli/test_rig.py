@@ -65,7 +65,8 @@ def test_what_was_said_is_in_the_rig():
 @pytest.mark.parametrize('load', ['hanging_mass', 'isometric', 'driven'])
 def test_without_a_word_it_is_the_nominal_rig_with_its_numbers_in_comments(load, valve):
     rig = new('--load', load, '--valve', valve)
-    unsure = {'T_m': 0.5, 'ppr_zero_pa': AbsoluteSd(12e3)} if valve == 'ppr' else {}
+    unsure = {'T_m': 0.5, 'ppr_zero_pa': AbsoluteSd(12e3)} if valve == 'ppr' else {
+        'C': 0.5, 'V_dead': 0.5}
     assert rig == load_rig(f'dmsp_5_300_{load}', valve=valve).with_(
         name='made', parameters={'vent_intake': 1.0},       # a vent of a real rig lets air in
         tolerance={'force_map_gain': 0.15, **unsure})
@@ -125,14 +126,48 @@ def test_the_damping_of_another_bore_goes_by_cross_section_and_is_hardly_known()
     rig = new('--muscle', 'dmsp_10_250')
     assert rig.parameters['damping_n_s_per_m'] == 100.0
     assert rig.tolerance['damping_n_s_per_m'] == 0.5
-    rig = new('--bore-mm', '20', '--unknown', 'damping_n_s_per_m', '--overwrite')
-    assert rig.parameters['damping_n_s_per_m'] == 400.0
+    rig = new('--bore-mm', '30', '--unknown', 'damping_n_s_per_m', '--overwrite')
+    assert rig.parameters['damping_n_s_per_m'] == 562.0     # that of the 40 mm preset times 9/16
     assert rig.unknown == ('damping_n_s_per_m',)
     # What is stated stays, and the nominal muscle is known.
     rig = new('--muscle', 'dmsp_40_300', '--known', 'damping_n_s_per_m=7', '--overwrite')
     assert rig.parameters['damping_n_s_per_m'] == 7.0
     nominal = new('--muscle', 'dmsp_5_300', '--overwrite')
     assert nominal.tolerance['damping_n_s_per_m'] == 0.02
+
+
+@pytest.mark.parametrize('muscle', ['dmsp_5_300', 'dmsp_10_250', 'dmsp_20_300', 'dmsp_40_300'])
+def test_damping_and_valves_are_those_of_the_preset_with_this_muscle(muscle):
+    preset = load_rig(f'{muscle}_hanging_mass', valve='hsv')
+    rig = new('--muscle', muscle, '--valve', 'hsv')
+    for name in ('damping_n_s_per_m', 'C', 'V_dead'):
+        assert rig.parameters[name] == preset.parameters[name], name
+    assert rig.tolerance['C'] == rig.tolerance['V_dead'] == 0.5
+
+
+def test_valves_go_by_the_size_of_the_muscle_unless_they_are_stated():
+    rig = new('--muscle', 'dmsp_10_250', '--length-mm', '220', '--valve', 'hsv')
+    assert rig.parameters['C'] == pytest.approx(7e-10 * 220 / 250, rel=1e-3)
+    assert 'C: 6.16e-10' in (text := open('made.yaml', encoding='utf-8').read())
+    assert 'not stated: that of dmsp_10_250_hanging_mass by volume' in text
+    rig = new('--muscle', 'dmsp_10_250', '--valve', 'hsv', '--known', 'C=3e-10', '--unknown',
+              'V_dead', '--overwrite')
+    assert rig.parameters['C'] == 3e-10 and rig.tolerance['C'] == 0.0
+    assert rig.unknown == ('V_dead',) and rig.parameters['V_dead'] == 3e-6
+
+
+def test_a_check_says_what_is_nominal_and_not_of_this_size(folder, capsys):
+    (folder / 'like.yaml').write_text(
+        'muscle: {like: dmsp_10_250}\nload: hanging_mass\nvalve: hsv\n')
+    assert main(['rig', 'check', 'like.yaml']) == 0
+    said = capsys.readouterr().out
+    assert ('damping_n_s_per_m: 25 N s/m is the nominal number, of a 5 mm muscle; for one of '
+            '10 mm "pam rig new" writes 100, that of dmsp_10_250_hanging_mass by cross-section.'
+            ) in said
+    assert '"pam rig new" writes 7e-10' in said and 'V_dead: 3e-06 m3 is' not in said
+    for preset in ('dmsp_5_300_hanging_mass', 'dmsp_10_250_hanging_mass'):
+        assert main(['rig', 'check', preset]) == 0
+        assert 'nominal' not in capsys.readouterr().out
 
 
 def test_a_force_map_is_found_from_another_folder(folder, monkeypatch):
