@@ -42,6 +42,7 @@ def run(args: argparse.Namespace) -> int:
     """Load the bags and write the page."""
     from pam_actuation.bags.ending import early_sentences
     from pam_actuation.bags.load_joint import load_recording, MEASURED
+    from pam_actuation.report.full_valves import full_valves
     from pam_actuation.report.joint_page import joint_report
     from pam_actuation.report.origin import default_page, origin
     from pam_actuation.report.pages import bag_report
@@ -53,9 +54,9 @@ def run(args: argparse.Namespace) -> int:
     note_implausible(args, runs)
     write = joint_report if any(MEASURED in run for run in runs) else bag_report
     summary = write(runs, out, of=origin(args.bag, out))
-    remarks = early_sentences(runs) + [
+    remarks = [*early_sentences(runs), *filter(None, map(full_valves, runs)), *(
         f'{title}: {said}' for title, facts in summary.items()
-        for said in facts.get('learned_worse', ())]
+        for said in facts.get('learned_worse', ()))]
     emit(args, {'report': out, 'remarks': remarks, **summary},
          '\n'.join([*(f'remark: {text}' for text in remarks), f'report: {out}']))
     return EXIT_DONE

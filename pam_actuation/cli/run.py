@@ -52,6 +52,7 @@ def run(args: argparse.Namespace) -> int:
     from pam_actuation.bags.layout import METADATA_FILE
     from pam_actuation.bags.place import check_bag_target
     from pam_actuation.rigging.session import run_experiment
+    from pam_actuation.report.full_valves import full_valves_in
     from pam_sim.rig_text import rig_title
     experiment, rig, controller = load_setup(args)
     remarks = tell_remarks(args, experiment, rig.valve, rig, controller, args.rig)
@@ -67,6 +68,8 @@ def run(args: argparse.Namespace) -> int:
             overwrite=args.overwrite, progress=lambda done, total: bar.update(done - bar.n),
             tell=lambda text: bar.write(f'pam run: {text}', file=sys.stderr))
     wall_s = time.perf_counter() - started
+    if result.complete and result.bag:
+        remarks += full_valves_in(result.bag, experiment, rig.valve)
     # A node that was killed could not report its last count.
     counted = '' if result.failure else f', {sum(result.published.values())} published'
     recorded = sum(result.recorded.values())

@@ -19,6 +19,7 @@ from typing import Any, TYPE_CHECKING
 
 from pam_actuation.bags.ending import early_sentences
 from pam_actuation.report.errors import by_part
+from pam_actuation.report.full_valves import full_valves_section
 from pam_actuation.report.metrics import run_metrics, RunMetrics
 from pam_actuation.report.page import paragraph, render, Section, signed, table
 from pam_actuation.report.sections.cycles import cycles
@@ -117,8 +118,9 @@ def experiment_report(runs: 'Sequence[Run]', out_path: StrPath,
     measured = [recorded_metrics(run) for run in runs]
     named = list(zip(titles, measured))
     spread = over_seeds(list(zip(titles, runs, measured)))
-    sections = [early_section(runs), _implausible(list(zip(titles, runs))), metrics(named),
-                seeds_section(spread), cycles(named), overlaid(list(zip(titles, runs)))]
+    sections = [early_section(runs), _implausible(list(zip(titles, runs))),
+                full_valves_section(zip(titles, runs)), metrics(named), seeds_section(spread),
+                cycles(named), overlaid(list(zip(titles, runs)))]
     for k, (title, run) in enumerate(zip(titles, runs)):
         heading = 'Signals over time' + (f': {title}' if len(runs) > 1 else '')
         sections.append(time_plots(run, f'signals-{k}', heading))

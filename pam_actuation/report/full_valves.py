@@ -1,0 +1,62 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""On/off valves that are too small for the motion they were asked for."""
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from pam_actuation.bags.facts import recorded_muscle
+from pam_actuation.bags.load import load_run
+from pam_actuation.report.metrics import saturation_share
+from pam_actuation.report.page import paragraph, Section
+from pam_actuation.rig_files.by_size import by_size
+
+if TYPE_CHECKING:
+    from pam_actuation.experiments.experiment import Experiment
+    from pam_sim.run import Run
+
+MOST = 0.1                   # of the messages fully open; presets need none for smooth motions
+SMALL = 0.8                  # of the conductance by size: worth a word
+
+
+def full_valves(run: 'Run') -> str:
+    """Return a sentence where the valves of a run that tracks stood fully open for long, or ''."""
+    share = saturation_share(run)
+    if share is None or share[0] is not None or share[1] <= MOST or 'reference' not in run:
+        return ''
+    rig = recorded_muscle(run.metadata, run.namespace)
+    number = '' if rig is None else f' (C is {rig.parameters["C"]:.3g} m3/(s Pa)'
+    if rig is not None:
+        usual = by_size(rig.muscle.bore_m, rig.muscle.length_m)['C']
+        number += f'; {usual.value:.3g} by the size of the muscle)' \
+            if rig.parameters['C'] < SMALL * usual.value else ')'
+    return (f'a valve stood fully open for {100 * share[1]:.0f} % of the time, so the valves '
+            'limit this motion, and the error says little of the controller; take larger valves'
+            f'{number}, a higher supply pressure or a slower motion')
+
+
+def full_valves_in(bag: str, experiment: 'Experiment', valve: str) -> list[str]:
+    """Return that sentence of a bag that was just recorded, if any."""
+    if valve != 'hsv' or not experiment.asks_for_motion or experiment.domain == 'joint_angle':
+        return []
+    said = full_valves(load_run(bag))
+    return [said] if said else []
+
+
+def full_valves_section(runs: 'Iterable[tuple[str, Run]]') -> Section | None:
+    """Return the section on such runs by their titles, None where there is none."""
+    told = [(title, said) for title, run in runs if (said := full_valves(run))]
+    return Section('full_valves', 'Valves too small', ''.join(
+        paragraph(f'{title}: {said}.') for title, said in told)) if told else None
