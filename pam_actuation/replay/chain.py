@@ -43,6 +43,7 @@ from pam_actuation.plant_loop import PlantLoop
 from pam_actuation.replay.arrivals import (
     ORDER, recorded_topics, recorded_topics_of_joint, RecordedTopic)
 from pam_actuation.replay.difference import Difference, difference
+from pam_actuation.replay.tracking import Tracking, tracking
 from pam_actuation.topics.table import short_name
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.errors import InputError
@@ -75,6 +76,7 @@ class ChainReplay:
 
     ``stamp_ns``, ``recorded`` and ``replayed`` map ``topic.field`` to arrays of equal length,
     SI; ``rig`` is the name of the simulated rig, ``start_ns`` the first stamp of the run.
+    ``tracking`` says how well the reference was tracked, where a whole experiment is repeated.
     """
 
     rig: str
@@ -82,6 +84,7 @@ class ChainReplay:
     recorded: dict[str, FloatArray]
     replayed: dict[str, FloatArray]
     start_ns: int
+    tracking: tuple[Tracking, ...] = ()
 
     @property
     def differences(self) -> list[Difference]:
@@ -98,6 +101,7 @@ class ChainReplay:
     def to_dict(self) -> dict[str, object]:
         """Return plain data for ``--json``."""
         return {'rig': self.rig, 'identical': self.identical,
+                'tracking': [one.to_dict() for one in self.tracking],
                 'signals': [one.to_dict() for one in self.differences]}
 
     def lines(self) -> list[str]:
@@ -105,7 +109,7 @@ class ChainReplay:
         what = f'controller, driver and {self.rig} in a closed loop on the recorded reference'
         if not any('pressure_command' in name for name in self.recorded):
             what = f'driver and {self.rig} on the recorded commands'
-        return [f'chain: {what}', *(one.line() for one in self.differences)]
+        return [f'chain: {what}', *(one.line() for one in (*self.tracking, *self.differences))]
 
     def arrays(self) -> dict[str, IntArray | FloatArray]:
         """Return all arrays by name, for saving."""
@@ -300,7 +304,8 @@ def replay_chain(run: Run,
     chain = RepeatedLoops(rig, law, recorded_seed(run), run.namespace.rpartition('/')[2],
                           changes=as_recorded(run.metadata, run.path))
     chain.run(recorded)
-    return ChainReplay(rig.name, *chain.signals(), run.start_ns)
+    signals = chain.signals()
+    return ChainReplay(rig.name, *signals, run.start_ns, tracking(run, *signals))
 
 
 def recorded_seed(run: Run) -> int:

@@ -36,6 +36,7 @@ from pam_actuation.replay.driver import replay_driver
 from pam_actuation.replay.model import model_of
 from pam_actuation.replay.plant import replay_plant
 from pam_actuation.replay.settings import changed_controller
+from pam_actuation.report.metrics import run_metrics
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.run import Run, Series
@@ -133,6 +134,21 @@ def test_another_tuning_in_the_closed_loop_changes_what_the_muscle_did(runs, cap
     assert main(['replay', bag, '--only', 'controller', '--set', 'lead_s=0.02']) == 0
     printed = capsys.readouterr().out
     assert 'another tuning' in printed and 'takes it 0.02 s ahead (lead_s)' in printed
+
+
+def test_the_chain_says_whether_the_reference_was_tracked_better(runs, capsys):
+    same, = replay_chain(runs['sofc_ppr']).tracking
+    assert same.recorded == same.replayed == pytest.approx(
+        run_metrics(runs['sofc_ppr']).rmse_m, rel=1e-3)
+    bag = str(bag_of('sofc_ppr'))
+    assert main(['replay', bag, '--chain', '--set', 'pid', '--json']) == 0
+    told, = json.loads(capsys.readouterr().out)['chain']['tracking']
+    assert told['quantity'] == 'contraction' and told['unit'] == 'm'
+    assert told['recorded_rmse'] == same.recorded != told['replayed_rmse']
+    assert main(['replay', bag, '--chain', '--set', 'pid']) == 0
+    word = 'better' if told['replayed_rmse'] < told['recorded_rmse'] else 'worse'
+    line = capsys.readouterr().out.splitlines()[1]
+    assert line.startswith('  tracking of contraction: rms error') and line.endswith(f'% {word}')
 
 
 def test_single_settings_change_the_recorded_controller(runs):
