@@ -47,8 +47,9 @@ def did_you_mean(
     """
     Return a hint at the known name that a wrong one is nearest to, empty without any.
 
-    Capitals count for nothing, nor does ``-`` instead of ``_``. Without a similar
-    name the first one that begins with the wrong one, or holds it, is near.
+    Capitals count for nothing, nor does ``-`` instead of ``_``. A name of which the wrong one is
+    the first word or words is nearest. Without a similar name the first one that begins with the
+    wrong one, or holds it, is near.
 
     Parameters
     ----------
@@ -69,7 +70,8 @@ def did_you_mean(
     spelled: dict[str, str] = {}
     for one in spellings:
         spelled.setdefault(_plain(one), one)
-    near = difflib.get_close_matches(plain, spelled, n=1) \
+    near = [one for one in spelled if one.startswith(f'{plain}_')] \
+        or difflib.get_close_matches(plain, spelled, n=1) \
         or [one for one in spelled if len(plain) > 1 and one.startswith(plain)] \
         or [one for one in spelled if len(plain) > 2 and plain in one]
     return inside.format(f'{quote}{spelled[near[0]]}{quote}') if near else ''

@@ -23,6 +23,8 @@ from pam_sim.declared import check_fields, shown
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.units import allowed_range
 
+MOST_LISTED = 20             # names that a message lists beside a hint
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -135,9 +137,12 @@ def check_given(
     result = {}
     for name, value in values.items():
         if name not in known:
-            raise InputError(
-                f'unknown {what} `{name}`{did_you_mean(name, known)}; allowed: '
-                f'{", ".join(known) or "none"}', place(name) if callable(place) else place)
+            hint = did_you_mean(name, known)
+            # A list that nobody reads hides the name that was meant.
+            listed = '' if hint and len(known) > MOST_LISTED else (
+                f'; allowed: {", ".join(known) or "none"}')
+            raise InputError(f'unknown {what} `{name}`{hint}{listed}',
+                             place(name) if callable(place) else place)
         result[name] = known[name].check(value, place(name) if callable(place) else place)
     return result
 

@@ -17,6 +17,7 @@
 import bisect
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+import math
 from typing import Any, TYPE_CHECKING
 
 from pam_actuation.experiments.primitives import make_primitive
@@ -126,14 +127,18 @@ class Chain:
         domain, duration_s = self.domain, primitive.duration_s
         unit = _SHOWN.get(domain.unit, domain.unit)
         count = min(max(round(duration_s / CHECK_EVERY_S), 200), _MOST_CHECKS)
-        for k in range(count + 1):
-            t = duration_s * k / count
-            value, rate = primitive.at(t)
-            if not domain.lower - 1e-9 <= value <= domain.upper + 1e-9:
-                allowed = allowed_range(domain.lower, domain.upper, unit)
-                raise InputError(
-                    f'{name} reaches {value:.6g} {unit} after {t:.3g} s; allowed for '
-                    f'{domain.name} is {allowed}', where)
+        samples = [(duration_s * k / count, *primitive.at(duration_s * k / count))
+                   for k in range(count + 1)]
+        # By the value that is farthest out, the last of equal ones: what a person has written.
+        beyond, t, worst = max(
+            (math.inf if math.isnan(value) else max(domain.lower - value, value - domain.upper),
+             t, value) for t, value, _ in samples)
+        if beyond > 1e-9:
+            allowed = allowed_range(domain.lower, domain.upper, unit)
+            raise InputError(
+                f'{name} reaches {worst:.6g} {unit} after {t:.3g} s; allowed for '
+                f'{domain.name} is {allowed}', where)
+        for t, _, rate in samples:
             if not abs(rate) <= domain.fastest:
                 raise InputError(
                     f'{name} moves at {abs(rate):.4g} {unit}/s after {t:.3g} s; allowed '

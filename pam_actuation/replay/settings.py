@@ -18,6 +18,7 @@ import os
 from typing import TYPE_CHECKING
 
 from pam_actuation.control.config import load_controller
+from pam_actuation.control.sofc.persistence import NO_FIT
 from pam_sim.errors import InputError
 from pam_sim.joint import load_rig_or_joint
 from pam_sim.located_yaml import dump_yaml, load_yaml
@@ -25,6 +26,10 @@ from pam_sim.located_yaml import dump_yaml, load_yaml
 if TYPE_CHECKING:
     from pam_actuation.control.config import Controller
     from pam_sim.run import Run
+
+
+OTHER_RULES = ('; the rules have their meaning with the recorded value only: "pam tune" tunes it '
+               'with new rules, and "pam simulate --controller FILE" begins with new rules')
 
 
 def changed_controller(run: 'Run', wanted: list[str] | None,
@@ -74,7 +79,8 @@ def changed_controller(run: 'Run', wanted: list[str] | None,
     try:
         return load_controller(dump_yaml(tree))
     except InputError as error:
-        raise InputError(error.problem, f'--set {" ".join(changes)}') from None
+        advice = OTHER_RULES if error.problem.startswith(NO_FIT) else ''
+        raise InputError(f'{error.problem}{advice}', f'--set {" ".join(changes)}') from None
 
 
 def preview_remark(run: 'Run', controller: object) -> tuple[str, ...]:

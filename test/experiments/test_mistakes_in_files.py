@@ -60,6 +60,14 @@ def test_a_comma_in_experiments_and_controllers_too():
     assert '`lead_s: 0,1` has a decimal comma' in said(load_controller, text)
 
 
+@pytest.mark.parametrize('segment, words', [
+    ('ramp: {to_pa: 350, duration_s: 1.0}', 'ramp reaches 350 Pa after 1 s; allowed'),
+    ('ramp: {to_pa: 2.0e+9, duration_s: 1.0}', 'ramp reaches 2e+09 Pa after 1 s; allowed'),
+    ('hold: {duration_s: .nan}', 'duration_s')])
+def test_a_value_out_of_range_is_the_one_that_was_written(segment, words):
+    assert words in said(load_experiment, f'name: x\ndomain: pressure\nsegments:\n  - {segment}\n')
+
+
 @pytest.mark.parametrize('text, words', [
     ('muscle: dmsp_5_300\nvalve: ppr\n', ('`load` is missing beside `muscle`', 'isometric')),
     ('valve: ppr\nload: hanging_mass\n', ('2: `muscle` is missing beside `load`', 'dmsp_10_250')),

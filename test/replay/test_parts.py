@@ -161,6 +161,8 @@ def test_single_settings_change_the_recorded_controller(runs):
     assert both.settings['lead_s'] != changed_controller(
         run, ['learning_rate=0.5']).settings['lead_s']
     for wanted, words in ((['lead=1'], 'did you mean `lead_s`'), (['lead_s=fast'], 'a number'),
+                          (['integral=1e7'], r'did you mean `integral_pa_per_m_s`\?\)$'),
+                          (['feedback_gain_pa=1e4'], 'do not fit .*"pam tune" tunes it with'),
                           (['lead_s=99'], 'allowed 0 to 0.5'),
                           (['sofc_ppr', 'pid'], 'two controllers')):
         with pytest.raises(InputError, match=words):

@@ -39,6 +39,7 @@ from pam_sim.keys import Key, names_of
 from pam_sim.parameters import check_parameters
 from pam_sim.valve import VALVES
 
+NO_FIT = 'rules do not fit this controller'
 MOST_PA = 1e6             # largest number of a model
 MAX_BYTES = 2**24         # more than the largest tables the settings allow
 # Lengths of the axes of every table: numbers, or the entry of the scaling that says it.
@@ -251,8 +252,7 @@ def check_fit(rules: RuleBase, expected: RuleBase, where: str) -> None:
             differences.append(f'{key} {_stated(mine)} (here {_stated(other)})')
     if differences:
         raise InputError(
-            f'rules do not fit this controller: they were learned with '
-            f'{", ".join(differences)}', where)
+            f'{NO_FIT}: they were learned with {", ".join(differences)}', where)
     for name in RuleBase.NAMES:
         mine, other = getattr(rules, name).shape, getattr(expected, name).shape
         if mine != other:
