@@ -232,9 +232,13 @@ def _check(args: argparse.Namespace) -> int:
     from pam_sim.rig_text import rig_title
     rig = load_rig(args.file)
     remarks = [*nominal_beside_size(rig), *idle_remarks(args.file, rig)]
-    lines = [rig_title(rig), f'load {rig.load}, valve {rig.valve}', *_numbers_text(rig),
-             *(f'remark: {text}' for text in remarks)]
-    emit(args, {'rig': rig.name, 'load': rig.load, 'valve': rig.valve, **_numbers(rig),
+    size = f'muscle of {1e3 * rig.muscle.bore_m:.4g} mm by {1e3 * rig.muscle.length_m:.4g} mm'
+    lines = [rig_title(rig), f'{size}, load {rig.load}, valve {rig.valve}', *_numbers_text(rig),
+             *_exact_text(rig), *(f'remark: {text}' for text in remarks)]
+    emit(args, {'rig': rig.name, 'load': rig.load, 'valve': rig.valve,
+                'muscle': {'bore_m': rig.muscle.bore_m, 'length_m': rig.muscle.length_m},
+                **_numbers(rig), 'exact': [{'name': p.name, 'unit': p.unit,
+                                            'value': rig.number(p.name)} for p in _exact(rig)],
                 'remarks': remarks}, '\n'.join(lines))
     return EXIT_DONE
 
@@ -252,7 +256,20 @@ def _numbers_text(rig: 'Rig') -> list[str]:
              if p.name in rig.unknown]
     return lines + [
         f'  {p.name}: {rig.number(p.name):.6g} ± {_short(rig.prior_sd(p.name))}'
-        f'{behind_number(p.unit)}' for p in _inexact(rig)]
+        f'{behind_number(p.unit)}{_as_gauge(rig, p.name)}' for p in _inexact(rig)]
+
+
+def _exact_text(rig: 'Rig') -> list[str]:
+    from pam_sim.units import behind_number
+    return [f'  {p.name}: {rig.number(p.name):.6g}{behind_number(p.unit)}'
+            f'{_as_gauge(rig, p.name)}, exact' for p in _exact(rig)]
+
+
+def _as_gauge(rig: 'Rig', name: str) -> str:
+    """Return the supply pressure once more as people read it; '' for another number."""
+    from pam_sim.units import gauge_kpa
+    return '' if name != 'supply_pa' else (
+        f' absolute ({gauge_kpa(rig.number(name)):.4g} kPa gauge)')
 
 
 def _short(sd: float) -> str:
@@ -269,10 +286,21 @@ def _law_text(rig: 'Rig') -> list[str]:
             'found as well']
 
 
-def _inexact(rig: 'Rig') -> list[Any]:
-    """Return the parameters of rig and valve that are neither unknown nor exact."""
+def _of_this_valve(rig: 'Rig') -> list[Any]:
+    """Return the parameters of a rig without those of the other kind of valve."""
     from pam_sim.valve import hsv, ppr
     other = {p.name for p in (hsv if rig.valve == 'ppr' else ppr).PARAMETERS}
-    return [p for p in rig.number_list if p.name in rig.tolerance
-            and p.name not in rig.unknown and p.name not in other
-            and rig.prior_sd(p.name) > 0.0]
+    return [p for p in rig.number_list if p.name not in other]
+
+
+def _inexact(rig: 'Rig') -> list[Any]:
+    """Return the parameters of rig and valve that are neither unknown nor exact."""
+    return [p for p in _of_this_valve(rig) if p.name in rig.tolerance
+            and p.name not in rig.unknown and rig.prior_sd(p.name) > 0.0]
+
+
+def _exact(rig: 'Rig') -> list[Any]:
+    """Return the exact numbers of muscle, load and valve."""
+    from pam_sim.sensors import ZEROS
+    known = {p.name for p in (*_inexact(rig), *ZEROS, *rig.law_list)}
+    return [p for p in _of_this_valve(rig) if p.name not in known and p.name not in rig.unknown]

@@ -372,6 +372,21 @@ def test_check_tells_what_is_unknown_and_how_well_the_rest_is_known(capsys):
     assert main(['rig', 'check']) == 2 and main(['rig', 'check', 'none.yaml']) == 2
 
 
+def test_check_shows_what_is_exact_and_the_supply_as_gauge_too(folder, capsys):
+    (folder / 'slip.yaml').write_text(
+        'muscle: dmsp_10_250\nload: hanging_mass\nvalve: hsv\nparameters: {mass_kg: 4.0, '
+        'spring_n_per_m: 0.8, supply_pa: 600000.0}\ntolerance: {mass_kg: 0.0}\n')
+    assert main(['rig', 'check', 'slip.yaml']) == 0
+    printed = capsys.readouterr().out
+    assert 'muscle of 10 mm by 250 mm, load hanging_mass, valve hsv\n' in printed
+    assert '  mass_kg: 4 kg, exact\n' in printed and 'spring_n_per_m: 0.8 ± ' in printed
+    assert 'supply_pa: 600000 ± 3000 Pa absolute (498.7 kPa gauge)\n' in printed
+    assert main(['rig', 'check', 'slip.yaml', '--json']) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert {'name': 'mass_kg', 'unit': 'kg', 'value': 4.0} in told['exact']
+    assert told['muscle'] == {'bore_m': 0.01, 'length_m': 0.25}
+
+
 def test_questions_come_again_until_the_answer_is_possible():
     answers = iter(['dsmp', 'own', '5', '200', '', 'hanging_mass', '-1', 'unknown', '300±100',
                     'ppr', 'smc_itv1050', '0-10', '0:10', '', '200', '', ''])
