@@ -109,7 +109,8 @@ class ChainReplay:
         what = f'controller, driver and {self.rig} in a closed loop on the recorded reference'
         if not any('pressure_command' in name for name in self.recorded):
             what = f'driver and {self.rig} on the recorded commands'
-        return [f'chain: {what}', *(one.line() for one in (*self.tracking, *self.differences))]
+        return [f'chain: {what}', *(one.line() for one in self.tracking),
+                *(one.line() for one in self.differences)]
 
     def arrays(self) -> dict[str, IntArray | FloatArray]:
         """Return all arrays by name, for saving."""

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 import math
 from typing import Any
 
-from pam_actuation.rig_files.by_size import BySize, by_size, DAMPING, nearest_muscle
+from pam_actuation.rig_files.by_size import by_size, BySize, DAMPING, nearest_muscle
 from pam_actuation.rig_files.numbers import Stated
 from pam_sim.errors import InputError
 from pam_sim.muscle.geometry import (

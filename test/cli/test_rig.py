@@ -379,7 +379,7 @@ def test_check_shows_what_is_exact_and_the_supply_as_gauge_too(folder, capsys):
     assert main(['rig', 'check', 'slip.yaml']) == 0
     printed = capsys.readouterr().out
     assert 'muscle of 10 mm by 250 mm, load hanging_mass, valve hsv\n' in printed
-    assert '  mass_kg: 4 kg, exact\n' in printed and 'spring_n_per_m: 0.8 ± ' in printed
+    assert '  mass_kg: 4 kg, exact\n' in printed and 'spring_n_per_m: 0.8 N/m, exact' in printed
     assert 'supply_pa: 600000 ± 3000 Pa absolute (498.7 kPa gauge)\n' in printed
     assert main(['rig', 'check', 'slip.yaml', '--json']) == 0
     told = json.loads(capsys.readouterr().out)
