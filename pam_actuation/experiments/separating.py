@@ -61,6 +61,7 @@ NOISE = {'pressure': 300.0, 'contraction': 1e-5, 'force': 0.1}     # where nothi
 SENSOR_NOISE = {'pressure': 'pressure_noise_pa', 'contraction': 'contraction_noise_m',
                 'force': 'force_noise_n'}
 PREFIX = 'tell_apart'
+LOOPS = (1.0, 2.0 / 3.0, 1.0 / 3.0)    # of the range, one after the other at one speed
 LEAST = 0.05                 # floors per sample; rivals that differ by less give the same signals
 CLEAR = 1.0                  # floors per sample between rivals that need no further sensor
 SURE_T = 4.0                 # of a test on simulated data; the rig's own forms take a part of it
@@ -101,9 +102,9 @@ def menu(valve: str, highest_pa: float = HIGHEST_GAUGE_PA) -> Menu:
         'edges': ('sharp steps at random times show transport and speed', [
             {'random_steps': {**band, 'min_hold_s': 0.25, 'max_hold_s': 0.9,
                               'duration_s': 16.0, 'seed': 7}}]),
-        'loops': ('slow moves with inner loops show what depends on the path', [
-            {'triangle_loops': {**band, 'depth_pa': 0.15 * half, 'loops': 2,
-                                'period_s': 12.0, 'cycles': 1}}]),
+        'loops': ('slow loops of three sizes show what depends on the path', [
+            {'triangle': {'low_pa': low, 'high_pa': low + size * (high - low),
+                          'period_s': 9.0 * size, 'cycles': 1}} for size in LOOPS]),
         'bands': ('the same motion at a low and a high pressure shows what grows with it', [
             {'two_bands': {'low_center_pa': middle - 0.6 * half,
                            'high_center_pa': middle + 0.6 * half,
@@ -241,7 +242,7 @@ def not_played(valve: str, names: Collection[str]) -> tuple[str, ...]:
 
 def _experiment(pieces: Menu, names: Sequence[str], highest_pa: float) -> dict[str, Any]:
     """Return an experiment as plain data: rest, then pieces of the menu, each from below."""
-    low = {'ramp': {'to_pa': P_ATM_PA + lowest_gauge_pa(highest_pa), 'duration_s': 1.5}}
+    low = {'step': {'to_pa': P_ATM_PA + lowest_gauge_pa(highest_pa), 'duration_s': 1.5}}
     segments: list[dict[str, dict[str, float]]] = [{'rest': {'duration_s': 1.0}}]
     for name in names:
         segments += [low, *pieces[name][1]]

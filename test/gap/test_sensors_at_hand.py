@@ -206,6 +206,21 @@ def test_the_next_experiment_stays_below_what_was_recorded_and_the_rig_gives(
         assert f'The pressure rises to {1e-3 * most_pa:.0f} kPa gauge at most.' in found['why']
 
 
+def test_the_next_experiment_uses_the_primitives_that_other_programs_know(monkeypatch):
+    monkeypatch.setattr(separating, 'simulated', lambda plain, rig: plain)
+    monkeypatch.setattr(separating, 'separation', lambda *given: (5.0, 2.0))
+    known = {'rest', 'step', 'hold', 'triangle', 'random_steps', 'multisine', 'decay', 'two_bands'}
+    for valve in ('ppr', 'hsv'):
+        rig = load_rig('dmsp_5_300_hanging_mass', valve=valve)
+        rivals = [(name, rig, None, ()) for name in ('end_taper', 'bladder_stiffness')]
+        for piece in separating.menu(valve):
+            found = separating.next_experiment(rig, rivals, ('pressure', 'contraction'), {},
+                                               pieces=[piece])
+            used = {name for one in found['experiment']['segments'] for name in one}
+            assert used <= known, piece
+            assert load_experiment(dump_yaml(found['experiment'])).domain == 'pressure'
+
+
 def test_a_plan_stays_below_what_the_regulator_gives():
     for name, segments in protocols.pieces('ppr', separating.within_reach(*weak())).items():
         assert highest_gauge_pa({'name': name, 'domain': 'pressure', 'segments': [
