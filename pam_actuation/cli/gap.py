@@ -92,11 +92,11 @@ def run(args: argparse.Namespace) -> int | None:
     model = args.model or recorded_model(args.run[0])
     for question in questions(model, args.run[0], args.namespace, args.renamed):
         out = os.path.join(args.out, question.side) if question.side else args.out
-        found[question.side], runs = _ask(args, question, out)
+        found[question.side], runs = _ask(args, question, out, model)
         result = found[question.side]
         lines += [f'{question.side}:'] if question.side else []
         lines += [result.text(), f'results: {out}',
-                  *_next_lines(result, out, [] if question.side else runs)]
+                  *_next_lines(result, out, runs, _joint_model(question, model))]
     alone = found.get('')
     emit(args, alone.to_dict() if alone is not None else {
         'schema': 1, **{side: result.to_dict() for side, result in found.items()}},
@@ -105,7 +105,14 @@ def run(args: argparse.Namespace) -> int | None:
     return EXIT_FINDING if refused else EXIT_DONE
 
 
-def _ask(args: argparse.Namespace, question: 'Question', out: str
+def _joint_model(question: 'Question', model: str) -> str:
+    """Return preset or file of the joint of which the muscle is asked about, '' of no joint."""
+    if question.joint is None:
+        return ''
+    return question.joint.name if '\n' in model else model
+
+
+def _ask(args: argparse.Namespace, question: 'Question', out: str, model: str
          ) -> 'tuple[GapResult, Sequence[Run]]':
     """Return the result for one muscle, written into its folder, and its recordings."""
     from pam_actuation.report.gap import FILES, write_gap
@@ -120,11 +127,13 @@ def _ask(args: argparse.Namespace, question: 'Question', out: str
     note_implausible(args, [*runs, *([certify] if certify else [])])
     with progress(args, 1.0, '', question.side or 'gap') as bar:
         return write_gap(
-            runs, question.model, out, certify, of, effects=names, seconds=args.seconds,
+            runs, question.model, out, certify, of, _joint_model(question, model),
+            joint=question.joint, effects=names, seconds=args.seconds,
             materiality=args.materiality, progress=lambda done: bar.update(done - bar.n)), runs
 
 
-def _next_lines(result: 'GapResult', out: str, runs: 'Sequence[Run]' = ()) -> list[str]:
+def _next_lines(result: 'GapResult', out: str, runs: 'Sequence[Run]' = (),
+                joint_model: str = '') -> list[str]:
     """Return how to use a model without a name, what to measure next and how, if anything."""
     from pathlib import Path
     from pam_actuation.report.gap import next_command, with_term
@@ -138,8 +147,8 @@ def _next_lines(result: 'GapResult', out: str, runs: 'Sequence[Run]' = ()) -> li
                   f'--rig {model} --out runs/surrogate']
     if result.next_experiment:
         lines += [f'what to measure next: {result.next_experiment["why"]}',
-                  'next: ' + next_command(result, Path(out) / 'next_experiment.yaml', runs,
-                                          Path(out) / 'model.yaml')]
+                  'next: ' + next_command(Path(out) / 'next_experiment.yaml', runs,
+                                          Path(out) / 'model.yaml', joint_model)]
     return lines
 
 

@@ -24,6 +24,7 @@ asked for where none was there and the rivals stay together without it.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
 import math
 from pathlib import Path
 import tempfile
@@ -36,6 +37,7 @@ from pam_actuation.control.config import Controller
 from pam_actuation.experiments.experiment import load_experiment
 from pam_actuation.experiments.limits import highest_gauge_pa
 from pam_actuation.experiments.offline import simulate_experiment
+from pam_actuation.experiments.separating_joint import InJoint, LOOPS
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.gap.criteria import CRITERIA
@@ -61,7 +63,6 @@ NOISE = {'pressure': 300.0, 'contraction': 1e-5, 'force': 0.1}     # where nothi
 SENSOR_NOISE = {'pressure': 'pressure_noise_pa', 'contraction': 'contraction_noise_m',
                 'force': 'force_noise_n'}
 PREFIX = 'tell_apart'
-LOOPS = (1.0, 2.0 / 3.0, 1.0 / 3.0)    # of the range, one after the other at one speed
 LEAST = 0.05                 # floors per sample; rivals that differ by less give the same signals
 CLEAR = 1.0                  # floors per sample between rivals that need no further sensor
 SURE_T = 4.0                 # of a test on simulated data; the rig's own forms take a part of it
@@ -130,7 +131,8 @@ def next_experiment(
         noise: Mapping[str, float],
         out_of_time: Callable[[], bool] = lambda: False,
         pieces: Collection[str] = (), may_add_cell: bool = True,
-        recorded_pa: float = HIGHEST_GAUGE_PA) -> dict[str, Any] | None:
+        recorded_pa: float = HIGHEST_GAUGE_PA,
+        place: InJoint | None = None) -> dict[str, Any] | None:
     """
     Return the experiment that separates rivals best, as gap.json states it, or None.
 
@@ -154,24 +156,25 @@ def next_experiment(
         Whether a load cell that was not recorded may be asked for.
     recorded_pa : float
         The highest pressure that the recordings held, Pa gauge; the experiment stays below it.
+    place : InJoint, optional
+        The joint of which it is a muscle; the experiment is one of the joint then.
 
     """
-    highest_pa = within_reach(rig, rivals[0][1], recorded_pa=recorded_pa)
-    known = menu(rig.valve, highest_pa)
-    found = _tried(rig, rivals, {name: known[name] for name in pieces or known}, recorded, noise,
-                   out_of_time, may_add_cell, highest_pa)
+    at = place or _Alone(rig.valve, within_reach(rig, rivals[0][1], recorded_pa=recorded_pa))
+    known = at.menu()
+    found = _tried(rig, rivals, {name: known[name] for name in pieces or known if name in known},
+                   recorded, noise, out_of_time, may_add_cell, at)
     best = max(found, default=None)
     if best is None or best.sigma < LEAST:
         return None
     # The rig's own forms blur a part of what is told: the next best piece follows.
     others = [one for one in found if one.name != best.name and one.with_cell == best.with_cell]
-    plain = _experiment(
-        known, [best.name, *([max(others).name] if others else [])], highest_pa)
+    plain = _experiment(known, [best.name, *([max(others).name] if others else [])], at)
     needs = ['pressure', 'contraction', *(['force'] if best.with_cell else [])]
     names = [rival[0] for rival in rivals]
     text = (f'{plain["description"]}. Run with {names[0]} as the truth, the first part leaves '
             f'{" and ".join(names[1:])} off by {best.sigma:.2g} noise floors per sample after '
-            f'refit. The pressure rises to {1e-3 * highest_pa:.0f} kPa gauge at most.')
+            f'refit. {at.limit}')
     if best.with_cell:
         text += ' It needs a load cell, which the recording does not have.'
     return {'name': plain['name'], 'why': text, 'separation_sigma': best.sigma,
@@ -179,12 +182,34 @@ def next_experiment(
 
 
 def cell_would_tell(rig: Rig, rivals: Sequence[Rival], noise: Mapping[str, float],
-                    recorded_pa: float = HIGHEST_GAUGE_PA) -> bool:
+                    recorded_pa: float = HIGHEST_GAUGE_PA, place: InJoint | None = None) -> bool:
     """Return whether a load cell would tell rivals apart, by an experiment of the menu."""
-    highest_pa = within_reach(rig, rivals[0][1], recorded_pa=recorded_pa)
-    return any(one.is_clear for piece in menu(rig.valve, highest_pa).items()
+    at = place or _Alone(rig.valve, within_reach(rig, rivals[0][1], recorded_pa=recorded_pa))
+    return any(one.is_clear for piece in at.menu().items()
                for one in _tried(rig, rivals, dict([piece]), ('force',), noise, lambda: False,
-                                 False, highest_pa))
+                                 False, at))
+
+
+@dataclass(frozen=True)
+class _Alone:
+    """A muscle of its own, and the highest pressure [Pa gauge] it may get."""
+
+    valve: str
+    highest_pa: float
+
+    @property
+    def limit(self) -> str:
+        return f'The pressure rises to {1e-3 * self.highest_pa:.0f} kPa gauge at most.'
+
+    def menu(self) -> Menu:
+        return menu(self.valve, self.highest_pa)
+
+    def begin(self) -> dict[str, Any]:
+        return {'domain': 'pressure', 'low': {'step': {
+            'to_pa': P_ATM_PA + lowest_gauge_pa(self.highest_pa), 'duration_s': 1.5}}}
+
+    def simulated(self, plain: dict[str, Any], truth: Rig) -> RecordedRun:
+        return simulated(plain, truth)
 
 
 class _Tried(NamedTuple):
@@ -199,7 +224,7 @@ class _Tried(NamedTuple):
 
 def _tried(rig: Rig, rivals: Sequence[Rival], pieces: Menu, recorded: Collection[str],
            noise: Mapping[str, float], out_of_time: Callable[[], bool], may_add_cell: bool,
-           highest_pa: float) -> list[_Tried]:
+           place: '_Alone | InJoint') -> list[_Tried]:
     """Return how well each piece separates the rivals; one that cannot run is left out."""
     truth = rivals[0][1].with_(sensors=_sensors(noise))
     runs: dict[str, RecordedRun] = {}
@@ -213,7 +238,7 @@ def _tried(rig: Rig, rivals: Sequence[Rival], pieces: Menu, recorded: Collection
                 break
             try:
                 if name not in runs:
-                    runs[name] = simulated(_experiment(pieces, [name], highest_pa), truth)
+                    runs[name] = place.simulated(_experiment(pieces, [name], place), truth)
                 sigma, sure = separation(
                     runs[name], rig, rivals, with_cell or 'force' in recorded)
             except InputError:
@@ -240,14 +265,14 @@ def not_played(valve: str, names: Collection[str]) -> tuple[str, ...]:
     return tuple(piece for piece in menu(valve) if piece not in shown)
 
 
-def _experiment(pieces: Menu, names: Sequence[str], highest_pa: float) -> dict[str, Any]:
+def _experiment(pieces: Menu, names: Sequence[str], place: '_Alone | InJoint') -> dict[str, Any]:
     """Return an experiment as plain data: rest, then pieces of the menu, each from below."""
-    low = {'step': {'to_pa': P_ATM_PA + lowest_gauge_pa(highest_pa), 'duration_s': 1.5}}
+    begin = place.begin()
     segments: list[dict[str, dict[str, float]]] = [{'rest': {'duration_s': 1.0}}]
     for name in names:
-        segments += [low, *pieces[name][1]]
+        segments += [begin['low'], *pieces[name][1]]
     text = '; '.join(pieces[name][0] for name in names)
-    return {'name': '_'.join([PREFIX, *names]), 'domain': 'pressure', 'segments': segments,
+    return {'name': '_'.join([PREFIX, *names]), 'domain': begin['domain'], 'segments': segments,
             'description': f'{text[0].upper()}{text[1:]}'}
 
 

@@ -32,8 +32,9 @@ import numpy as np
 from pam_actuation.bags.ending import early_sentences
 from pam_actuation.bags.writer import BagWriter
 from pam_actuation.experiments.separating import cell_would_tell, next_experiment, not_played
+from pam_actuation.experiments.separating_joint import in_joint
 from pam_actuation.report.model_held import model_held
-from pam_actuation.report.next_run import command_on_rig, is_of_muscle
+from pam_actuation.report.next_run import command_on_rig
 from pam_actuation.report.page import render
 from pam_actuation.report.pages import FOOTER
 from pam_actuation.report.sections.gap import gap_section, VERDICT_TEXT
@@ -58,7 +59,7 @@ from pam_sim.gap.propose.surrogate import FILE as SURROGATE_FILE
 from pam_sim.gap.select.memory import memories
 from pam_sim.gap.subsystems.simulation import free_run
 from pam_sim.identify.before_gap import numbers_block, numbers_first, numbers_text
-from pam_sim.joint import joint_preset_names, load_rig_or_side
+from pam_sim.joint import joint_preset_names, JointRig, load_rig_or_side
 from pam_sim.joint.parameters import SIDES
 from pam_sim.located_yaml import dump_yaml
 from pam_sim.rig import Rig
@@ -77,7 +78,8 @@ FOLDERS = ('measured', 'simulated_before', 'simulated_refit', 'simulated_after',
 
 
 def write_gap(runs: 'Sequence[Run]', model: 'StrPath | Rig', out_dir: StrPath,
-              certify: 'Run | None' = None, of: str = '', **options: Any) -> 'GapResult':
+              certify: 'Run | None' = None, of: str = '', joint_model: StrPath = '',
+              **options: Any) -> 'GapResult':
     """
     Find the gap between recordings and a model and write the result folder.
 
@@ -95,8 +97,10 @@ def write_gap(runs: 'Sequence[Run]', model: 'StrPath | Rig', out_dir: StrPath,
         Recording for the proof; by default blocks of the first one.
     of : str
         Words in the head of the page that tell of what it is.
+    joint_model : str or path
+        Preset or file of the joint of which it is a muscle, for the command of what comes next.
     options
-        As of :func:`pam_sim.gap.find_gap`.
+        As of ``gap_of``.
 
     Returns
     -------
@@ -110,17 +114,19 @@ def write_gap(runs: 'Sequence[Run]', model: 'StrPath | Rig', out_dir: StrPath,
     """
     check_folder(out_dir)
     result = gap_of(runs, model, certify, **options)
-    save_gap(result, certify or runs[0], out_dir, of)
+    save_gap(result, certify or runs[0], out_dir, of, joint_model)
     return result
 
 
 def gap_of(runs: 'Sequence[Run]', model: 'StrPath | Rig', certify: 'Run | None' = None,
-           played: Collection[str] = (), **options: Any) -> 'GapResult':
+           played: Collection[str] = (), joint: JointRig | None = None,
+           **options: Any) -> 'GapResult':
     """
     Find the gap between recordings and a model, and the experiment that would tell rivals apart.
 
     Arguments and errors as of ``write_gap``; nothing is written. ``played`` names experiments
-    that were suggested and recorded before: their pieces are not suggested again.
+    that were suggested and recorded before: their pieces are not suggested again. ``joint`` is
+    the model of the joint of which the recordings are a muscle, by default the one they hold.
     """
     if not runs:
         raise InputError('a gap look needs at least one recording')
@@ -146,14 +152,15 @@ def gap_of(runs: 'Sequence[Run]', model: 'StrPath | Rig', certify: 'Run | None' 
         recorded_pa = recorded_gauge_pa(
             run['pressure'][FIELD['pressure']]
             for run in (*runs, *([certify] if certify else [])))
+        place = in_joint(runs, joint)
         result.next_experiment = next_experiment(
             rig, result.rivals, tuple(result.signals), result.noise, pieces=pieces,
             may_add_cell=not any(dead_signals(run) for run in runs) and may_have_cell(rig),
-            recorded_pa=recorded_pa)
+            recorded_pa=recorded_pa, place=place)
         if result.next_experiment is None:
             has_cell = 'force' in result.signals
             result.remarks.append(INSEPARABLE + (A_CELL_WOULD if not has_cell and cell_would_tell(
-                rig, result.rivals, result.noise, recorded_pa) else '.'))
+                rig, result.rivals, result.noise, recorded_pa, place) else '.'))
     result.remarks += early_sentences([*runs, *([certify] if certify else [])])
     return result
 
@@ -183,7 +190,8 @@ def model_for(run: 'Run', model: 'StrPath | Rig') -> Rig:
         model, valve=(recorded_valve(run) or None) if named else None)
 
 
-def save_gap(result: 'GapResult', run: 'Run', out_dir: StrPath, of: str = '') -> None:
+def save_gap(result: 'GapResult', run: 'Run', out_dir: StrPath, of: str = '',
+             joint_model: StrPath = '') -> None:
     """
     Write gap.json, model.yaml, compare.mcap and report.html of a result.
 
@@ -194,10 +202,11 @@ def save_gap(result: 'GapResult', run: 'Run', out_dir: StrPath, of: str = '') ->
     # A model that has the proposed effect needs its file.
     kept = (EFFECT_FILE, MODEL_FILE) if Path(EFFECT_FILE).stem in result.model_yaml else ()
     with whole_files(out_dir, set(FILES).difference(kept)) as folder:
-        _save_into(folder, result, run, of)
+        _save_into(folder, result, run, of, joint_model)
 
 
-def _save_into(out_dir: Path, result: 'GapResult', run: 'Run', of: str) -> None:
+def _save_into(out_dir: Path, result: 'GapResult', run: 'Run', of: str, joint_model: StrPath
+               ) -> None:
     write_json(out_dir / 'gap.json', result.to_dict())
     write_text(out_dir / 'model.yaml', result.model_yaml)
     if result.next_experiment:
@@ -214,21 +223,19 @@ def _save_into(out_dir: Path, result: 'GapResult', run: 'Run', of: str) -> None:
         'Recording against model', VERDICT_TEXT.get(result.verdict, result.verdict) + '.',
         [*numbers_section(result),
          gap_section(result, command=next_command(
-             result, 'next_experiment.yaml', [run] if is_of_muscle(run) else [])),
+             'next_experiment.yaml', [run], joint_model=joint_model)),
          provenance([('recording', run)])], footer=FOOTER, of=of))
 
 
-def next_command(result: 'GapResult', path: StrPath, runs: 'Sequence[Run]' = (),
-                 model: StrPath = 'model.yaml') -> str:
+def next_command(path: StrPath, runs: 'Sequence[Run]', model: StrPath = 'model.yaml',
+                 joint_model: StrPath = '') -> str:
     """
     Return the command that runs the next experiment on the rig that was recorded.
 
-    ``runs`` are the recordings of a muscle; ``model`` is the file with the model found. Without
-    recordings the rig is a simulated one.
+    ``model`` is the file with the model found, ``joint_model`` that of the joint of which it is a
+    muscle.
     """
-    if runs:
-        return command_on_rig(runs, path, model)
-    return f'pam run {shlex.quote(str(path))} --valve {load_rig(result.model_yaml).valve}'
+    return command_on_rig(runs, path, joint_model or model)
 
 
 def with_term(folder: StrPath) -> str:

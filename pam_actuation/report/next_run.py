@@ -20,6 +20,7 @@ import shlex
 from typing import Any, TYPE_CHECKING
 
 from pam_sim.files import StrPath
+from pam_sim.joint.parameters import SIDES
 
 if TYPE_CHECKING:
     from pam_sim.run import Run
@@ -32,14 +33,9 @@ def is_simulated(run: 'Run') -> bool:
     return bool(run.metadata.get('seed'))
 
 
-def is_of_muscle(run: 'Run') -> bool:
-    """Tell whether a recording is of a single muscle, as far as it says what it is of."""
-    from pam_sim import load_rig
-    from pam_sim.errors import InputError
-    try:
-        return 'rig' not in run.metadata or bool(load_rig(run.metadata['rig']))
-    except InputError:
-        return False
+def is_of_joint(run: 'Run') -> bool:
+    """Tell whether a recording is of a joint, or of a muscle in one."""
+    return run.namespace.rpartition('/')[2] in SIDES
 
 
 def command_on_rig(runs: 'Sequence[Run]', experiment: StrPath, model: StrPath,
@@ -54,20 +50,21 @@ def command_on_rig(runs: 'Sequence[Run]', experiment: StrPath, model: StrPath,
     experiment : path
         File of the experiment.
     model : path
-        Rig file with what is known of the rig.
+        Rig file with what is known of the rig; of a joint its file or preset.
     name : str
         Of the folder in ``runs`` for the new recording.
 
     """
     played, described = shlex.quote(str(experiment)), shlex.quote(str(model))
     if not all(is_simulated(run) for run in runs):
-        return on_hardware(played, described, name)
+        return on_hardware(played, described, name, is_of_joint(runs[0]))
     return f'pam run {played} --rig {_recorded_preset(runs) or described}'
 
 
-def on_hardware(experiment: str, model: str, name: str) -> str:
+def on_hardware(experiment: str, model: str, name: str, of_joint: bool = False) -> str:
     """Return the command that runs an experiment on a real rig; files as the shell takes them."""
-    return (f'pam up rig --hardware {HARDWARE_FILE} --model {model} --experiment {experiment} '
+    what = 'knee' if of_joint else 'rig'
+    return (f'pam up {what} --hardware {HARDWARE_FILE} --model {model} --experiment {experiment} '
             f'--record {shlex.quote(os.path.join("runs", name))}')
 
 
@@ -101,14 +98,16 @@ def before_it(runs: 'Sequence[Run]', advice: Mapping[str, Any], model: StrPath) 
 
 def _recorded_preset(runs: 'Sequence[Run]') -> str:
     """Return the options for the preset that all recordings are of; '' where there is none."""
-    from pam_sim import load_rig, preset_names
+    from pam_sim import preset_names
     from pam_sim.errors import InputError
+    from pam_sim.joint import joint_preset_names, load_rig_or_joint
     try:
-        rigs = [load_rig(run.metadata['rig']) for run in runs]
+        rigs = [load_rig_or_joint(run.metadata['rig']) for run in runs]
     except (InputError, KeyError):
         return ''
     first = rigs[0]
-    if first.name not in preset_names() or any(
-            rig.to_yaml() != load_rig(first.name, valve=first.valve).to_yaml() for rig in rigs):
+    if first.name not in (*preset_names(), *joint_preset_names()) or any(
+            rig.to_yaml() != load_rig_or_joint(first.name, first.valve).to_yaml()
+            for rig in rigs):
         return ''
     return f'{first.name} --valve {first.valve}'

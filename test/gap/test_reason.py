@@ -195,10 +195,12 @@ def test_the_next_experiment_is_told_with_its_command():
         'dmsp_5_300_hanging_mass', valve='hsv').to_yaml())
     assert gap_verb._next_lines(result, 'runs/gap') == []
     result.next_experiment = {'name': 'next', 'why': 'It tells A from B.', 'experiment': {}}
-    told = gap_verb._next_lines(result, 'runs/my gap')
+    run = Run({}, {'seed': '1'}, '/muscle')
+    told = gap_verb._next_lines(result, 'runs/my gap', [run])
     assert told == ['what to measure next: It tells A from B.',
-                    "next: pam run 'runs/my gap/next_experiment.yaml' --valve hsv"]
-    command = next_command(result, 'next_experiment.yaml')
+                    "next: pam run 'runs/my gap/next_experiment.yaml' --rig "
+                    "'runs/my gap/model.yaml'"]
+    command = next_command('next_experiment.yaml', [run])
     assert command in gap_section(result, command=command).body
 
 

@@ -17,7 +17,8 @@
 from pam_actuation.cli import gap as gap_verb
 from pam_actuation.cli.main import build_parser, main
 from pam_actuation.experiments import protocols
-from pam_actuation.report.next_run import before_it, command_on_rig, is_of_muscle, is_simulated
+from pam_actuation.report.gap import next_command
+from pam_actuation.report.next_run import before_it, command_on_rig, is_simulated
 from pam_sim import load_rig
 from pam_sim.gap.result import GapResult
 from pam_sim.joint import load_joint
@@ -26,6 +27,7 @@ from pam_sim.run import Run
 import pytest
 
 PRESET = 'dmsp_20_300_hanging_mass'
+JOINT = 'joint_dmsp_5_300_realistic'
 OWN = load_rig(PRESET).with_(parameters={'mass_kg': 3.3})
 IMPORTED = Run({}, {'origin': 'imported'})
 HARDWARE = Run({}, {'origin': 'live', 'rig': OWN.to_yaml()})
@@ -71,8 +73,19 @@ def test_a_gap_is_measured_on_where_it_was_recorded(tmp_path):
     _, told = gap_verb._next_lines(result, 'gap', [simulated])
     assert told == ('next: pam run gap/next_experiment.yaml --rig dmsp_20_300_hanging_mass '
                     '--valve ppr')
-    joint = load_joint('joint_dmsp_5_300_realistic').to_yaml()
-    assert is_of_muscle(lab) and not is_of_muscle(Run({}, {'rig': joint}))
+
+
+@pytest.mark.parametrize('joint, is_simulated, rig', [
+    (load_joint(JOINT, 'hsv'), True, f'pam run next.yaml --rig {JOINT} --valve hsv'),
+    (load_joint(JOINT).with_(parameters={'inertia_kg_m2': 0.02}), True,
+     'pam run next.yaml --rig my_joint.yaml'),
+    (load_joint(JOINT), False, 'pam up knee --hardware my_hardware.yaml --model my_joint.yaml '
+     '--experiment next.yaml --record runs/next')])
+def test_a_muscle_of_a_joint_is_measured_in_its_joint(joint, is_simulated, rig):
+    seed = {'seed': '3'} if is_simulated else {}
+    run = Run({}, {'rig': joint.to_yaml(), **seed}, '/knee/flexor')
+    assert next_command('next.yaml', [run], joint_model='my_joint.yaml') == rig
+    assert build_parser().parse_args(rig.split()[1:])
 
 
 def test_a_plan_says_how_it_is_run_for_real_and_simulated(tmp_path, capsys, monkeypatch):
