@@ -56,6 +56,7 @@ class CompiledController:
     made_for: dict[str, Any] | None = None  # facts of the rig, see ``made_for``
     driver: dict[str, float] | None = None  # numbers of the driver's law it asks for, by name
     other_rig = ''          # how the rig it runs on differs, if that was accepted
+    other_valve = ''        # that the preset is made for the other valve, and which is not
 
     _step: Callable[..., float]
     _arguments: tuple[Any, ...]

@@ -39,7 +39,7 @@ from typing import Any, TYPE_CHECKING
 
 from pam_actuation.control.compiled_controller import CompiledController
 from pam_actuation.control.laws import Asked, LAWS
-from pam_actuation.control.made_for import check_made_for, read_facts
+from pam_actuation.control.made_for import check_made_for, other_valve, read_facts
 from pam_actuation.control.modes.files import KEYS as MODE_KEYS, read_mode
 from pam_actuation.control.modes.force import ForceController
 from pam_actuation.control.modes.joint import JointController
@@ -49,6 +49,7 @@ from pam_sim.errors import InputError
 from pam_sim.joint.rig import JointRig
 from pam_sim.keys import Key, names_of
 from pam_sim.located_yaml import load_yaml, Located
+from pam_sim.valve import VALVES
 
 if TYPE_CHECKING:
     from pam_sim.rig import Rig
@@ -120,6 +121,9 @@ def load_controller(name_or_path_or_text: str | os.PathLike[str],
         folder = os.path.dirname(path)
         tree = load_yaml(path)
     controller = controller_from_tree(tree, rig, folder, accept_other_rig)
+    if '\n' not in text and rig is not None and getattr(rig, 'valve', '') in VALVES:
+        from pam_actuation.resources import list_config
+        controller.other_valve = other_valve(text, rig.valve, list_config('controllers'))
     if rules_file is not None:
         if controller.rules is None:
             raise InputError(f'a {controller.kind} controller has no rules', str(rules_file))

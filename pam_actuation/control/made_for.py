@@ -24,6 +24,7 @@ What matters is compared: size of the muscle, valve, kind and size of the load. 
 and names do not matter: a model that the gap workflow improved is still the same rig.
 """
 
+from collections.abc import Collection
 from typing import Any, TYPE_CHECKING
 
 from pam_actuation.control.sofc.persistence import identity_parts
@@ -58,6 +59,30 @@ _WORDS = {
     'muscle_length_m': ('a muscle of', 1e3, 'mm length'),
     'muscle_bore_m': ('a muscle of', 1e3, 'mm bore'),
     'mass_kg': ('a load of', 1.0, 'kg'), 'inertia_kg_m2': ('a limb of', 1.0, 'kg m^2')}
+
+
+def other_valve(preset: str, valve: str, known: Collection[str]) -> str:
+    """
+    Return a sentence where a preset is made for the other valve and has a twin for this one.
+
+    Parameters
+    ----------
+    preset : str
+        Its name; what is none of ``known`` tells nothing.
+    valve : str
+        Of the rig.
+    known : collection of str
+        Names of all presets: ``pid`` beside ``pid_hsv``, ``sofc_ppr`` beside ``sofc_hsv``.
+
+    """
+    base = preset.removesuffix('_hsv').removesuffix('_ppr')
+    twins = {'ppr': [base, f'{base}_ppr'], 'hsv': [f'{base}_hsv']}
+    right = next((name for name in twins[valve] if name in known), '')
+    wrong = next(other for other in VALVES if other != valve)
+    if preset not in known or preset not in twins[wrong] or not right:
+        return ''
+    return (f'the controller preset `{preset}` is made for valve {wrong}, this rig has {valve}; '
+            f'`{right}` is the one made for it')
 
 
 def facts_of(rig: 'JointRig | Rig') -> dict[str, Any]:

@@ -156,7 +156,7 @@ class Experiment:
         rig : pam_sim.rig.Rig, optional
             Then also what of the reference it cannot reach.
         controller : object, optional
-            May keep the pressure lower than the driver does.
+            May keep the pressure lower than the driver does, or be made for the other valve.
 
         """
         said: tuple[str, ...] = ()
@@ -164,7 +164,8 @@ class Experiment:
             said = (
                 'decay: a pressure regulator has no shut state; it holds the last command and '
                 'refills what leaks, so this recording shows nothing of a leak',)
-        return (*said, *jump_remarks(self), *reach_remarks(self, rig, controller))
+        return (*said, *filter(None, [getattr(controller, 'other_valve', '')]),
+                *jump_remarks(self), *reach_remarks(self, rig, controller))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the experiment as plain data, as it stands in a file."""

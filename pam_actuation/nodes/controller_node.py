@@ -96,6 +96,8 @@ class ControllerNode(ManagedNode):
         self.controller = load_controller(name, rig, accept_other_rig=accept)
         if self.controller.other_rig:
             self.get_logger().warning(f'the controller was {self.controller.other_rig}')
+        if self.controller.other_valve:
+            self.get_logger().warning(self.controller.other_valve)
         self.loop = ControllerLoop(self.controller, rig, self.value('muscle'))
 
     def create_topics(self) -> None:

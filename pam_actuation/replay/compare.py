@@ -29,7 +29,7 @@ from pam_actuation.replay.difference import Difference, difference
 from pam_actuation.replay.driver import DriverReplay, replay_driver
 from pam_actuation.replay.model import GIVE_MODEL, other_model, with_model
 from pam_actuation.replay.plant import PlantReplay, replay_plant
-from pam_actuation.replay.settings import preview_remark
+from pam_actuation.replay.settings import preview_remark, valve_remark
 from pam_sim.errors import InputError
 from pam_sim.files import whole_file
 
@@ -176,7 +176,8 @@ def replay_run(run: 'RecordedRun', controller: 'Controller | str | os.PathLike[s
     """
     preview = () if chain else preview_remark(run, controller)
     result = Replay(counterfactual=controller is not None, start_ns=run.start_ns,
-                    remarks=(*early_sentences([run]), *other_model(run, model), *preview))
+                    remarks=(*early_sentences([run]), *other_model(run, model),
+                             *valve_remark(controller), *preview))
     run = with_model(run, model)
     if chain:
         if not run.metadata.get('rig'):

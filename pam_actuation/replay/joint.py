@@ -37,7 +37,7 @@ from pam_actuation.replay.arrivals import recorded_topics_of_joint
 from pam_actuation.replay.chain import ChainReplay, recorded_seed, RepeatedLoops, replay_chain
 from pam_actuation.replay.joint_controller import replay_joint_controller, states_suffice
 from pam_actuation.replay.model import GIVE_MODEL, other_model, with_model
-from pam_actuation.replay.settings import preview_remark
+from pam_actuation.replay.settings import preview_remark, valve_remark
 from pam_sim.errors import InputError
 from pam_sim.files import whole_file
 from pam_sim.joint import JointRig, load_joint
@@ -155,7 +155,7 @@ def replay_joint(run: Run, controller: 'Controller | str | os.PathLike[str] | No
     """
     path = str(run.path)
     other = other_model(run, model)     # another joint asks for other commands
-    remarks = (*early_sentences([run]), *other)
+    remarks = (*early_sentences([run]), *other, *valve_remark(controller))
     run = with_model(run, model)
     if not run.metadata.get('rig'):
         raise InputError(f'the recording does not say which joint it is; {GIVE_MODEL}', path)

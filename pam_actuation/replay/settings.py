@@ -60,14 +60,14 @@ def changed_controller(run: 'Run', wanted: list[str] | None,
     changes = [one for one in wanted if one not in files]
     if len(files) > 1:
         raise InputError(f'gives two controllers, {files[0]} and {files[1]}', '--set')
-    base = run.metadata.get('controller')
+    base, other_valve = run.metadata.get('controller'), ''
     if files:
         rig = run.metadata.get('rig')
         controller = load_controller(
             files[0], load_rig_or_joint(rig) if rig else None, accept_other_rig=accept_other_rig)
         if not changes:
             return controller
-        base = controller.to_yaml()
+        base, other_valve = controller.to_yaml(), controller.other_valve
     if not base:
         raise InputError('the recording does not say which controller ran, so that single '
                          'settings cannot be changed; give a controller', '--set')
@@ -77,10 +77,17 @@ def changed_controller(run: 'Run', wanted: list[str] | None,
         name, _, value = change.partition('=')
         settings[name.strip()] = _number(value.strip())
     try:
-        return load_controller(dump_yaml(tree))
+        changed = load_controller(dump_yaml(tree))
     except InputError as error:
         advice = OTHER_RULES if error.problem.startswith(NO_FIT) else ''
         raise InputError(f'{error.problem}{advice}', f'--set {" ".join(changes)}') from None
+    changed.other_valve = other_valve
+    return changed
+
+
+def valve_remark(controller: object) -> tuple[str, ...]:
+    """Return a sentence where another controller is a preset made for the other valve."""
+    return tuple(filter(None, [getattr(controller, 'other_valve', '')]))
 
 
 def preview_remark(run: 'Run', controller: object) -> tuple[str, ...]:

@@ -14,14 +14,17 @@
 
 """A controller made for another rig is refused, or runs when told so and says it."""
 
+import json
 import re
 
+from pam_actuation.bags.load import load_run
 from pam_actuation.bags.metadata import experiment_metadata
 from pam_actuation.cli.main import main
 from pam_actuation.control.config import load_controller
-from pam_actuation.control.made_for import facts_of
+from pam_actuation.control.made_for import facts_of, other_valve
 from pam_actuation.experiments import load_experiment
 from pam_actuation.replay.settings import changed_controller
+from pam_actuation.resources import list_config
 from pam_actuation.rigging.layouts import knee, rig as rig_layout
 from pam_actuation.rigging.plan import make_plan
 from pam_actuation.tuning.problem import rebuild
@@ -174,3 +177,27 @@ def test_pam_up_refuses_before_any_node_starts(tuned, tmp_path, capsys):
     assert main(['up', 'rig', '--controller', str(path)]) == 2
     said = capsys.readouterr()
     assert 'made for another rig' in said.err and said.err.count('\n') == 1 and not said.out
+
+
+@pytest.mark.parametrize('preset, valve, right', [
+    ('pid', 'hsv', 'pid_hsv'), ('pid_hsv', 'ppr', 'pid'), ('sofc_ppr', 'hsv', 'sofc_hsv'),
+    ('sofc_model_hsv', 'ppr', 'sofc_model_ppr'), ('pid', 'ppr', ''), ('sofc_hsv', 'hsv', ''),
+    ('sofc_untuned', 'hsv', ''), ('own_ppr', 'hsv', '')])
+def test_a_preset_for_the_other_valve_is_told_with_the_right_one(preset, valve, right):
+    known = list_config('controllers')
+    said = other_valve(preset, valve, known)
+    assert said.endswith(f'`{right}` is the one made for it') if right else said == ''
+
+
+def test_simulation_and_replay_tell_that_a_preset_is_for_the_other_valve(tmp_path, capsys):
+    bag, told = str(tmp_path / 'bag'), 'preset `pid` is made for valve ppr, this rig has hsv'
+    call = ['simulate', 'short_sine', '--valve', 'hsv', '--out', bag, '--overwrite', '--json']
+    assert main([*call, '--controller', 'pid']) == 0
+    assert any(told in one for one in json.loads(capsys.readouterr().out)['remarks'])
+    assert told in load_run(bag).metadata['remarks']
+    assert main([*call, '--controller', 'pid_hsv']) == 0
+    assert not any('preset' in one for one in json.loads(capsys.readouterr().out)['remarks'])
+    for wanted in (['pid'], ['pid', 'lead_s=0.05']):
+        changes = [word for one in wanted for word in ('--set', one)]
+        assert main(['replay', bag, '--chain', *changes]) == 0
+        assert told in capsys.readouterr().out

@@ -51,6 +51,7 @@ class WrappedLaw:
     made_for: dict[str, Any] | None = None      # facts of the rig, see ``control/made_for``
     driver: dict[str, float] | None = None      # numbers of the driver's law it asks for
     other_rig = ''          # how the rig it runs on differs, if that was accepted
+    other_valve = ''        # that the preset is made for the other valve, and which is not
 
     def __init__(self, law: CompiledController) -> None:
         self.law = law
