@@ -109,8 +109,9 @@ class InJoint:
     def simulated(self, plain: Mapping[str, Any], truth: Rig) -> RecordedRun:
         """Return the simulated run of this muscle, in the joint that has it as ``truth``."""
         joint = self.joint.with_(valve=truth.valve)
-        muscle = truth.with_(fidelity=getattr(joint, self.side).fidelity)
-        joint = joint.with_(**{self.side: muscle})      # type: ignore[arg-type]
+        flexes = self.side == SIDES[0]
+        joint = joint.with_(flexor=truth if flexes else None,
+                            extensor=None if flexes else truth)
         controller = load_controller(
             joint_preset_for(joint, joint.valve), joint, accept_other_rig=True)
         with tempfile.TemporaryDirectory(prefix='pam_separating_') as folder:
