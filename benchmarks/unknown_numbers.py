@@ -51,7 +51,8 @@ from pam_actuation.report.gap import gap_of  # noqa: E402, I100
 from pam_sim import load_rig  # noqa: E402
 from pam_sim.effects.registry import effects  # noqa: E402
 from pam_sim.gap.data.signals import FIELD, UNIT  # noqa: E402
-from pam_sim.gap.verify.uncertainty import NORMAL_95, NUMERICS  # noqa: E402
+from pam_sim.gap.fit.profile import NORMAL_95  # noqa: E402
+from pam_sim.gap.verify.uncertainty import NUMERICS  # noqa: E402
 from pam_sim.identify import identify  # noqa: E402
 from pam_sim.run import Run, Series  # noqa: E402
 from pam_sim.tolerance import UNKNOWN  # noqa: E402

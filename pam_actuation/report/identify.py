@@ -22,7 +22,7 @@ from pam_actuation.report.page import paragraph, plot, render, Section, table
 from pam_actuation.report.pages import FOOTER
 from pam_actuation.report.sections.provenance import provenance
 from pam_sim.files import StrPath, whole_files, write_json, write_text
-from pam_sim.identify.profile import RISE_95
+from pam_sim.gap.fit.profile import RISE_95
 from pam_sim.identify.result import READABLE
 from pam_sim.located_yaml import dump_yaml
 

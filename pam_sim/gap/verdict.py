@@ -22,6 +22,7 @@ from pam_sim.effects.registry import get_effect
 from pam_sim.gap.criteria import Criteria
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit, Precision
+from pam_sim.gap.fit.profile import NORMAL_95
 from pam_sim.gap.report.reason import join
 from pam_sim.gap.result import Calibrated, GapResult
 from pam_sim.gap.select.comparison import gap
@@ -32,7 +33,7 @@ from pam_sim.gap.verify.model import as_given, held_without, model_of, numbers_o
 from pam_sim.gap.verify.notice import Notice, notices, stamp_sd_s, supply_notice
 from pam_sim.gap.verify.own_runs import OwnRuns
 from pam_sim.gap.verify.spread import spread_of_numbers
-from pam_sim.gap.verify.uncertainty import effect_numbers, half_width, NORMAL_95, NUMERICS
+from pam_sim.gap.verify.uncertainty import effect_numbers, half_width, NUMERICS
 from pam_sim.gap.verify.validation import Validation
 
 
@@ -97,15 +98,16 @@ def fill(result: GapResult, outcome: Outcome, validation: Validation) -> None:
         place = next((i for i, c in enumerate(final.hypothesis.effects) if c.name == w.name), None)
         if place is None:
             continue
-        parameters, equivalent = effect_numbers(
+        numbers = effect_numbers(
             model, final, place, precision, w, 1.0 - outcome.share.get(w.subsystem, 1.0))
         effect = get_effect(w.name)
         formulation = final.hypothesis.effects[place].effect
         result.effects.append({
             'name': w.name, 'family': effect.family, 'subsystem': effect.subsystem,
             'confidence': _confidence(w, outcome, estimator.criteria),
-            'formulation': formulation, 'parameters': parameters, 'equivalent': equivalent})
-        settings = [replace(s, source={'ci95': {n: p['ci95'] for n, p in parameters.items()}})
+            'formulation': formulation, **numbers})
+        settings = [replace(s, source={'ci95': {
+            n: p['ci95'] for n, p in numbers['parameters'].items()}})
                     if s.name == formulation else s for s in settings]
     result.model_yaml = model.with_(effects=settings).to_yaml()
 
@@ -242,20 +244,21 @@ def _beyond(value: float, floor: float) -> float:
 
 def _calibrated(estimator: Estimator, found: Fit, precision: Precision) -> list[Calibrated]:
     """Return every known number of the rig as Calibrated."""
-    count, free = len(found.theta), list(found.hypothesis.numbers)
+    place = len(found.theta)
     numbers, _ = numbers_of(estimator, found)
     listed = []
     for problem in estimator.problems:
         for known, z in zip(problem.known, found.known_z[problem.subsystem]):
-            if not known.of_rig:
-                continue
-            value = numbers[known.name]
-            half = NORMAL_95 * known.sd
-            if known.name in free:
-                half = math.hypot(NUMERICS * value, known.sd * half_width(
-                    precision, count + free.index(known.name), float(z)))
-            listed.append(Calibrated(known.name, known.unit, known.value, value,
-                                     (value - half, value + half), float(z)))
+            if known.of_rig:
+                value = numbers[known.name]
+                half = NORMAL_95 * known.sd
+                if known.name in found.hypothesis.numbers:
+                    half = math.hypot(
+                        NUMERICS * value, known.sd * half_width(precision, place, float(z)))
+                listed.append(Calibrated(
+                    known.name, known.unit, known.value, value,
+                    (value - half, value + half), float(z)))
+            place += 1
     return listed
 
 

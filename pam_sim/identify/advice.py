@@ -25,8 +25,8 @@ from pam_sim.errors import InputError
 from pam_sim.gap.data.noise import noise_sd
 from pam_sim.gap.data.pressed import recorded_gauge_pa
 from pam_sim.gap.data.signals import FIELD, UNIT
+from pam_sim.gap.fit.profile import NORMAL_95
 from pam_sim.gap.subsystems.simulation import pressure_driven
-from pam_sim.gap.verify.uncertainty import NORMAL_95
 from pam_sim.identify.fit import NOWHERE, Weighted
 from pam_sim.identify.judgement import is_narrow, UNDETERMINED
 from pam_sim.identify.numbers import known_numbers_of, Number

@@ -15,13 +15,13 @@
 """Which numbers the data determine, which only together, and which not at all."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import combinations
 import math
 
 import numpy as np
 from pam_sim.annotations import FloatArray
-from pam_sim.gap.verify.uncertainty import NORMAL_95
+from pam_sim.gap.fit.profile import NORMAL_95
+from pam_sim.gap.verify.together import Combination, ROUND
 from pam_sim.identify.numbers import Number
 from pam_sim.identify.profile import Interval
 
@@ -32,41 +32,7 @@ NARROW_RATIO, NARROW_SHARE, NARROW_SHARE_OF_SMALL = 1.5, 0.02, 0.2
 # interval.
 NEAR_EDGE = 0.05
 KNOWN = 0.5                  # standard deviation of what is worth telling, in coordinates
-ROUND = 0.03                 # how near to a whole number a power is one
 GENTLE = 1e-12
-
-
-@dataclass(frozen=True)
-class Combination:
-    """
-    What is known of several numbers that are not known one by one.
-
-    For ``product`` False: the sum of ``weights[name] * value`` is ``value``. For True the product
-    of ``value ** weights[name]`` is. The first weight is 1.
-
-    Parameters
-    ----------
-    weights : dict of str -> float
-    value, half_width : float
-        With the 95 % half width; of a product relative.
-    product : bool
-
-    """
-
-    weights: dict[str, float]
-    value: float
-    half_width: float
-    product: bool
-
-    def text(self) -> str:
-        """Return the combination as a formula."""
-        if self.product:
-            terms = ' · '.join(name if w == 1.0 else f'{name}^{w:.3g}'
-                               for name, w in self.weights.items())
-            return f'{terms} = {self.value:.4g} ± {100.0 * self.half_width:.2g} %'
-        terms = ' + '.join(name if w == 1.0 else f'{w:.4g}·{name}'
-                           for name, w in self.weights.items()).replace('+ -', '- ')
-        return f'{terms} = {self.value:.4g} ± {self.half_width:.2g}'
 
 
 def is_narrow(number: Number, low: float, high: float) -> bool:

@@ -30,12 +30,12 @@ from typing import Any
 
 import numpy as np
 from pam_sim.annotations import FloatArray
-from pam_sim.gap.verify.uncertainty import NORMAL_95, NUMERICS
+from pam_sim.gap.fit.profile import NORMAL_95, RISE_95
+from pam_sim.gap.verify.uncertainty import NUMERICS
 from pam_sim.identify.fit import Weighted
 from pam_sim.identify.numbers import Number
 from pam_sim.identify.secant import solve_from
 
-RISE_95 = 3.841              # 95 % of chi squared with one degree of freedom
 FARTHER = 2.0                # next try, where the cost has not risen enough
 FLAT, FLAT_FARTHER = 0.1, 10.0       # the same, where it has hardly risen
 TRIES = 9

@@ -34,8 +34,8 @@ import numpy as np
 from pam_sim.annotations import FloatArray
 from pam_sim.gap.data.noise import SMALLEST
 from pam_sim.gap.data.recording import GRID_S, Recording, START_S
+from pam_sim.gap.fit.profile import NORMAL_95
 from pam_sim.gap.subsystems.problem import SubsystemProblem
-from pam_sim.gap.verify.uncertainty import NORMAL_95
 from pam_sim.identify.fit import used, Weighted
 from pam_sim.identify.judgement import DETERMINED, is_narrow, UNDETERMINED
 from pam_sim.identify.profile import Interval

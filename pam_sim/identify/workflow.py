@@ -24,7 +24,7 @@ from pam_sim.errors import InputError
 from pam_sim.gap.criteria import CRITERIA
 from pam_sim.gap.data.commanded import commanded
 from pam_sim.gap.data.signals import UNIT
-from pam_sim.gap.verify.uncertainty import NORMAL_95
+from pam_sim.gap.fit.profile import NORMAL_95
 from pam_sim.identify.advice import next_experiment, where_open
 from pam_sim.identify.fit import fit, NOWHERE, Weighted
 from pam_sim.identify.inputs import noise_beyond

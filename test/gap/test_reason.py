@@ -43,7 +43,7 @@ MASS = Calibrated('mass_kg', 'kg', 5.0, 5.75, (5.7, 5.8), 7.5)
 def effect(name, quantity, unit):
     return {'name': name, 'family': 'f', 'subsystem': 'valve', 'confidence': 0.5,
             'equivalent': {quantity: {'value': 0.03, 'unit': unit, 'ci95': [0.02, 0.04]}},
-            'parameters': {}}
+            'parameters': {}, 'together': []}
 
 
 EFFECTS = {'valve_dead_time': effect('valve_dead_time', 'delay_s', 's'),
@@ -281,3 +281,11 @@ def test_an_answer_ends_with_0_and_what_is_wrong_with_the_data_with_1(
     assert main(['gap', 'bag', '--model', NOMINAL, '--out', str(tmp_path / 'gap')]) == code
     said = capsys.readouterr().out
     assert f'{verdict}: Because.' in said and all(one in said for one in implausible)
+
+
+def test_what_is_known_only_together_follows_the_quantities(monkeypatch):
+    formula = 'close_time_s - open_time_s = 0.0003 ± 1e-05'
+    monkeypatch.setitem(EFFECTS['hysteresis'], 'together', [formula])
+    named = [NamedEffect('hysteresis', 'muscle', [], ('hysteresis',))]
+    text = said('effects', {'force': FORCE}, named, effects=['hysteresis'])
+    assert f'95 % 0.02 to 0.04; the data determine only {formula}). With this' in text

@@ -39,6 +39,7 @@ from pam_sim.gap.data.split import FIT, SELECT
 from pam_sim.gap.fit.candidate import Setting
 from pam_sim.gap.fit.distance import distance_to_none
 from pam_sim.gap.fit.hypothesis import Fit, Hypothesis, Precision, within_reach
+from pam_sim.gap.fit.profile import profile_ends
 from pam_sim.gap.fit.solver import is_refused, ROUNDS, simulated_errors, Solver
 from pam_sim.gap.subsystems.effects import shows
 from pam_sim.gap.subsystems.parallel import parallel_map
@@ -196,17 +197,16 @@ class Estimator:
                    for c in self.problems)
 
     def precision(self, found: Fit) -> Precision:
-        """Return the Precision of what a hypothesis adds, with slopes taken at the solution."""
+        """Return the Precision of a fit, with slopes taken at the solution."""
         own = self._own()
         own._slopes_at(found)
-        touched = self._touched(found.hypothesis)
-        names, likelihood, blocks = own._covariances(found, touched)
+        likelihood, blocks = own._covariances(found, self.problems)
         held = own.fit(found.hypothesis, found.theta, found, hold=True)
-        count = len(found.theta)
-        chosen = [*range(count), *(names.index(n) for n in found.hypothesis.numbers)]
-        z = np.concatenate([held.theta] + [held.known_z[c.subsystem] for c in touched])
-        pick = np.ix_(chosen, chosen)
-        return Precision(likelihood[pick], blocks[pick], z[chosen])
+        search = Solver(own, found.hypothesis, self.problems, dict(found.temper))
+        return Precision(
+            likelihood, blocks, search.join(held.theta, held.known_z),
+            profile_ends(search, search.join(found.theta, found.known_z),
+                         range(len(found.theta)), (likelihood, blocks)))
 
     def certainty(self, found: Fit, place: int) -> float:
         """
@@ -225,9 +225,9 @@ class Estimator:
         size = [first + j for j, f in enumerate(effect.free) if not f.shape]
         touched = self._touched(found.hypothesis)
         if not size:
-            _, *covariances = own._covariances(found, touched)
-            return min(1.0 / np.sqrt(np.diag(c)[held].min()) for c in covariances)
-        _, *covariances = own._covariances(found, touched, held)
+            return min(1.0 / np.sqrt(np.diag(c)[held].min())
+                       for c in own._covariances(found, touched))
+        covariances = own._covariances(found, touched, held)
         search = Solver(own, found.hypothesis, touched, dict(found.temper))
         x = search.join(found.theta, found.known_z)
         low, high = (np.delete(end, held) for end in search.bounds)
@@ -235,13 +235,13 @@ class Estimator:
         return min(distance_to_none(np.delete(np.delete(c, held, 0), held, 1),
                                     np.delete(x, held), none, low, high) for c in covariances)
 
-    def spread(self, found: Fit) -> tuple[list[FloatArray], Callable[[int, float], Fit]]:
+    def spread(self, found: Fit) -> tuple[Sequence[FloatArray], Callable[[int, float], Fit]]:
         """
         Return how uncertain a fit is: its parameters, then the known numbers of every subsystem.
 
         Returns
         -------
-        covariances : list of numpy.ndarray, shape (K, K)
+        covariances : sequence of numpy.ndarray, shape (K, K)
             By likelihood and by blocks, as of ``Precision``.
         at : callable
             ``at(j, step)``: the fit with number ``j`` moved by ``step``, not fitted again.
@@ -249,7 +249,7 @@ class Estimator:
         """
         own = self._own()
         own.take_slopes(found.settings(), found.known_z)
-        _, *covariances = own._covariances(found, self.problems)
+        covariances = own._covariances(found, self.problems)
         search = Solver(self, found.hypothesis, self.problems, dict(found.temper))
         x = search.join(found.theta, found.known_z)
 
@@ -260,9 +260,9 @@ class Estimator:
         return covariances, at
 
     def _covariances(self, found: Fit, problems: Sequence[SubsystemProblem],
-                     held: Sequence[int] = ()) -> tuple[list[str | None], FloatArray, FloatArray]:
+                     held: Sequence[int] = ()) -> tuple[FloatArray, FloatArray]:
         """
-        Return (names of all numbers, None for theta; covariance by likelihood; by blocks).
+        Return the covariance by likelihood, and that by blocks.
 
         Of the fit's own parameters and the numbers of ``problems``; ``held`` are places that do
         not move.
@@ -277,8 +277,7 @@ class Estimator:
         np.add.at(scores, blocks, slope[:blocks.size] * residuals[:blocks.size, np.newaxis])
         priors = slope[blocks.size:]
         between = scores.T @ scores + priors.T @ priors
-        names = [None] * len(found.theta) + [k.name for c in problems for k in c.known]
-        return names, whole, whole @ between @ whole
+        return whole, whole @ between @ whole
 
     def fit_base(self) -> Fit:
         """Return the baseline: known numbers fitted to the parts that are used now."""

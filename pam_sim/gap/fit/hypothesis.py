@@ -102,7 +102,7 @@ class Fit:
 @dataclass(frozen=True)
 class Precision:
     """
-    How well what a hypothesis adds is known: theta, then free numbers in deviations.
+    How well a fit is known: theta, then the known numbers of every subsystem in deviations.
 
     Attributes
     ----------
@@ -114,12 +114,15 @@ class Precision:
     held : numpy.ndarray, shape (K,)
         Solution with latency and skew of the measurement at their prior. What they took
         up of a delay may have been the effect's own.
+    ends : numpy.ndarray, shape (P, 2, K)
+        All numbers at both ends of the 95 % interval of each of theta (``profile_ends``).
 
     """
 
     likelihood: FloatArray
     blocks: FloatArray
     held: FloatArray
+    ends: FloatArray
 
 
 def within_reach(hypothesis: Hypothesis, known: Hypothesis, problems: Sequence[SubsystemProblem]

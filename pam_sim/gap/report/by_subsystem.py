@@ -20,11 +20,11 @@ import math
 
 from pam_sim.effects.registry import effects, get_effect
 from pam_sim.gap.criteria import Criteria
+from pam_sim.gap.fit.profile import NORMAL_95
 from pam_sim.gap.result import GapResult, SignalGap, SubsystemVerdict
 from pam_sim.gap.select.rival import NamedEffect
 from pam_sim.gap.subsystems.effects import subsystem_of_number
 from pam_sim.gap.verify.own_runs import largest, OwnRuns
-from pam_sim.gap.verify.uncertainty import NORMAL_95
 from pam_sim.gap.verify.validation import share_left
 
 SUBSYSTEMS = ('valve', 'muscle', 'load', 'sensor')

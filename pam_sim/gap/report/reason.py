@@ -76,8 +76,8 @@ def _told(result: GapResult, outcome: Outcome) -> str:
 
 def _found(result: GapResult, chosen: Callable[[str], bool]) -> list[str]:
     """Return a sentence for each effect, and one for the numbers, whose names are chosen."""
-    parts = [f'{_sentence(e["name"])} ({e["name"]}: {_quantity(e["equivalent"])}).'
-             for e in result.effects if chosen(e['name'])]
+    parts = [f'{_sentence(e["name"])} ({e["name"]}: {_quantity(e["equivalent"])}'
+             f'{_together(e["together"])}).' for e in result.effects if chosen(e['name'])]
     numbers = [c for c in result.parameters if chosen(c.name)]
     return [*parts, *([_numbers(numbers) + '.'] if numbers else [])]
 
@@ -95,6 +95,11 @@ def _sentence(name: str) -> str:
 def _quantity(equivalent: Mapping[str, Mapping[str, Any]]) -> str:
     return join([f'{in_words(n)} {q["value"]:.3g} {q["unit"]}, 95 % {q["ci95"][0]:.3g} to '
                  f'{q["ci95"][1]:.3g}' for n, q in equivalent.items()])
+
+
+def _together(formulas: Iterable[str]) -> str:
+    """Return what of several quantities is known where each alone is not, to follow them."""
+    return ''.join(f'; the data determine only {formula}' for formula in formulas)
 
 
 def _numbers(parameters: Iterable[Calibrated]) -> str:

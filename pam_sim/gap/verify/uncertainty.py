@@ -16,14 +16,15 @@
 How well the numbers of a named effect are known.
 
 There are three sources. The first is the tempered likelihood around the solution, or the
-difference between time blocks if that is larger. The second is what latency and skew of the
-measurement absorbed, since it may belong to the effect. The third is the form: no formulation is
-exactly that of the muscle. It is the spread over formulations of the same effect that explain
-about as much, and the rest of the gap. Results state quantities that mean the same in all
-formulations.
+difference between time blocks if that is larger; and how far a number may go, all others fitted
+again, before the errors rise. The second is what latency and skew of the measurement absorbed,
+since it may belong to the effect. The third is the form: no formulation is exactly that of the
+muscle. It is the spread over formulations of the same effect that explain about as much, and the
+rest of the gap. Results state quantities that mean the same in all formulations.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+import math
 from typing import Any
 
 import numpy as np
@@ -31,26 +32,29 @@ from pam_sim.annotations import FloatArray
 from pam_sim.effects.registry import get_effect
 from pam_sim.gap.fit.candidate import Candidate
 from pam_sim.gap.fit.hypothesis import Fit, Precision
+from pam_sim.gap.fit.profile import NORMAL_95
 from pam_sim.gap.select.rival import NamedEffect, Rival
+from pam_sim.gap.verify.together import known_together
 from pam_sim.rig import Rig
 
-NORMAL_95 = 1.96
 AS_GOOD = 2.0                # times the rest of the best formulation, plus what follows
 AS_GOOD_SHARE = 0.01
 FORM = 1.5                   # times the amplitude of what is left, relative to the gap
 HELD = 1.5                   # times what latency and skew took up
 LEAST = 0.03                 # relative; no formulation is worth less
 NUMERICS = 0.002             # relative, of step and interpolation
+STEP = 1e-4                  # of a slope of what is reported, in coordinates
 
 # An entry of gap.json, and what an effect reports: name -> (value, unit).
 Entry = dict[str, Any]
 Report = dict[str, tuple[float, str]]
+Told = Callable[[FloatArray], Report]
 
 
 def effect_numbers(rig: Rig, found: Fit, place: int, precision: Precision, named: NamedEffect,
-                   rest: float) -> tuple[dict[str, Entry], dict[str, Entry]]:
+                   rest: float) -> dict[str, Any]:
     """
-    Return (parameters, equivalent) of one effect of a fit as entries of gap.json.
+    Return what gap.json says of the numbers of one effect of a fit.
 
     Parameters
     ----------
@@ -69,39 +73,56 @@ def effect_numbers(rig: Rig, found: Fit, place: int, precision: Precision, named
 
     Returns
     -------
-    tuple of dict
-        Name -> ``{'value', 'unit', 'ci95'}``; the fitted parameters, and what the
-        effect reports.
+    dict
+        ``parameters``, the fitted ones, and ``equivalent``, what the effect reports: name ->
+        ``{'value', 'unit', 'ci95'}``. ``together``: what
+        is known of the quantities of ``equivalent`` that are not known alone, as formulas.
 
     """
     candidate = found.hypothesis.effects[place]
     theta, rows = found.theta_of(place), found.hypothesis.rows(place)
     spreads = [c[rows, rows] for c in (precision.likelihood, precision.blocks)]
+    ends = precision.ends[rows, :, rows]
     held = precision.held[rows]
-    effect = get_effect(candidate.effect)
-    units = {p.name: p.unit for p in effect.parameters}
+    # What is left may be the effect's own: a formulation that is a little off.
+    off = FORM * math.sqrt(max(rest, 0.0))
+    scaled = [f in candidate.amplitudes or not candidate.amplitudes for f in candidate.free]
+    push = np.where(scaled, [off if f.shape else off * t
+                             for f, t in zip(candidate.free, theta)], 0.0)
+
+    def entries(told: Told, spread: Mapping[str, float]) -> dict[str, Entry]:
+        pairs = [[[told(end) for end in pair]] for pair in ends]
+        moved = [_along_axes(told, theta, own) for own in spreads] + pairs
+        shifted = told(held)
+        formed = [told(theta + sign * push) for sign in (-1.0, 1.0)]
+        made = {}
+        for name, (value, unit) in told(theta).items():
+            extra = (spread.get(name, 0.0) ** 2 + (LEAST * value) ** 2
+                     + (HELD * (shifted[name][0] - value)) ** 2)
+            down, up = (math.sqrt(extra + _pushed([formed], name, value, sign) + max(
+                _pushed(axes, name, value, sign) for axes in moved)) for sign in (-1.0, 1.0))
+            made[name] = {'value': float(value), 'unit': unit,
+                          'ci95': [float(value - down), float(value + up)]}
+        return made
+
+    def reported(at: FloatArray) -> Report:
+        return _report(candidate, at, rig)
+
+    units = {p.name: p.unit for p in get_effect(candidate.effect).parameters}
+    equivalent = entries(reported, _formulation_spread(rig, candidate, named))
     parameters = {}
     for j, f in enumerate(candidate.free):
         half = half_width(precision, rows.start + j, theta[j])
         low, high = sorted((f.value(theta[j] - half), f.value(theta[j] + half)))
-        parameters[f.name] = _entry(f.value(theta[j]), units[f.name], low, high)
-    equivalent = {}
-    spread = _formulation_spread(rig, candidate, named)
-    moved = [_along_axes(candidate, theta, own, rig) for own in spreads]
-    shifted = _report(candidate, held, rig)
-    # What is left may be the effect's own: a formulation that is a little off.
-    off = FORM * np.sqrt(max(rest, 0.0))
-    scaled = [f in candidate.amplitudes or not candidate.amplitudes for f in candidate.free]
-    push = np.where(scaled, [off if f.shape else off * t
-                             for f, t in zip(candidate.free, theta)], 0.0)
-    off = [_report(candidate, theta + sign * push, rig) for sign in (-1.0, 1.0)]
-    for name, (value, unit) in _report(candidate, theta, rig).items():
-        extra = (spread.get(name, 0.0) ** 2 + (LEAST * value) ** 2
-                 + (HELD * (shifted[name][0] - value)) ** 2)
-        down, up = (np.sqrt(extra + _pushed([off], name, value, sign) + max(
-            _pushed(axes, name, value, sign) for axes in moved)) for sign in (-1.0, 1.0))
-        equivalent[name] = _entry(value, unit, value - down, value + up)
-    return parameters, equivalent
+        parameters[f.name] = {'value': float(f.value(theta[j])), 'unit': units[f.name],
+                              'ci95': [float(low), float(high)]}
+    usual = reported(theta)
+    slopes = _slopes(reported, candidate, theta)
+    return {'parameters': parameters, 'equivalent': equivalent, 'together': [
+        one.text() for one in known_together(
+            usual, [slopes @ own @ slopes.T for own in spreads],
+            np.array([[[value for value, _ in reported(end).values()] for end in pair]
+                      for pair in ends]), LEAST)]}
 
 
 def half_width(precision: Precision, place: int, value: float) -> float:
@@ -116,15 +137,25 @@ def _pushed(pairs: Sequence[Sequence[Report]], name: str, value: float, sign: fl
     return float(np.sum(np.max(sign * shifts, axis=1).clip(0.0) ** 2))
 
 
-def _along_axes(candidate: Candidate, theta: FloatArray, covariance: FloatArray, rig: Rig
-                ) -> list[list[Report]]:
-    """Return what the effect reports at both ends of every axis of the 95 % ellipsoid."""
+def _along_axes(told: Told, theta: FloatArray, covariance: FloatArray) -> list[list[Report]]:
+    """Return what is told at both ends of every axis of the 95 % ellipsoid."""
     size, axes = np.linalg.eigh(covariance)
     found = []
     for variance, axis in zip(size, axes.T):
         step = NORMAL_95 * np.sqrt(max(variance, 0.0)) * axis
-        found.append([_report(candidate, theta + sign * step, rig) for sign in (-1.0, 1.0)])
+        found.append([told(theta + sign * step) for sign in (-1.0, 1.0)])
     return found
+
+
+def _slopes(told: Told, candidate: Candidate, theta: FloatArray) -> FloatArray:
+    """Return the derivatives of what is told, one column a parameter, within their ranges."""
+    columns = []
+    for j, f in enumerate(candidate.free):
+        step = STEP if theta[j] + STEP <= f.coordinate(f.upper) else -STEP
+        moved = theta + step * (np.arange(theta.size) == j)
+        columns.append([(value - usual) / step for (value, _), (usual, _) in zip(
+            told(moved).values(), told(theta).values())])
+    return np.array(columns).T
 
 
 def _report(candidate: Candidate, theta: FloatArray, rig: Rig) -> Report:
@@ -157,7 +188,3 @@ def _formulation_spread(rig: Rig, candidate: Candidate, named: NamedEffect) -> d
 def _reported_in(rival: Rival, candidate: Candidate, rig: Rig) -> dict[str, float]:
     theta = rival.found.theta_of(rival.found.hypothesis.effects.index(candidate))
     return {name: value for name, (value, _) in _report(candidate, theta, rig).items()}
-
-
-def _entry(value: float, unit: str, low: float, high: float) -> Entry:
-    return {'value': float(value), 'unit': unit, 'ci95': [float(low), float(high)]}

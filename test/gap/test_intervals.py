@@ -1,0 +1,124 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""95 % intervals: along what the data leave open, within the allowed range, one for a name."""
+
+import numpy as np
+from pam_sim import load_rig
+from pam_sim.gap import find_gap
+from pam_sim.gap.fit.profile import NORMAL_95, profile_ends
+from pam_sim.gap.verify.together import known_together
+import pytest
+
+from gap_runs import assert_form, NOMINAL, recorded
+
+SD = 1e-3                    # of the difference in the toy problem
+OPEN_S, CLOSE_S = 1.7e-3, 2.0e-3
+
+
+class Valley:
+    """Two numbers of which the data tell the difference, until their sum is above 2."""
+
+    bounds = (np.array([0.0, 0.0]), np.array([9.0, 9.0]))
+
+    def residuals(self, x):
+        """Return the errors."""
+        return np.array([(x[1] - x[0] - 0.3) / SD, 1e3 * max(x[0] + x[1] - 2.0, 0.0)])
+
+    def slopes(self, x):
+        """Return slopes whose steps make a bend of the difference look like a slope of the sum."""
+        bend = 1e-3 / SD
+        beyond = 1e3 * (x[0] + x[1] > 2.0)
+        return np.array([[-1.0 / SD, 1.0 / SD], [bend + beyond, bend + beyond]])
+
+
+class Plane:
+    """Two numbers, each with its own standard deviation."""
+
+    bounds = (np.array([-9.0, -9.0]), np.array([9.0, 9.0]))
+
+    def residuals(self, x):
+        """Return the errors."""
+        return self.slopes(x) @ x
+
+    def slopes(self, x):
+        """Return their slopes."""
+        return np.array([[2.0, 0.0], [1.0, 5.0]])
+
+
+def covariance(problem, x):
+    slopes = problem.slopes(x)
+    return np.linalg.inv(slopes.T @ slopes)
+
+
+def test_the_ends_reach_as_far_as_the_errors_stay_the_same():
+    problem, x = Valley(), np.array([0.1, 0.4])
+    own = covariance(problem, x)
+    assert 1.96 * np.sqrt(own[0, 0]) < 2.0           # by its slopes alone
+    ends = profile_ends(problem, x, [0, 1], [own])
+    assert ends[0, :, 0] == pytest.approx([0.0, 0.85], abs=0.03)
+    assert ends[1, :, 1] == pytest.approx([0.3, 1.15], abs=0.03)
+    assert ends[:, :, 1] - ends[:, :, 0] == pytest.approx(0.3, abs=5 * SD)
+
+
+def test_where_the_slopes_tell_all_the_ends_are_those_of_the_covariance():
+    problem, x = Plane(), np.zeros(2)
+    own = covariance(problem, x)
+    half = NORMAL_95 * np.sqrt(np.diag(own))
+    ends = profile_ends(problem, x, [0, 1], [own])
+    assert ends[0, :, 0] == pytest.approx([-half[0], half[0]])
+    assert ends[1, :, 1] == pytest.approx([-half[1], half[1]])
+    # Blocks of errors that last tell less.
+    ends = profile_ends(problem, x, [0], [own, 4.0 * own])
+    assert ends[0, :, 0] == pytest.approx([-2.0 * half[0], 2.0 * half[0]])
+
+
+@pytest.mark.parametrize('close, ends, text', [
+    (0.4, [[0.0, 0.3], [1.7, 2.0]], 'close - open = 0.3 ± 0.003'),
+    (4.0, [[0.05, 8.0], [0.4, 1.0]], 'close · open = 0.4 ± 1 %'),
+    (0.4, [[0.0, 0.1], [0.2, 0.9]], None),          # known no better together
+    (0.4, [[0.099, 0.398], [0.101, 0.402]], None)])         # known alone
+def test_a_sum_or_a_product_is_told_where_neither_number_is_known(close, ends, text):
+    found = known_together({'open': (0.1, 's'), 'close': (close, 's')},
+                           [np.array([[0.5, 0.5], [0.5, 0.5]]) * 1e-8], np.array([ends]), 0.01)
+    assert [one.text() for one in found] == ([] if text is None else [text])
+
+
+def switching(**effect):
+    """Return the rig with on/off valves and dead zone, and duties that are 0 or long."""
+    rig = load_rig(NOMINAL, valve='hsv')
+    return rig, rig.with_(effects=[{'name': 'valve_dead_zone', 'parameters': effect}])
+
+
+def duties(seconds=8.0, seed=5):
+    """Return duties of both valves per millisecond: one of them for a while, then none."""
+    random = np.random.default_rng(seed)
+    found = np.zeros((int(1000 * seconds), 2))
+    for start in range(500, len(found) - 300, 300):
+        side = int(random.integers(2)) if 1500 < start else 0
+        found[start:start + int(random.integers(40, 120)), side] = random.uniform(0.25, 0.6)
+    return found
+
+
+def test_of_opening_and_closing_times_only_the_difference_is_told():
+    given, true = switching(open_time_s=OPEN_S, close_time_s=CLOSE_S)
+    result = find_gap(recorded(true, duties()), given, effects=['valve_dead_zone'], unnamed=())
+    assert [e['name'] for e in result.effects] == ['valve_dead_zone']
+    said = result.effects[0]
+    assert_form(result)
+    for name, value in (('open_time_s', OPEN_S), ('close_time_s', CLOSE_S)):
+        assert said['equivalent'][name]['ci95'][0] <= value <= said['equivalent'][name]['ci95'][1]
+    assert len(said['together']) == 1
+    assert said['together'][0].startswith('close_time_s - open_time_s = 0.0003')
+    assert f'the data determine only {said["together"][0]}' in result.reason
