@@ -119,6 +119,8 @@ def test_of_opening_and_closing_times_only_the_difference_is_told():
     assert_form(result)
     for name, value in (('open_time_s', OPEN_S), ('close_time_s', CLOSE_S)):
         assert said['equivalent'][name]['ci95'][0] <= value <= said['equivalent'][name]['ci95'][1]
+        assert 0.0 <= said['equivalent'][name]['ci95'][0]
+        assert said['parameters'][name] == said['equivalent'][name]
     assert len(said['together']) == 1
     assert said['together'][0].startswith('close_time_s - open_time_s = 0.0003')
     assert f'the data determine only {said["together"][0]}' in result.reason

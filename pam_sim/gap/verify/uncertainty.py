@@ -24,6 +24,7 @@ rest of the gap. Results state quantities that mean the same in all formulations
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from itertools import product
 import math
 from typing import Any
 
@@ -75,7 +76,7 @@ def effect_numbers(rig: Rig, found: Fit, place: int, precision: Precision, named
     -------
     dict
         ``parameters``, the fitted ones, and ``equivalent``, what the effect reports: name ->
-        ``{'value', 'unit', 'ci95'}``. ``together``: what
+        ``{'value', 'unit', 'ci95'}``, with one interval for what is in both. ``together``: what
         is known of the quantities of ``equivalent`` that are not known alone, as formulas.
 
     """
@@ -95,14 +96,17 @@ def effect_numbers(rig: Rig, found: Fit, place: int, precision: Precision, named
         moved = [_along_axes(told, theta, own) for own in spreads] + pairs
         shifted = told(held)
         formed = [told(theta + sign * push) for sign in (-1.0, 1.0)]
+        limits = [told(np.array(corner)) for corner in product(*(
+            [f.coordinate(f.lower), f.coordinate(f.upper)] for f in candidate.free))]
         made = {}
         for name, (value, unit) in told(theta).items():
             extra = (spread.get(name, 0.0) ** 2 + (LEAST * value) ** 2
                      + (HELD * (shifted[name][0] - value)) ** 2)
             down, up = (math.sqrt(extra + _pushed([formed], name, value, sign) + max(
                 _pushed(axes, name, value, sign) for axes in moved)) for sign in (-1.0, 1.0))
-            made[name] = {'value': float(value), 'unit': unit,
-                          'ci95': [float(value - down), float(value + up)]}
+            allowed = [value, *(one[name][0] for one in limits if math.isfinite(one[name][0]))]
+            made[name] = {'value': float(value), 'unit': unit, 'ci95': [
+                float(max(value - down, min(allowed))), float(min(value + up, max(allowed)))]}
         return made
 
     def reported(at: FloatArray) -> Report:
@@ -110,12 +114,11 @@ def effect_numbers(rig: Rig, found: Fit, place: int, precision: Precision, named
 
     units = {p.name: p.unit for p in get_effect(candidate.effect).parameters}
     equivalent = entries(reported, _formulation_spread(rig, candidate, named))
-    parameters = {}
-    for j, f in enumerate(candidate.free):
-        half = half_width(precision, rows.start + j, theta[j])
-        low, high = sorted((f.value(theta[j] - half), f.value(theta[j] + half)))
-        parameters[f.name] = {'value': float(f.value(theta[j])), 'unit': units[f.name],
-                              'ci95': [float(low), float(high)]}
+    parameters = entries(lambda at: {
+        f.name: (f.value(t), units[f.name]) for f, t in zip(candidate.free, at)}, {})
+    # Another formulation may mean something else by the same name.
+    parameters |= {name: one for name, one in equivalent.items() if name in parameters
+                   and math.isclose(one['value'], parameters[name]['value'])}
     usual = reported(theta)
     slopes = _slopes(reported, candidate, theta)
     return {'parameters': parameters, 'equivalent': equivalent, 'together': [
