@@ -251,13 +251,11 @@ def _calibrated(estimator: Estimator, found: Fit, precision: Precision) -> list[
         for known, z in zip(problem.known, found.known_z[problem.subsystem]):
             if known.of_rig:
                 value = numbers[known.name]
-                half = NORMAL_95 * known.sd
-                if known.name in found.hypothesis.numbers:
-                    half = math.hypot(
-                        NUMERICS * value, known.sd * half_width(precision, place, float(z)))
+                half = math.hypot(
+                    NUMERICS * value, known.sd * half_width(precision, place, float(z)))
                 listed.append(Calibrated(
                     known.name, known.unit, known.value, value,
-                    (value - half, value + half), float(z)))
+                    (max(value - half, known.lower), min(value + half, known.upper)), float(z)))
             place += 1
     return listed
 

@@ -21,7 +21,7 @@ from pam_sim.gap.fit.profile import NORMAL_95, profile_ends
 from pam_sim.gap.verify.together import known_together
 import pytest
 
-from gap_runs import assert_form, NOMINAL, recorded
+from gap_runs import assert_form, NOMINAL, nominal, recorded, voltages
 
 SD = 1e-3                    # of the difference in the toy problem
 OPEN_S, CLOSE_S = 1.7e-3, 2.0e-3
@@ -124,3 +124,12 @@ def test_of_opening_and_closing_times_only_the_difference_is_told():
     assert len(said['together']) == 1
     assert said['together'][0].startswith('close_time_s - open_time_s = 0.0003')
     assert f'the data determine only {said["together"][0]}' in result.reason
+
+
+def test_a_number_has_the_interval_of_the_data_not_that_of_its_prior():
+    rig = nominal().with_(parameters={'force_map_gain': 0.97})
+    result = find_gap(recorded(rig, voltages(8.0)), nominal(), effects=['creep'], unnamed=())
+    gain = next(c for c in result.calibration if c.name == 'force_map_gain')
+    prior = NORMAL_95 * abs(gain.value - gain.nominal) / abs(gain.prior_deviation)
+    assert gain.ci95[0] <= 0.97 <= gain.ci95[1]
+    assert gain.ci95[1] - gain.ci95[0] < 0.5 * prior
