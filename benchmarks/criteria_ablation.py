@@ -210,7 +210,7 @@ class HiddenCase:
 def verdict_alone():
     """Leave out what the workflow only reports once it has its verdict."""
     with ExitStack() as stack:
-        for name, nothing in (('places', []), ('fingerprint', {}), ('least_sizes', {}),
+        for name, nothing in (('places', []), ('fingerprint', {}), ('sizes_or_reasons', {}),
                               ('explain', '')):
             stack.enter_context(mock.patch.object(
                 workflow, name, lambda *_, nothing=nothing: nothing))

@@ -130,7 +130,8 @@ def _point(row: dict[str, Any], name: str, quantity: str, like: dict[str, Any]
         if like['kind'] == 'parameter' and size['name'] == name:
             return size['value'], _sd(size), False
     least = row['least'].get(name)
-    if like['kind'] == 'effect' and least is not None and least['quantity'] == quantity:
+    if like['kind'] == 'effect' and least is not None and least['value'] is not None and (
+            least['quantity'] == quantity):
         return 0.0, abs(least['value']) / IN_95, False
     return None
 

@@ -194,6 +194,7 @@ def _explain(args: argparse.Namespace) -> int:
     from pam_actuation.report.model_held import recorded_model
     from pam_sim import load_rig
     from pam_sim.catalogue import catalogue, find
+    from pam_sim.gap.plan.detectable import NOT_PROPORTIONAL
     from pam_sim.gap.plan.look_alikes import look_alikes
     from pam_sim.rig_text import rig_title
     from pam_sim.units import behind_number
@@ -209,7 +210,9 @@ def _explain(args: argparse.Namespace) -> int:
     found = look_alikes(run, rig, args.explain)
     least = found['least']
     lines = [in_full(entry), f'model: {rig_title(rig)}, valve {rig.valve}']
-    if least:
+    if not least:
+        lines.append(f'no smallest size: {NOT_PROPORTIONAL}')
+    else:
         unit = behind_number(least['unit'])
         lines.append(f'shows from {least["quantity"]} = {least["value"]:.3g}{unit} on '
                      '(one noise floor, rms, after calibration)')

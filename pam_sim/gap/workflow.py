@@ -23,7 +23,7 @@ from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.speeds import moves_at_one_speed
 from pam_sim.gap.data.split import FIT, SELECT
 from pam_sim.gap.fit.estimator import Estimator
-from pam_sim.gap.plan.detectable import least_sizes
+from pam_sim.gap.plan.detectable import sizes_or_reasons
 from pam_sim.gap.propose.proposal import propose
 from pam_sim.gap.propose.surrogate import add_surrogate
 from pam_sim.gap.report.by_subsystem import add_place, subsystem_verdicts
@@ -160,7 +160,8 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     add_place(result)
     result.traces, result.inputs = validation.traces(), validation.inputs()
     result.fingerprint = fingerprint(estimator, validation.base, validation.final)
-    result.minimum_detectable = least_sizes(outcome.screened, rig, materiality)
+    result.minimum_detectable = sizes_or_reasons(
+        outcome.screened, rig, [s for p in estimator.problems for s in p.signals], materiality)
     result.reason = explain(result, outcome, harms)
     if not outcome.complete:
         result.reason += CUT_SHORT.format(seconds)

@@ -157,7 +157,8 @@ def test_days_without_a_name_count_as_nothing_or_not_at_all():
     least = {'leakage': {'value': 0.7, 'unit': '-', 'quantity': 'c'}}
     [found] = series_of([
         row(1, 'no_gap', least=least), row(2, sizes=[leak]), row(3, 'unknown', least=least),
-        row(4, 'ambiguous', ambiguous=['leakage'], least=least), row(5, 'no_gap')])
+        row(4, 'ambiguous', ambiguous=['leakage'], least=least), row(5, 'no_gap'),
+        row(6, 'no_gap', least={'leakage': {**least['leakage'], 'value': None, 'why': 'w'}})])
     assert found.time.tolist() == [1.0, 2.0] and found.named.tolist() == [False, True]
     assert found.value.tolist() == [0.0, 5.0]
     assert found.sd == pytest.approx([0.7 / IN_95, 1.0 / IN_95])

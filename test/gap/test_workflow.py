@@ -20,10 +20,12 @@ from gap_runs import assert_form, NOMINAL, nominal, recorded, voltages
 import numpy as np
 from pam_actuation.report.gap import free_run_overlay, write_gap
 from pam_sim import load_rig
+from pam_sim.effects.registry import effects
 from pam_sim.gap import find_gap
 from pam_sim.gap.data.health import check_for
 from pam_sim.gap.data.recording import held_mean, Recording
 from pam_sim.gap.data.split import CERTIFY, FIT, long_split, SELECT, UNUSED
+from pam_sim.gap.plan.detectable import NOT_PROPORTIONAL
 from pam_sim.gap.result import SignalGap
 from pam_sim.gap.subsystems.simulation import free_run, start_contraction_m
 from pam_sim.units import P_ATM_PA
@@ -275,6 +277,13 @@ def test_the_folder_holds_what_others_rely_on(two_effects):
     assert set(found['subsystems']['valve']) >= {'verdict', 'names', 'unexplained', 'unit'}
     assert set(found['signals']['pressure']) == {
         'unit', 'noise_floor', 'rmse_before', 'rmse_refit', 'rmse_after', 'shrink_percent'}
+    least = found['minimum_detectable']
+    assert set(least) == {name for name, e in effects().items() if 'ppr' in e.valves
+                          and not e.variant_of and not e.relative_of}
+    assert least['flow_limit'] == {
+        'value': None, 'unit': 'Pa/s', 'quantity': 'fill_rate_at_400kpa_pa_per_s',
+        'why': NOT_PROPORTIONAL}
+    assert least['leakage']['value'] > 0.0 and 'why' not in least['leakage']
     assert load_rig(str(folder / 'model.yaml')).valve == 'ppr'
     assert (folder / 'report.html').stat().st_size > 1e6
     assert sorted(p.name for p in folder.iterdir()) == [

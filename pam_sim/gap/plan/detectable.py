@@ -14,12 +14,16 @@
 
 """The smallest size of each effect that shows in a recording."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
-from pam_sim.effects.registry import get_effect
+from pam_sim.effects.registry import effects, get_effect
+from pam_sim.gap.select.candidates import why_not
 from pam_sim.gap.select.screening import Screened
 from pam_sim.rig import Rig
+
+NOT_PROPORTIONAL = 'what it does is not about proportional to any of its parameters'
+NOT_SEEN = 'it was not tried, or changes no signal here'
 
 
 def least_sizes(screened: Iterable[Screened], rig: Rig, floors: float = 1.0
@@ -44,3 +48,25 @@ def least_sizes(screened: Iterable[Screened], rig: Rig, floors: float = 1.0
         quantity, (value, unit) = next(iter(report.items()))
         found[effect.name] = {'value': float(value), 'unit': unit, 'quantity': quantity}
     return found
+
+
+def sizes_or_reasons(screened: Iterable[Screened], rig: Rig, outputs: Sequence[str],
+                     floors: float = 1.0) -> dict[str, dict[str, Any]]:
+    """
+    Return ``least_sizes``, and for every other effect of the valve why it has none (``why``).
+
+    ``outputs`` are the signals that are compared.
+    """
+    sizes = least_sizes(screened, rig, floors)
+    found = {}
+    for name, effect in effects().items():
+        if effect.variant_of or effect.relative_of or rig.valve not in effect.valves:
+            continue
+        found[name] = sizes.get(name)
+        if found[name] is None:
+            quantity, (_, unit) = next(iter(effect.report(effect.values({}), rig).items()))
+            shapes_only = all(f.shape for f in effect.free_parameters(rig.valve))
+            found[name] = {'value': None, 'unit': unit, 'quantity': quantity,
+                           'why': why_not(name, rig, outputs) or (
+                               NOT_PROPORTIONAL if shapes_only else NOT_SEEN)}
+    return {**found, **sizes}
