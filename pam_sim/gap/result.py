@@ -216,6 +216,8 @@ class GapResult:
     model : dict, optional
         Which model was held against the recordings, and which rig they name: the entry of
         gap.json.
+    recorded : dict
+        ``bag`` and ``date`` of what was searched, for the source of an effect in the model.
     numbers_first : dict, optional
         What was found of unknown numbers before the look: the entry of gap.json.
     first_lines : list of str
@@ -254,6 +256,7 @@ class GapResult:
     not_judged: dict[str, str] = field(default_factory=dict)
     noticed: list[Any] = field(default_factory=list)
     model: dict[str, Any] | None = None
+    recorded: dict[str, Any] = field(default_factory=dict)
     numbers_first: dict[str, Any] | None = None
     first_lines: list[str] = field(default_factory=list)
     proposal: Any = None

@@ -105,8 +105,9 @@ def fill(result: GapResult, outcome: Outcome, validation: Validation) -> None:
         result.effects.append({
             'name': w.name, 'family': effect.family, 'subsystem': effect.subsystem,
             'confidence': _confidence(w, outcome, estimator.criteria),
-            'formulation': formulation, **numbers})
-        settings = [replace(s, source={'ci95': {
+            'formulation': formulation, **numbers,
+            'rivals': [name for name in w.names if name != w.name]})
+        settings = [replace(s, source={**result.recorded, 'ci95': {
             n: p['ci95'] for n, p in numbers['parameters'].items()}})
                     if s.name == formulation else s for s in settings]
     result.model_yaml = model.with_(effects=settings).to_yaml()
@@ -154,6 +155,7 @@ def judge(result: GapResult, outcome: Outcome, validation: Validation, materiali
     result.ambiguity_set = list(dict.fromkeys(n for w in named for n in w.names))
     if any(len(w.names) > 1 for w in named):
         result.verdict = 'ambiguous'
+        result.effects.sort(key=lambda e: -e['confidence'])
     else:
         result.verdict = 'effects' if result.effects else 'parameter'
         if result.unexplained_fraction >= criteria.partial_share:

@@ -15,7 +15,10 @@
 """The whole workflow: health, subsystems, search, numbers, validation, verdict."""
 
 from collections.abc import Callable, Collection, Sequence
+from datetime import datetime, timezone
+from pathlib import Path
 import time
+from typing import Any
 
 from pam_sim.gap.criteria import CRITERIA, Criteria
 from pam_sim.gap.data.checked import checked_runs, recording_of
@@ -115,7 +118,7 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
                          runtime_s=time.perf_counter() - started, model_yaml=rig.to_yaml())
     is_certify = checked.certify is not None
     recordings = [recording_of(run, rig, criteria) for run in checked.runs]
-    result = GapResult('unknown', '', remarks=checked.remarks)
+    result = GapResult('unknown', '', remarks=checked.remarks, recorded=_recorded(checked.runs))
     if _needs_pulses(rig, recordings, criteria):
         rig = rig.with_(fidelity='switching')
         result.remarks.append(PULSES)
@@ -174,6 +177,13 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     progress(1.0)
     result.runtime_s = time.perf_counter() - started
     return result
+
+
+def _recorded(runs: Sequence[Run]) -> dict[str, Any]:
+    """Return the names of recordings, one or a list, and the day of the first one (UTC)."""
+    bags = list(dict.fromkeys(Path(run.path).name for run in runs))
+    day = datetime.fromtimestamp(runs[0].start_ns * 1e-9, timezone.utc).date()
+    return {'bag': bags if len(bags) > 1 else bags[0], 'date': day.isoformat()}
 
 
 def _needs_pulses(rig: Rig, recordings: Sequence[Recording], criteria: Criteria) -> bool:

@@ -79,7 +79,11 @@ def test_two_effects_are_named_with_their_sizes(two_effects):
         assert said['value'] == pytest.approx(truth, rel=0.05)
         assert said['ci95'][0] < truth < said['ci95'][1]
         assert 0.5 < found[name]['confidence'] <= 1.0
+        assert found[name]['rivals'] == []
     assert found['coulomb_friction']['subsystem'] == 'muscle'
+    for added in load_rig(result.model_yaml).effects:
+        assert {**added.source, 'ci95': {}} == {
+            'bag': 'simulated', 'date': '1970-01-01', 'ci95': {}}
     assert result.unexplained_fraction < 0.02
     for name in ('pressure', 'contraction', 'force'):
         assert result.signals[name].rmse_refit > 3.0 * result.signals[name].noise_floor
@@ -310,6 +314,24 @@ def test_an_overlay_of_the_true_model_stays_near():
     assert np.sqrt(np.mean((contraction.recorded - contraction.simulated) ** 2)) < 1e-4
 
 
+def test_a_certain_name_beside_two_that_cannot_be_told_apart():
+    rig = nominal().with_(effects=[
+        {'name': 'valve_dead_time', 'parameters': {'delay_s': 0.03}},
+        {'name': 'coulomb_friction', 'parameters': {'force_n': 1.5}}])
+    run = recorded(rig, voltages(12.0), topics=('pressure', 'contraction'))
+    result = find_gap(run, nominal(), effects=[
+        'valve_dead_time', 'coulomb_friction', 'guide_friction'], unnamed=())
+    assert result.verdict == 'ambiguous'
+    assert set(result.ambiguity_set) == {
+        'valve_dead_time', 'coulomb_friction', 'guide_friction'}
+    # The likeliest first, each with its own rivals.
+    assert [e['name'] for e in result.effects][0] == 'valve_dead_time'
+    sure, doubtful = result.effects
+    assert sure['rivals'] == [] and sure['confidence'] > doubtful['confidence']
+    assert {doubtful['name'], *doubtful['rivals']} == {'coulomb_friction', 'guide_friction'}
+    assert_form(result)
+
+
 def test_rivals_come_with_an_experiment_that_tells_them_apart(tmp_path, monkeypatch):
     from pam_actuation.experiments import load_experiment, separating
     pieces = separating.menu('ppr')
@@ -321,7 +343,8 @@ def test_rivals_come_with_an_experiment_that_tells_them_apart(tmp_path, monkeypa
     result = write_gap([run], NOMINAL, tmp_path, effects=['coulomb_friction', 'guide_friction'])
     assert result.verdict == 'ambiguous'
     assert_form(result)
-    assert set(result.ambiguity_set) == {'coulomb_friction', 'guide_friction'}
+    assert set(result.ambiguity_set) == {
+        'valve_dead_time', 'coulomb_friction', 'guide_friction'}
     # Inside the muscle or at the rail: only a load cell between them can tell.
     assert 'force' in result.next_experiment['needs']
     found = load_experiment(str(tmp_path / 'next_experiment.yaml'))
