@@ -24,6 +24,8 @@ from pam_sim.plain_json import finite
 from pam_sim.short_repr import short_repr
 
 SCHEMA = 1
+OWN_INPUTS = 'each subsystem on its own measured inputs:'
+WHOLE_CHAIN = 'the whole chain, run freely on the data of the proof:'
 
 
 @dataclass(frozen=True)
@@ -82,7 +84,8 @@ class Share:
         when = '' if self.condition == 'all' else f', {_when(self.condition)}'
         sure = '' if self.certainty is None else f' (certainty {self.certainty:.2f})'
         return (f'After calibration the disagreement lives in the {subsystem}{sure}: '
-                f'{100 * self.share_of_gap:.0f} % of the squared gap in {self.signal}{when}.')
+                f'{100 * self.share_of_gap:.0f} % of the squared gap in {self.signal}{when}, each '
+                'subsystem on its own measured inputs.')
 
 
 @dataclass(frozen=True)
@@ -265,7 +268,12 @@ class GapResult:
     @property
     def place(self) -> str:
         """Return in one sentence where the disagreement lives; empty where there is none."""
-        return self.where[0].text() if self.where else ''
+        if not self.where:
+            return ''
+        others = [s for s, one in self.subsystems.items()
+                  if one.names and s != self.where[0].subsystem]
+        return self.where[0].text() + (
+            f' Something is named in {" and ".join(others)} as well.' if others else '')
 
     @property
     def model_lines(self) -> list[str]:
@@ -281,9 +289,10 @@ class GapResult:
     def text(self) -> str:
         """Return the result in lines for a person."""
         rows = [*self.model_lines, *self.first_lines, *([self.place] if self.place else []),
-                f'{self.verdict}: {self.reason}',
+                f'{self.verdict}: {self.reason}', *([OWN_INPUTS] if self.subsystems else []),
                 *(f'  {name}: {found.text()}' for name, found in self.subsystems.items())]
         rows += [f'  {s}: not judged: {why}' for s, why in self.not_judged.items()]
+        rows += [WHOLE_CHAIN] if self.signals else []
         for name, s in self.signals.items():
             factor, unit = READABLE[name]
             rows.append(

@@ -107,9 +107,9 @@ def fill(result: GapResult, outcome: Outcome, validation: Validation) -> None:
             'confidence': _confidence(w, outcome, estimator.criteria),
             'formulation': formulation, **numbers,
             'rivals': [name for name in w.names if name != w.name]})
-        settings = [replace(s, source={**result.recorded, 'ci95': {
-            n: p['ci95'] for n, p in numbers['parameters'].items()}})
-                    if s.name == formulation else s for s in settings]
+        source = {**result.recorded,
+                  'ci95': {n: p['ci95'] for n, p in numbers['parameters'].items()}}
+        settings = [replace(s, source=source) if s.name == formulation else s for s in settings]
     result.model_yaml = model.with_(effects=settings).to_yaml()
 
 
@@ -255,9 +255,9 @@ def _calibrated(estimator: Estimator, found: Fit, precision: Precision) -> list[
                 value = numbers[known.name]
                 half = math.hypot(
                     NUMERICS * value, known.sd * half_width(precision, place, float(z)))
+                ends = (max(value - half, known.lower), min(value + half, known.upper))
                 listed.append(Calibrated(
-                    known.name, known.unit, known.value, value,
-                    (max(value - half, known.lower), min(value + half, known.upper)), float(z)))
+                    known.name, known.unit, known.value, value, ends, float(z)))
             place += 1
     return listed
 

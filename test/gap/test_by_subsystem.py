@@ -22,7 +22,7 @@ from pam_actuation.report.sections.gap import gap_section
 from pam_sim.gap import find_gap
 from pam_sim.gap.criteria import CRITERIA
 from pam_sim.gap.report.by_subsystem import subsystem_of, subsystem_verdicts
-from pam_sim.gap.result import Calibrated, GapResult, SignalGap
+from pam_sim.gap.result import Calibrated, GapResult, OWN_INPUTS, SignalGap, WHOLE_CHAIN
 from pam_sim.gap.select.rival import NamedEffect
 import pytest
 
@@ -55,8 +55,10 @@ def test_a_valve_without_a_name_takes_none_from_the_muscle(own_proof):
     assert muscle.unexplained_fraction < 0.05 < result.unexplained_fraction
     assert muscle.gap.rmse_after < muscle.gap.noise_floor < muscle.gap.rmse_refit
     lines = result.text().splitlines()
-    assert lines[2].startswith('  valve: ') and lines[2].endswith(' kPa unexplained')
-    assert lines[3].startswith('  muscle: coulomb_friction, ')
+    assert lines[2] == OWN_INPUTS
+    assert lines[3].startswith('  valve: ') and lines[3].endswith(' kPa unexplained')
+    assert lines[4].startswith('  muscle: coulomb_friction, ')
+    assert lines[lines.index(WHOLE_CHAIN) + 1].startswith('  pressure: noise floor ')
     page = gap_section(result).body
     assert 'By subsystem' in page and '% of the squared gap' in page
 

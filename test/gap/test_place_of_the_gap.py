@@ -14,6 +14,7 @@
 
 """The first row of ``where``: the subsystem in which the disagreement lives after calibration."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 from gap_runs import nominal, recorded, voltages
@@ -136,9 +137,10 @@ def test_a_condition_is_told_where_it_holds_most_of_the_gap(run):
     found = place(run, 'unknown', errors=late)
     assert found.condition == 'in the last third' and found.share_of_gap > 0.9
     assert Share('muscle', 'force', '380 to 470 kPa', 0.5).text().endswith(
-        ': 50 % of the squared gap in force, at 380 to 470 kPa.')
+        ': 50 % of the squared gap in force, at 380 to 470 kPa, '
+        'each subsystem on its own measured inputs.')
     assert place(run, 'unknown').condition == 'all'
-    assert 'of the squared gap in contraction, in the last third.' in found.text()
+    assert 'of the squared gap in contraction, in the last third, each' in found.text()
 
 
 def test_the_balance_of_forces_tells_muscle_from_load(run):
@@ -185,6 +187,25 @@ def test_page_and_terminal_open_with_the_place():
     assert result.text().startswith(f'{sentence}\neffects: ')
     assert gap_section(result).body.startswith(f'<p>{sentence}</p>')
     assert {w.subsystem for w in result.where} == {'sensor'}
+
+
+def test_the_first_sentence_tells_its_basis_and_what_else_is_named():
+    one = SubsystemVerdict('effects', ('leakage',), 'pressure', WIDE, 0.1)
+    result = GapResult('effects', '', where=[Share('muscle', 'contraction', 'all', 1.0, 1.0)],
+                       subsystems={'valve': one, 'muscle': replace(one, names=('creep',))})
+    assert result.place.endswith(
+        'in contraction, each subsystem on its own measured inputs. '
+        'Something is named in valve as well.')
+    result.subsystems.pop('valve')
+    assert 'as well' not in result.place
+
+
+def test_the_page_tells_the_limits_by_which_rivals_are_left_behind():
+    result = GapResult('effects', '', evidence=[
+        {'subsystem': 'valve', 'name': 'leakage', 'share': 0.9, 't': None}])
+    body = gap_section(result).body
+    assert f'From {CRITERIA.ahead_t:g} on a rival is left behind' in body
+    assert f'from {CRITERIA.behind_t:g} on one that explains at least 5 points less' in body
 
 
 def test_a_page_lists_no_dependence_of_what_has_no_gap():

@@ -23,6 +23,7 @@ from pam_actuation.report import figures
 from pam_actuation.report.page import paragraph, plot, Section, table
 from pam_actuation.report.sections.gap_witness import coloured_part, witness_part
 from pam_actuation.report.sections.replay import SHOWN
+from pam_sim.gap.criteria import CRITERIA
 from pam_sim.gap.report.words import in_words
 
 if TYPE_CHECKING:
@@ -137,6 +138,8 @@ def _effects(result: 'GapResult') -> str:
             else '<h3>What is missing in the model</h3>')
     body += table(['effect', 'family', 'subsystem', 'confidence', 'quantity', 'value',
                    '95 % interval'], rows)
+    body += ''.join(paragraph(f'{e["name"]}: the data determine only {formula}.')
+                    for e in result.effects for formula in e['together'])
     moved = ', '.join(f'{name} by {value:.3g}' for name, value in result.moved.items())
     return body + paragraph(
         f'With it the model moves {moved} standard deviations of the sensor (rms). '
@@ -158,7 +161,9 @@ def _evidence(result: 'GapResult') -> str:
                           f'{", ".join(names)}.', 'note')
     return body + paragraph(
         'Every name was fitted to one part of the data and judged on another. t compares squared '
-        'errors block by block; below 3 the data do not tell two names apart.', 'note')
+        f'errors block by block. From {CRITERIA.ahead_t:g} on a rival is left behind, from '
+        f'{CRITERIA.behind_t:g} on one that explains at least '
+        f'{100 * CRITERIA.close_share:.0f} points less.', 'note')
 
 
 def _next(result: 'GapResult', command: str) -> str:
@@ -177,6 +182,9 @@ def _where(result: 'GapResult') -> str:
     body = '<h3>Where the gap of the whole chain sits</h3>'
     body += table(['signal', 'subsystem', 'share of the squared gap'],
                   [[w.signal, w.subsystem, f'{100 * w.share_of_gap:.0f} %'] for w in whole])
+    body += paragraph(
+        'Here the whole chain runs freely, so an error of the pressure goes on into contraction '
+        'and force. The first line of this section takes each subsystem by itself.', 'note')
     parts = [w for w in rows if w.condition != 'all']
     names = list(dict.fromkeys(w.condition for w in parts))
     groups = []
