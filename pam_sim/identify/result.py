@@ -17,7 +17,8 @@
 from dataclasses import dataclass, field
 from typing import Any
 
-from pam_sim.identify.judgement import Combination, DETERMINED, is_narrow
+from pam_sim.gap.verify.together import Combination
+from pam_sim.identify.judgement import DETERMINED, is_narrow
 from pam_sim.identify.numbers import Number
 from pam_sim.identify.profile import Interval
 from pam_sim.rig import Rig

@@ -25,11 +25,11 @@ from pam_sim.gap.criteria import CRITERIA
 from pam_sim.gap.data.commanded import commanded
 from pam_sim.gap.data.signals import UNIT
 from pam_sim.gap.fit.profile import NORMAL_95
+from pam_sim.gap.verify.together import Combination
 from pam_sim.identify.advice import next_experiment, where_open
 from pam_sim.identify.fit import fit, NOWHERE, Weighted
 from pam_sim.identify.inputs import noise_beyond
-from pam_sim.identify.judgement import (
-    Combination, DETERMINED, is_at_edge, judge, UNDETERMINED)
+from pam_sim.identify.judgement import DETERMINED, is_at_edge, judge, UNDETERMINED
 from pam_sim.identify.numbers import (
     known_numbers_of, Number, unknown_numbers, with_values)
 from pam_sim.identify.possible import (

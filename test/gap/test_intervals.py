@@ -14,14 +14,13 @@
 
 """95 % intervals: along what the data leave open, within the allowed range, one for a name."""
 
+from gap_runs import assert_form, NOMINAL, nominal, recorded, voltages
 import numpy as np
 from pam_sim import load_rig
 from pam_sim.gap import find_gap
 from pam_sim.gap.fit.profile import NORMAL_95, profile_ends
 from pam_sim.gap.verify.together import known_together
 import pytest
-
-from gap_runs import assert_form, NOMINAL, nominal, recorded, voltages
 
 SD = 1e-3                    # of the difference in the toy problem
 OPEN_S, CLOSE_S = 1.7e-3, 2.0e-3

@@ -62,11 +62,12 @@ def sizes_or_reasons(screened: Iterable[Screened], rig: Rig, outputs: Sequence[s
     for name, effect in effects().items():
         if effect.variant_of or effect.relative_of or rig.valve not in effect.valves:
             continue
-        found[name] = sizes.get(name)
-        if found[name] is None:
+        size = sizes.get(name)
+        if size is None:
             quantity, (_, unit) = next(iter(effect.report(effect.values({}), rig).items()))
             shapes_only = all(f.shape for f in effect.free_parameters(rig.valve))
-            found[name] = {'value': None, 'unit': unit, 'quantity': quantity,
-                           'why': why_not(name, rig, outputs) or (
-                               NOT_PROPORTIONAL if shapes_only else NOT_SEEN)}
+            size = {'value': None, 'unit': unit, 'quantity': quantity,
+                    'why': why_not(name, rig, outputs) or (
+                        NOT_PROPORTIONAL if shapes_only else NOT_SEEN)}
+        found[name] = size
     return {**found, **sizes}

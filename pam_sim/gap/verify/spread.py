@@ -14,7 +14,7 @@
 
 """What the doubt about the parameters of a model leaves on the certify data."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 import math
 from typing import TypeVar
 
@@ -51,7 +51,7 @@ def spread_of_numbers(validation: Validation) -> dict[str, float]:
         s: values[validation.part[s]] for s, values in validation.refit.items()})
 
 
-def spread_of_runs(spread: tuple[list[FloatArray], Callable[[int, float], Fit]],
+def spread_of_runs(spread: tuple[Sequence[FloatArray], Callable[[int, float], Fit]],
                    run: Callable[[Fit], Mapping[Signal, FloatArray]],
                    usual: Mapping[Signal, FloatArray]) -> dict[Signal, float]:
     """
