@@ -58,16 +58,14 @@ def sizes_or_reasons(screened: Iterable[Screened], rig: Rig, outputs: Sequence[s
     ``outputs`` are the signals that are compared.
     """
     sizes = least_sizes(screened, rig, floors)
-    found = {}
+    found = {name: {**one, 'why': None} for name, one in sizes.items()}
     for name, effect in effects().items():
-        if effect.variant_of or effect.relative_of or rig.valve not in effect.valves:
+        if (name in found or effect.variant_of or effect.relative_of
+                or rig.valve not in effect.valves):
             continue
-        size = sizes.get(name)
-        if size is None:
-            quantity, (_, unit) = next(iter(effect.report(effect.values({}), rig).items()))
-            shapes_only = all(f.shape for f in effect.free_parameters(rig.valve))
-            size = {'value': None, 'unit': unit, 'quantity': quantity,
-                    'why': why_not(name, rig, outputs) or (
-                        NOT_PROPORTIONAL if shapes_only else NOT_SEEN)}
-        found[name] = size
-    return {**found, **sizes}
+        quantity, (_, unit) = next(iter(effect.report(effect.values({}), rig).items()))
+        shapes_only = all(f.shape for f in effect.free_parameters(rig.valve))
+        found[name] = {'value': None, 'unit': unit, 'quantity': quantity,
+                       'why': why_not(name, rig, outputs) or (
+                           NOT_PROPORTIONAL if shapes_only else NOT_SEEN)}
+    return found
