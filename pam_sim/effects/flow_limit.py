@@ -28,7 +28,6 @@ from typing import Any
 import numpy as np
 
 from pam_sim.compiled import compiled, interpreted
-from pam_sim.effects.air_volume import air_volume_m3, pack_volume, VOLUME
 from pam_sim.effects.effect import Effect, Numbers, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import check_parameters, Parameter
@@ -55,8 +54,7 @@ def _pack(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
         flow = interpreted(mass_flow_kg_per_s)(p, P_ATM_PA, 1.0, CRITICAL_RATIO)
         vent = values['vent_rate_at_400kpa_pa_per_s'] * volume / flow
     return {'fill_m3_per_s': fill, 'vent_m3_per_s': vent,
-            'supply_pa': numbers.parameters['supply_pa'], 'atmosphere_pa': P_ATM_PA,
-            **pack_volume(numbers)}
+            'supply_pa': numbers.parameters['supply_pa'], 'atmosphere_pa': P_ATM_PA}
 
 
 EFFECT = Effect(
@@ -80,7 +78,7 @@ EFFECT = Effect(
         Reported('vent_rate_at_400kpa_pa_per_s', 'Pa/s',
                  lambda values, rig: values['vent_rate_at_400kpa_pa_per_s']),
     ),
-    packed=record('fill_m3_per_s', 'vent_m3_per_s', 'supply_pa', 'atmosphere_pa', *VOLUME),
+    packed=record('fill_m3_per_s', 'vent_m3_per_s', 'supply_pa', 'atmosphere_pa'),
     pack=_pack,
     valves=('ppr',),
     order=40,               # the regulator's own rate: before what leaks behind it
@@ -92,14 +90,13 @@ EFFECT = Effect(
 
 
 @compiled
-def pressure_rate(rate_pa_per_s: float, pressure_pa: float, contraction_m: float,
+def pressure_rate(rate_pa_per_s: float, pressure_pa: float, volume_m3: float,
                   par: np.record) -> float:
     """Return the pressure rate within what the orifices let through."""
-    volume = air_volume_m3(contraction_m, par)
     if rate_pa_per_s > 0.0:
-        cap = par.fill_m3_per_s / volume
+        cap = par.fill_m3_per_s / volume_m3
         return min(rate_pa_per_s, mass_flow_kg_per_s(
             par.supply_pa, pressure_pa, cap, CRITICAL_RATIO))
-    cap = par.vent_m3_per_s / volume
+    cap = par.vent_m3_per_s / volume_m3
     return max(rate_pa_per_s, -mass_flow_kg_per_s(
         pressure_pa, par.atmosphere_pa, cap, CRITICAL_RATIO))

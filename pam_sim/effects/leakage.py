@@ -25,7 +25,6 @@ from typing import Any, TYPE_CHECKING
 import numpy as np
 
 from pam_sim.compiled import compiled, interpreted
-from pam_sim.effects.air_volume import air_volume_m3, pack_volume, VOLUME
 from pam_sim.effects.effect import Effect, Numbers, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.parameters import Parameter
@@ -43,8 +42,7 @@ _KG_PER_S_PA = RHO_REFERENCE * (T_REFERENCE_K / TEMPERATURE_K) ** 0.5
 
 def _pack(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     return {'conductance_kg_per_s_pa': values['conductance_m3_per_s_pa'] * _KG_PER_S_PA,
-            'atmosphere_pa': P_ATM_PA, 'rt_j_per_kg': GAS_CONSTANT_AIR * TEMPERATURE_K,
-            **pack_volume(numbers)}
+            'atmosphere_pa': P_ATM_PA, 'rt_j_per_kg': GAS_CONSTANT_AIR * TEMPERATURE_K}
 
 
 def flow_at_400kpa(values: Mapping[str, float], rig: 'Rig') -> float:
@@ -72,7 +70,7 @@ EFFECT = Effect(
                  lambda values, rig: values['conductance_m3_per_s_pa']),
         Reported('mass_flow_at_400kpa_kg_per_s', 'kg/s', flow_at_400kpa),
     ),
-    packed=record('conductance_kg_per_s_pa', 'atmosphere_pa', 'rt_j_per_kg', *VOLUME),
+    packed=record('conductance_kg_per_s_pa', 'atmosphere_pa', 'rt_j_per_kg'),
     pack=_pack,
     fitting=Fitting(free=(FreeParameter('conductance_m3_per_s_pa', 2e-13, 0.0, 1e-10),)),
 )
@@ -86,10 +84,9 @@ def mass_flow(flow_kg_per_s: float, pressure_pa: float, par: np.record) -> float
 
 
 @compiled
-def pressure_rate(rate_pa_per_s: float, pressure_pa: float, contraction_m: float,
+def pressure_rate(rate_pa_per_s: float, pressure_pa: float, volume_m3: float,
                   par: np.record) -> float:
     """Return the pressure rate behind the PPR less the leak's share."""
     lost = mass_flow_kg_per_s(
         pressure_pa, par.atmosphere_pa, par.conductance_kg_per_s_pa, CRITICAL_RATIO)
-    volume = air_volume_m3(contraction_m, par)
-    return rate_pa_per_s - par.rt_j_per_kg / volume * lost
+    return rate_pa_per_s - par.rt_j_per_kg / volume_m3 * lost

@@ -25,7 +25,6 @@ from typing import Any, TYPE_CHECKING
 import numpy as np
 from pam_sim.annotations import Number
 from pam_sim.compiled import compiled
-from pam_sim.effects.air_volume import air_volume_m3
 from pam_sim.effects.effect import Effect, Numbers, Reported
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.effects.leakage import CRITICAL_RATIO, EFFECT as _SIBLING, flow_at_400kpa
@@ -106,8 +105,7 @@ def mass_flow(flow_kg_per_s: float, pressure_pa: float, par: np.record) -> float
 
 
 @compiled
-def pressure_rate(rate_pa_per_s: float, pressure_pa: float, contraction_m: float,
+def pressure_rate(rate_pa_per_s: float, pressure_pa: float, volume_m3: float,
                   par: np.record) -> float:
     """Return the pressure rate behind the PPR less the leak's share."""
-    volume = air_volume_m3(contraction_m, par)
-    return rate_pa_per_s - par.rt_j_per_kg / volume * lost_kg_per_s(pressure_pa, par)
+    return rate_pa_per_s - par.rt_j_per_kg / volume_m3 * lost_kg_per_s(pressure_pa, par)

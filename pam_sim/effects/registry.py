@@ -29,7 +29,7 @@ from pam_sim.rollout.hooks import check_hook, HOOKS
 _OWN_FOLDER = Path(__file__).parent
 _NOT_EFFECTS = ('declaration', 'effect', 'fitting', 'registry', 'setting')
 # What several effects call.
-_SHARED = ('air_volume', 'lag', 'loop_level', 'presliding', 'progressive', 'saturation')
+_SHARED = ('lag', 'loop_level', 'presliding', 'progressive', 'saturation')
 _UNNAMED_FOLDER = _OWN_FOLDER / 'unnamed'
 _NOT_TERMS = ('reading', 'terms')
 _SLIP = 0.8             # how alike a misspelt hook is to the one that was meant

@@ -120,6 +120,14 @@ def pressure_per_kg(mass: float, inflow: float, net: float, p: float, volume: fl
 
 
 @inlined
+def rate_behind_ppr(target: float, time_constant: float, p: float, x: float, beyond: int,
+                    state: np.record, par: np.record) -> float:
+    """Return the pressure rate [Pa/s] behind the PPR with what effects change of it."""
+    return hooks.pressure_rate((target - p) / time_constant, p, x,
+                               air_volume(p, x, beyond, state, par), beyond, state, par)
+
+
+@inlined
 def ppr_pressures(voltage: float, h: float, beyond: int, state: np.record,
                   par: np.record) -> tuple[float, float]:
     """Return the PPR pressure [Pa] at the middle and the end of a physics step."""
@@ -139,13 +147,13 @@ def ppr_pressures(voltage: float, h: float, beyond: int, state: np.record,
     for half in range(2):
         q = 0.5 * h
         p = middle
-        k1 = hooks.pressure_rate((target - p) / time_constant, p, x, beyond, state, par)
+        k1 = rate_behind_ppr(target, time_constant, p, x, beyond, state, par)
         y = p + 0.5 * q * k1
-        k2 = hooks.pressure_rate((target - y) / time_constant, y, x, beyond, state, par)
+        k2 = rate_behind_ppr(target, time_constant, y, x, beyond, state, par)
         y = p + 0.5 * q * k2
-        k3 = hooks.pressure_rate((target - y) / time_constant, y, x, beyond, state, par)
+        k3 = rate_behind_ppr(target, time_constant, y, x, beyond, state, par)
         y = p + q * k3
-        k4 = hooks.pressure_rate((target - y) / time_constant, y, x, beyond, state, par)
+        k4 = rate_behind_ppr(target, time_constant, y, x, beyond, state, par)
         y = p + q / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
         if half == 0:
             middle = y
