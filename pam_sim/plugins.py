@@ -248,7 +248,8 @@ def _line(one: dis.Instruction, function: Callable[..., Any]) -> int:
 
 
 def formula(module: ModuleType, name: str, arguments: tuple[str, ...],
-            path: Path, packed: np.dtype[Any]) -> Compiled[..., Any] | None:
+            path: Path, packed: np.dtype[Any],
+            returns: str = 'force_n') -> Compiled[..., Any] | None:
     """
     Return a compiled function of a plug-in, None where it has none of this name.
 
@@ -264,6 +265,8 @@ def formula(module: ModuleType, name: str, arguments: tuple[str, ...],
         The file.
     packed : numpy.dtype
         Record of the argument ``par``.
+    returns : str
+        What it returns, for messages.
 
     Raises
     ------
@@ -282,7 +285,7 @@ def formula(module: ModuleType, name: str, arguments: tuple[str, ...],
     given = named_arguments(function)
     if given != arguments:
         raise InputError(f'`{name}` takes ({", ".join(given)}); {form}', str(path))
-    check_function(f'`{name}`', function, ('force_n',), {'par': packed}, path)
+    check_function(f'`{name}`', function, (returns,), {'par': packed}, path)
     return function
 
 

@@ -109,6 +109,9 @@ class MuscleLaw:
         For a law with a damper,
         ``damper_force_n(velocity_m_per_s, gauge_pa, strain, par)`` of the file; compiled, not
         clipped, with the values of :meth:`pack` in the record ``par``.
+    COMPILED_VOLUME : callable or None
+        For a law with a volume of its own, ``volume_m3(gauge_pa, strain, par)`` of the file: the
+        inner volume [m^3].
     EXTRAPOLATES : bool
         Whether the formula goes on outside its range; else a rollout flags it.
 
@@ -130,6 +133,7 @@ class MuscleLaw:
     # Put here by the registry from the law's file.
     COMPILED: Compiled[..., float]
     COMPILED_DAMPER: Compiled[..., float] | None = None
+    COMPILED_VOLUME: Compiled[..., float] | None = None
     EXTRAPOLATES = True
     PACKED = record()
 
@@ -185,12 +189,16 @@ class MuscleLaw:
 
     def _tension_n(self, pressure: FloatArray, strain: FloatArray) -> FloatArray:
         """Return the formula's value [N], negative where the muscle would push."""
+        return self._over_points(type(self).COMPILED, pressure, strain)
+
+    def _over_points(self, formula: Compiled[..., float], pressure: FloatArray,
+                     strain: FloatArray) -> FloatArray:
         pressure, strain = np.broadcast_arrays(pressure, strain)
-        force = np.empty(pressure.size)
-        over_points(type(self).COMPILED, type(self).PACKED)(
+        found = np.empty(pressure.size)
+        over_points(formula, type(self).PACKED)(
             pressure.astype(float).ravel(), strain.astype(float).ravel(), self._packed_values(),
-            force)
-        return force.reshape(pressure.shape)
+            found)
+        return found.reshape(pressure.shape)
 
     def _packed_values(self) -> FloatArray:
         return values_of(self.PACKED, self.pack())
@@ -261,6 +269,22 @@ class MuscleLaw:
         """
         force = self._tension_n(*self._judged(pressure_gauge_pa, strain, outside))
         return np.maximum(0.0, force)[()]
+
+    def volume_m3(self, pressure_gauge_pa: ArrayLike, strain: ArrayLike) -> FloatArray:
+        """
+        Return the law's own inner volume [m^3]; checked, never warned; arrays broadcast.
+
+        Raises
+        ------
+        InputError
+            The law has none, or as of ``force_n``.
+
+        """
+        formula = type(self).COMPILED_VOLUME
+        if formula is None:
+            raise InputError(f'law `{self.NAME}` has no volume of its own')
+        return self._over_points(
+            formula, *self._judged(pressure_gauge_pa, strain, 'allow'))[()]
 
     def max_strain(self, pressure_gauge_pa: ArrayLike, load_n: ArrayLike = 0.0) -> FloatArray:
         """

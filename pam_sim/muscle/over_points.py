@@ -28,12 +28,12 @@ from pam_sim.records import part
 def over_points(formula: Callable[..., float], packed: np.dtype[Any]
                 ) -> Callable[[FloatArray, FloatArray, FloatArray, FloatArray], None]:
     """
-    Return a function that fills in the force [N] of many points.
+    Return a function that fills in what a formula of a law gives at many points.
 
     Parameters
     ----------
     formula : callable
-        ``tension_n`` of a law, compiled.
+        ``tension_n`` or ``volume_m3`` of a law, compiled.
     packed : numpy.dtype
         Record ``par`` of the formula.
 
@@ -41,12 +41,12 @@ def over_points(formula: Callable[..., float], packed: np.dtype[Any]
     key = source_key(formula)
 
     @entry_point
-    def fill_tension(gauge_pa: FloatArray, strain: FloatArray, values: FloatArray,
-                     force_n: FloatArray) -> None:
-        """Fill in the force [N] of each point; ``values`` are those of ``pack``."""
+    def fill(gauge_pa: FloatArray, strain: FloatArray, values: FloatArray,
+             found: FloatArray) -> None:
+        """Fill in the value of each point; ``values`` are those of ``pack``."""
         if key < 0:         # never; makes the key part of what is stored
             return
         par = part(values, 0, packed)
-        for i in range(force_n.size):
-            force_n[i] = formula(gauge_pa[i], strain[i], par)
-    return fill_tension
+        for i in range(found.size):
+            found[i] = formula(gauge_pa[i], strain[i], par)
+    return fill

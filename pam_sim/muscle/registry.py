@@ -65,6 +65,7 @@ def laws() -> dict[str, type[MuscleLaw]]:
         law.COMPILED = compiled
         law.COMPILED_DAMPER = formula(
             module, 'damper_force_n', ('velocity_m_per_s', *_POINT), path, law.PACKED)
+        law.COMPILED_VOLUME = formula(module, 'volume_m3', _POINT, path, law.PACKED, 'volume_m3')
         _check_bores(law, path)
         if path.parent != _OWN_FOLDER:
             _check_sets(law, path)

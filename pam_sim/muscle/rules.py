@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from pam_sim.annotations import FloatArray
-from pam_sim.compiled import interpreted
+from pam_sim.compiled import Compiled, interpreted
 from pam_sim.errors import InputError
 from pam_sim.records import fields, values_of
 
@@ -84,26 +84,26 @@ def grid(law: 'MuscleLaw') -> tuple[FloatArray, FloatArray]:
             np.linspace(*law.validity.strain, _STRAINS))
 
 
-def formula_at(law: 'MuscleLaw', pressure: FloatArray, strain: FloatArray) -> FloatArray:
-    """Return the value of the formula [N] on a grid, by the function in Python."""
+def formula_at(law: 'MuscleLaw', pressure: FloatArray, strain: FloatArray,
+               formula: Compiled[..., float] | None = None) -> FloatArray:
+    """Return the force [N], or another formula's value, on a grid, by the function in Python."""
     packed = type(law).PACKED
     par = fields(values_of(law.PACKED, law.pack()), packed) if packed.names else None
-    one = interpreted(type(law).COMPILED)
+    one = interpreted(formula or type(law).COMPILED)
     with np.errstate(all='ignore'):
         return np.array([[one(p, e, par) for e in strain] for p in pressure], float)
 
 
 def _rule_1(law: 'MuscleLaw', pressure: FloatArray, strain: FloatArray,
             force: FloatArray) -> Iterator[str]:
-    volume_m3 = getattr(law, 'volume_m3', None)
-    if volume_m3 is None:
-        yield 'it has no method `volume_m3(pressure_gauge_pa, strain)`'
+    formula = type(law).COMPILED_VOLUME
+    if formula is None:
+        yield 'its file has no `volume_m3(gauge_pa, strain, par)`'
         return
-    for p, row in zip(pressure, force):
-        pulls = strain[row > 0.0]
-        for (e, before), (_, after) in pairwise(zip(pulls, volume_m3(p, pulls))):
-            if not after > before:
-                yield f'the volume does not grow with contraction {at(p, e)}'
+    volume = formula_at(law, pressure, strain, formula)
+    for p, row, grown in zip(pressure, force, np.diff(volume)):
+        for k in np.flatnonzero((row[1:] > 0.0) & ~(grown > 0.0)):
+            yield f'the volume does not grow with contraction {at(p, strain[k])}'
 
 
 def _rule_2(law: 'MuscleLaw', pressure: FloatArray, strain: FloatArray,

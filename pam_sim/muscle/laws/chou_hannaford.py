@@ -23,7 +23,6 @@ import math
 from typing import Any
 
 import numpy as np
-from pam_sim.annotations import FloatArray
 from pam_sim.compiled import compiled
 from pam_sim.errors import InputError
 from pam_sim.muscle.law import MuscleLaw, ParameterSet, Validity
@@ -41,6 +40,11 @@ def shape(values: dict[str, float]) -> tuple[float, float, float]:
     angle = values['braid_angle_rad']
     return (0.25 * math.pi * values['diameter_m'] ** 2,
             3.0 / math.tan(angle) ** 2, 1.0 / math.sin(angle) ** 2)
+
+
+def pack_cylinder(values: dict[str, float]) -> dict[str, float]:
+    """Return the packed values of ``CYLINDER`` and the length [m]."""
+    return {**dict(zip(CYLINDER, shape(values))), 'length_m': values['length_m']}
 
 
 def diameter_for(force_n: float, pressure_gauge_pa: float, angle_rad: float = ANGLE_RAD) -> float:
@@ -84,6 +88,13 @@ def tension_n(gauge_pa: float, strain: float, par: np.record) -> float:
     return gauge_pa * par.area_m2 * (par.a * ratio * ratio - par.b)
 
 
+@compiled
+def volume_m3(gauge_pa: float, strain: float, par: np.record) -> float:
+    """Return the inner volume [m^3], one point; the pressure does not change it."""
+    ratio = 1.0 - strain
+    return par.area_m2 * par.length_m * ratio * (par.b - par.a * ratio * ratio / 3.0)
+
+
 def check_angle(values: dict[str, float], where: str) -> None:
     """Raise InputError where the braid angle gives no contraction at all."""
     _, a, b = shape(values)
@@ -102,23 +113,14 @@ class ChouHannaford(MuscleLaw):
     PARAMETERS = GEOMETRY
     SETS = GEOMETRY_SETS
     CLAIMS = (1, 2, 3, 4)
-    PACKED = record(*CYLINDER)
+    PACKED = record('length_m', *CYLINDER)
 
     def _check(self, where: str) -> None:
         check_angle(self.values, where)
 
     def pack(self) -> dict[str, Any]:
-        """Return force per pressure [m^2], a and b."""
-        return dict(zip(CYLINDER, shape(self.values)))
-
-    def volume_m3(self, pressure_gauge_pa: float, strain: FloatArray) -> FloatArray:
-        """Return the inner volume [m^3]; the pressure does not change it. Arrays broadcast."""
-        pressure, strain = self._judged(pressure_gauge_pa, strain, 'allow')
-        angle = self.values['braid_angle_rad']
-        ratio = 1.0 - strain
-        at_rest = shape(self.values)[0] * self.values['length_m']
-        return at_rest * ratio * (1.0 / math.cos(angle) ** 2 - ratio ** 2) \
-            / math.tan(angle) ** 2 + 0.0 * pressure
+        """Return force per pressure [m^2], a, b and the length [m]."""
+        return pack_cylinder(self.values)
 
     def strain_limit(self) -> float:
         """Return the contraction of zero force and largest volume, at any pressure."""

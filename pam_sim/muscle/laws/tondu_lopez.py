@@ -30,7 +30,7 @@ from pam_sim.annotations import FloatArray
 from pam_sim.compiled import compiled
 from pam_sim.muscle.law import MuscleLaw, ParameterSet, Validity
 from pam_sim.muscle.laws.chou_hannaford import (
-    check_angle, CYLINDER, GEOMETRY, GEOMETRY_SETS, shape)
+    check_angle, CYLINDER, GEOMETRY, GEOMETRY_SETS, pack_cylinder)
 from pam_sim.parameters import Parameter
 from pam_sim.records import record
 
@@ -43,6 +43,20 @@ def tension_n(gauge_pa: float, strain: float, par: np.record) -> float:
     factor = par.k0 + par.k_rise * math.exp(-gauge_pa * par.inverse_k_pressure_per_pa)
     left = max(0.0, 1.0 - factor * strain)
     return gauge_pa * par.area_m2 * (par.a * left * left - par.b)
+
+
+@compiled
+def volume_m3(gauge_pa: float, strain: float, par: np.record) -> float:
+    """
+    Return the volume [m^3] whose virtual work is the force, one point.
+
+    The integral of F / p over the way from rest, from the cylinder at rest
+    on; for a pressure-dependent k taken at constant pressure.
+    """
+    factor = par.k0 + par.k_rise * math.exp(-gauge_pa * par.inverse_k_pressure_per_pa)
+    left = max(0.0, 1.0 - factor * strain)
+    return par.area_m2 * par.length_m * (
+        1.0 + par.a * (1.0 - left * left * left) / (3.0 * factor) - par.b * strain)
 
 
 class TonduLopez(MuscleLaw):
@@ -77,7 +91,7 @@ class TonduLopez(MuscleLaw):
            for name in ('dmsp_5', 'dmsp_10', 'dmsp_20', 'dmsp_40')},
     }
     CLAIMS = (1, 2, 3, 4)
-    PACKED = record(*CYLINDER, 'k0', 'k_rise', 'inverse_k_pressure_per_pa')
+    PACKED = record(*CYLINDER, 'length_m', 'k0', 'k_rise', 'inverse_k_pressure_per_pa')
 
     def _check(self, where: str) -> None:
         check_angle(self.values, where)
@@ -88,25 +102,11 @@ class TonduLopez(MuscleLaw):
             -np.asarray(pressure_gauge_pa, float) / self.values['k_pressure_pa'])
 
     def pack(self) -> dict[str, Any]:
-        """Return force per pressure [m^2], a, b, k0, k_rise and 1 / k_pressure [1/Pa]."""
+        """Return the cylinder, k0, k_rise and 1 / k_pressure [1/Pa]."""
         value = self.values
-        return {**dict(zip(CYLINDER, shape(value))), 'k0': value['k0'],
+        return {**pack_cylinder(value), 'k0': value['k0'],
                 'k_rise': value['k_rise'],
                 'inverse_k_pressure_per_pa': 1.0 / value['k_pressure_pa']}
-
-    def volume_m3(self, pressure_gauge_pa: float, strain: FloatArray) -> FloatArray:
-        """
-        Return the volume [m^3] whose virtual work is the force; arrays broadcast.
-
-        The integral of F / p over the way from rest, from the cylinder at rest
-        on; for a pressure-dependent k taken at constant pressure.
-        """
-        pressure, strain = self._judged(pressure_gauge_pa, strain, 'allow')
-        area, a, b = shape(self.values)
-        k = self.k(pressure)
-        left = np.maximum(0.0, 1.0 - k * strain)
-        return area * self.values['length_m'] * (
-            1.0 + a * (1.0 - left ** 3) / (3.0 * k) - b * strain)
 
 
 LAW = TonduLopez
