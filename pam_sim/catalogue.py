@@ -38,10 +38,11 @@ from pam_sim.plugins import pick
 from pam_sim.rig import Rig
 from pam_sim.sensors import SENSOR_PARAMETERS
 from pam_sim.valve import hsv, ppr
+from pam_sim.volume import VOLUMES
 
 KINDS = {
-    'law': 'Muscle laws', 'muscle': 'Muscles', 'valve': 'Valves', 'load': 'Loads',
-    'effect': 'Effects', 'sensors': 'Sensors', 'rig': 'Rigs'}
+    'law': 'Muscle laws', 'muscle': 'Muscles', 'volume': 'Volumes', 'valve': 'Valves',
+    'load': 'Loads', 'effect': 'Effects', 'sensors': 'Sensors', 'rig': 'Rigs'}
 
 
 def catalogue() -> list[dict[str, Any]]:
@@ -68,6 +69,7 @@ def catalogue() -> list[dict[str, Any]]:
     return [
         *(_law(law) for law in laws().values()),
         *(_muscle(name) for name in muscle_names()),
+        *(_module('volume', module) for module in VOLUMES.values()),
         *(_module('valve', module, signals=list(module.SIGNAL_NAMES)) for module in (ppr, hsv)),
         *(_module('load', module) for module in (*LOADS.values(), joint)),
         *(_effect(effect) for effect in _by_subsystem(effects())),

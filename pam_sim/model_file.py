@@ -25,7 +25,8 @@ from pam_sim.keys import Key, names_of
 from pam_sim.load import LOADS
 from pam_sim.located_yaml import Located, LocatedList
 from pam_sim.muscle.coefficients import ALL, coefficients, PREFIX, stated_names
-from pam_sim.muscle.muscle import get_muscle, LawChoice, muscle_names, read_law, read_muscle
+from pam_sim.muscle.muscle import (
+    get_muscle, LawChoice, muscle_names, read_law, read_muscle, with_volume_of)
 from pam_sim.named_files import file_stem, NamedFiles
 from pam_sim.parameters import check_parameters, Parameter
 from pam_sim.rig import Rig
@@ -33,6 +34,7 @@ from pam_sim.rig_parameters import rig_parameters
 from pam_sim.sensors import SENSOR_PARAMETERS
 from pam_sim.tolerance import read_tolerance, Tolerance
 from pam_sim.valve import hsv, VALVES
+from pam_sim.volume import VOLUMES
 
 KEYS = (
     Key('name', str, 'What the rig is called in bags and reports.', otherwise='name of the file'),
@@ -42,6 +44,8 @@ KEYS = (
         otherwise='required without `rig`'),
     Key('law', str, 'Force law of the muscle: a name, or a mapping with the keys of a law below.',
         otherwise='that of the muscle'),
+    Key('volume', str, 'Inner volume of the muscle: a cylinder of the bore, or that of the force '
+        'law.', otherwise='that of the muscle', choices=tuple(VOLUMES)),
     Key('load', str, 'What the muscle pulls.', otherwise='required without `rig`',
         choices=tuple(LOADS)),
     Key('valve', str, 'Proportional regulator or pair of on/off valves.',
@@ -137,6 +141,7 @@ def _from_mapping(data: Located, name: str | None, seen: tuple[str, ...]) -> Rig
     muscle = base.muscle
     if 'law' in data:
         muscle = muscle.with_law(read_law(data, muscle.law, muscle.bore_m))
+    muscle = with_volume_of(muscle, data)
     known = rig_parameters(base.load)
     given = data.get('parameters', dict) if data.get('parameters') is not None else {}
     check_parameters(known, given)

@@ -89,6 +89,7 @@ class Rig:
                 raise InputError(f'`{value}` is not known; allowed: {", ".join(choices)}', where)
         if isinstance(self.muscle, str):
             object.__setattr__(self, 'muscle', get_muscle(self.muscle))
+        _ = self.muscle.least_volume_m3         # refused here where the law has no volume
         known = rig_parameters(self.load)
         _check_contraction(self.parameters, self.muscle)
         checked: dict[str, object] = {
@@ -163,7 +164,8 @@ class Rig:
               valve: str | None = None, fidelity: str | None = None, load: str | None = None,
               sensors: Mapping[str, float] | None = None, name: str | None = None,
               muscle: Muscle | str | None = None, law: LawChoice | str | None = None,
-              tolerance: Mapping[str, Tolerance] | None = None) -> 'Rig':
+              tolerance: Mapping[str, Tolerance] | None = None,
+              volume: str | None = None) -> 'Rig':
         """
         Return a changed copy.
 
@@ -183,6 +185,8 @@ class Rig:
             Another force law for the muscle; a name takes the set of the nearest bore.
         tolerance : dict, optional
             How well numbers are known, those to change.
+        volume : str, optional
+            Another volume of the muscle: ``bore`` or ``law``.
 
         Raises
         ------
@@ -190,7 +194,7 @@ class Rig:
             Unknown name or value out of bounds.
 
         """
-        if all(other is None for other in (sensors, muscle, law, tolerance)) and all(
+        if all(other is None for other in (sensors, muscle, law, tolerance, volume)) and all(
                 other is None or other == own for other, own in (
                     (valve, self.valve), (fidelity, self.fidelity), (load, self.load),
                     (name, self.name))):
@@ -199,6 +203,8 @@ class Rig:
         chosen = get_muscle(muscle) if isinstance(muscle, str) else muscle or self.muscle
         if law is not None:
             chosen = chosen.with_law(law)
+        if volume is not None:
+            chosen = chosen.with_volume(volume)
         given, chosen = _apart(parameters or {}, chosen)
         known = {p.name for p in rig_parameters(new_load)} if new_load in LOADS else set()
         kept = {key: value for key, value in self.parameters.items() if key in known}
@@ -449,9 +455,14 @@ class Rig:
         """Return a model file that :func:`pam_sim.load_rig` turns into an equal rig."""
         return rig_to_yaml(self)
 
-    def volume_m3(self, contraction_m: Number) -> Number:
-        """Return muscle and dead volume [m^3] at a contraction [m]; scalar or array."""
-        return self.parameters['V_dead'] + self.muscle.volume_m3(contraction_m)
+    def volume_m3(self, contraction_m: Number, pressure_pa: Number | float = P_ATM_PA) -> Number:
+        """
+        Return muscle and dead volume [m^3] at a contraction [m]; scalars or arrays.
+
+        The absolute pressure [Pa] counts where the volume of the law depends on it.
+        """
+        return self.parameters['V_dead'] + self.muscle.volume_m3(
+            contraction_m, pressure_pa - P_ATM_PA)
 
 
 def _apart(parameters: Mapping[str, float], muscle: Muscle) -> tuple[dict[str, float], Muscle]:

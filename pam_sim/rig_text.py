@@ -38,10 +38,13 @@ def _base(rig: 'Rig') -> dict[str, Any]:
     nominal, preset = get_muscle(_MUSCLE), f'{_MUSCLE}_{rig.load}'
     if preset not in _PRESETS.names():
         return {'muscle': rig.muscle.plain(), 'load': rig.load}
-    if rig.muscle == nominal:
-        return {'rig': preset}
-    if rig.muscle == replace(nominal, law=rig.muscle.law):
-        return {'rig': preset, 'law': rig.muscle.law.plain()}
+    data: dict[str, Any] = {'rig': preset}
+    if rig.muscle.law != nominal.law:
+        data['law'] = rig.muscle.law.plain()
+    if rig.muscle.volume != nominal.volume:
+        data['volume'] = rig.muscle.volume
+    if rig.muscle == replace(nominal, law=rig.muscle.law, volume=rig.muscle.volume):
+        return data
     return {'muscle': rig.muscle.plain(), 'load': rig.load}
 
 

@@ -106,8 +106,9 @@ def _load(rig: 'Rig') -> dict[str, float]:
     """Return volume and swing of the load on the muscle, from the statics of the rig."""
     if rig.is_driven:
         # The contraction is prescribed: nothing swings with the pressure.
-        volume_m3 = float(rig.volume_m3(rig.parameters.get('contraction_m', 0.0)))
-        return {'hsv.volume_m3': volume_m3, 'hsv.volume_at_600kpa_m3': volume_m3,
+        held_m = rig.parameters.get('contraction_m', 0.0)
+        return {'hsv.volume_m3': float(rig.volume_m3(held_m)),
+                'hsv.volume_at_600kpa_m3': float(rig.volume_m3(held_m, P_ATM_PA + 600e3)),
                 'hsv.volume_slope_m3_per_pa': 0.0, 'hsv.volume_slope_m3_per_m': 0.0}
     lifted = rig.static_contraction_m(P_ATM_PA + _GAUGES_PA) > 0.0
     lift_off = (float(_GAUGES_PA[lifted][0]) if lifted.any() else 550e3) - 10e3
@@ -121,9 +122,11 @@ def _load(rig: 'Rig') -> dict[str, float]:
     lowest_at = next(gauge for hz, gauge in swings if hz <= 1.05 * lowest_hz)
     slope = (_volume(rig, lift_off + 30e3) - _volume(rig, lift_off + 10e3)) / 20e3
     full_m = float(rig.static_contraction_m(P_ATM_PA + 600e3))
+    at_lift_off_pa = P_ATM_PA + lift_off
     return {
         'hsv.volume_slope_m3_per_m': float(
-            rig.volume_m3(_SLOPE_OVER_M) - rig.volume_m3(0.0)) / _SLOPE_OVER_M,
+            rig.volume_m3(_SLOPE_OVER_M, at_lift_off_pa)
+            - rig.volume_m3(0.0, at_lift_off_pa)) / _SLOPE_OVER_M,
         'hsv.contraction_at_600kpa_m': max(full_m, _SLOPE_OVER_M),
         'hsv.volume_m3': _volume(rig, 0.0),
         'hsv.volume_at_600kpa_m3': _volume(rig, 600e3),
@@ -139,7 +142,8 @@ def _load(rig: 'Rig') -> dict[str, float]:
 
 
 def _volume(rig: 'Rig', gauge_pa: float) -> float:
-    return float(rig.volume_m3(rig.static_contraction_m(P_ATM_PA + gauge_pa)))
+    pressure_pa = P_ATM_PA + gauge_pa
+    return float(rig.volume_m3(rig.static_contraction_m(pressure_pa), pressure_pa))
 
 
 def _swing_hz(rig: 'Rig', gauge_pa: float) -> float:

@@ -250,8 +250,8 @@ def loop_timing(run: 'Run', topic: str) -> LoopTiming | None:
 
 
 def air_use(pressure_pa: ArrayLike, contraction_m: ArrayLike,
-            volume_m3: Callable[[FloatArray], FloatArray], temperature_k: float = 293.15
-            ) -> float:
+            volume_m3: Callable[[FloatArray, FloatArray], FloatArray],
+            temperature_k: float = 293.15) -> float:
     """
     Return the air [kg] filled in over a record, by mass balance of the muscle.
 
@@ -264,12 +264,13 @@ def air_use(pressure_pa: ArrayLike, contraction_m: ArrayLike,
     pressure_pa, contraction_m : array_like, shape (N,)
         Absolute pressure and contraction at the same instants.
     volume_m3 : callable
-        Volume of muscle and fittings at a contraction [m].
+        Volume of muscle and fittings at a contraction [m] and a pressure [Pa].
     temperature_k : float
         Of the air.
 
     """
-    mass = np.asarray(pressure_pa) * volume_m3(np.asarray(contraction_m)) / (
+    pressure = np.asarray(pressure_pa)
+    mass = pressure * volume_m3(np.asarray(contraction_m), pressure) / (
         287.05 * temperature_k)
     if mass.size < 2:
         return 0.0

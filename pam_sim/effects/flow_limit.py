@@ -44,7 +44,8 @@ _RATES = (4e5, 1e6, 2.5e6)         # Pa/s, of the screening
 
 
 def _pack(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
-    volume = numbers.parameters['V_dead'] + numbers.muscle.volume_m3(_CONTRACTION_M)
+    volume = numbers.parameters['V_dead'] + numbers.muscle.volume_m3(
+        _CONTRACTION_M, _GAUGE_PA)
     p = P_ATM_PA + _GAUGE_PA
     fill = vent = _NO_LIMIT
     if values['fill_rate_at_400kpa_pa_per_s'] > 0.0:

@@ -31,6 +31,7 @@ from pam_sim.parameters import check_parameters, Parameter
 from pam_sim.records import record, values_of
 
 OUTSIDE = ('warn', 'refuse', 'allow')
+_AIR_PRESSURES = 61
 BORE_FITS = 1.5              # factor between the bores of a muscle and of a set that fits it
 
 
@@ -285,6 +286,10 @@ class MuscleLaw:
             raise InputError(f'law `{self.NAME}` has no volume of its own')
         return self._over_points(
             formula, *self._judged(pressure_gauge_pa, strain, 'allow'))[()]
+
+    def air_grid_pa(self) -> FloatArray:
+        """Return gauge pressures [Pa], rising, at which the law's own volume is looked at."""
+        return np.linspace(*self.validity.pressure_gauge_pa, _AIR_PRESSURES)
 
     def max_strain(self, pressure_gauge_pa: ArrayLike, load_n: ArrayLike = 0.0) -> FloatArray:
         """

@@ -36,6 +36,7 @@ from pam_sim.muscle.lookup_table import LookupTable, read_table
 from pam_sim.muscle.registry import get_law, make_law
 from pam_sim.named_files import NamedFiles
 from pam_sim.parameters import Parameter
+from pam_sim.volume import VOLUMES
 
 if TYPE_CHECKING:
     from pam_sim.muscle.law import MuscleLaw
@@ -64,6 +65,8 @@ KEYS = (
         otherwise='stated by the model'),
     Key('law', str, 'Force law: a name, or a mapping with the keys of a law.',
         otherwise='required without `like`'),
+    Key('volume', str, 'Inner volume: a cylinder of the bore, or that of the force law.',
+        otherwise='that of `like`, else bore', choices=tuple(VOLUMES)),
 )
 LAW_KEYS = (
     Key('name', str, 'Which law; `pam models` lists them.', otherwise='that of the muscle'),
@@ -82,6 +85,7 @@ TABLE_KEYS = (
     Key('air_mass_kg', list, 'Mass of air, kg, a row for each pressure.', required=True),
     Key('source', str, 'Where the points come from.', ''),
 )
+_BORE = 'bore'
 _DIMENSION_NAMES = tuple(parameter.name for parameter in DIMENSIONS)
 
 
@@ -142,6 +146,8 @@ class Muscle:
     law : LawChoice
     rests_on : str
         Where the numbers come from and how far to trust them.
+    volume : str
+        Which of ``pam_sim.volume.VOLUMES``: ``bore``, or ``law`` for that of the force law.
 
     """
 
@@ -152,6 +158,7 @@ class Muscle:
     max_strain: float = geometry.MAX_STRAIN
     law: LawChoice = field(default_factory=lambda: LawChoice(set='dmsp_5'))
     rests_on: str = ''
+    volume: str = _BORE
 
     @property
     def stroke_m(self) -> float:
@@ -171,14 +178,62 @@ class Muscle:
         force = self.law.law.force_n(np.array([[200e3], [400e3], [600e3]]), strain, 'allow')
         return max(0.0, float(np.max(-np.diff(force)) / (strain[1] * self.length_m)))
 
-    def volume_m3(self, contraction_m: Number) -> Number:
-        """Return the inner volume [m^3] at a contraction [m]; scalar or array."""
-        return geometry.volume_of(contraction_m, *self.shape)
+    def volume_m3(self, contraction_m: Number, gauge_pa: Number | float = 0.0) -> Number:
+        """
+        Return the inner volume [m^3]; scalars or arrays.
+
+        Parameters
+        ----------
+        contraction_m : float or ndarray
+            Contraction, m.
+        gauge_pa : float or ndarray
+            Gauge pressure, Pa; a cylinder of the bore does not depend on it.
+
+        Raises
+        ------
+        InputError
+            The volume is that of the law, and the law has none.
+
+        """
+        return VOLUMES[self.volume].volume_m3(self, contraction_m, gauge_pa)
+
+    @cached_property
+    def least_volume_m3(self) -> float:
+        """
+        Least d(p V)/dp [m^3] up to the stroke: what a change of pressure fills.
+
+        Raises
+        ------
+        InputError
+            The law has no volume, is of another length, or its air does not rise with pressure.
+
+        """
+        return VOLUMES[self.volume].least_volume_m3(self)
 
     def with_law(self, law: LawChoice | str) -> 'Muscle':
         """Return the muscle with another law, a LawChoice or a name; its set fits the bore."""
         return replace(self, law=checked_law(
             LawChoice(law) if isinstance(law, str) else law, bore_m=self.bore_m))
+
+    def with_volume(self, volume: str, where: str = '') -> 'Muscle':
+        """
+        Return the muscle with another volume, one of ``pam_sim.volume.VOLUMES``.
+
+        Raises
+        ------
+        InputError
+            Unknown name, or as of ``least_volume_m3``.
+
+        """
+        if volume not in VOLUMES:
+            raise InputError(f'volume `{volume}` is not known{did_you_mean(volume, VOLUMES)}; '
+                             f'allowed: {", ".join(VOLUMES)}', where)
+        chosen = replace(self, volume=volume)
+        try:
+            _ = chosen.least_volume_m3          # checked here, and found once
+        except InputError as error:
+            raise InputError(error.problem, where or error.where) from error
+        return chosen
 
     def plain(self) -> dict[str, Any] | str:
         """Return the muscle as plain data for a model file: its name if that says all."""
@@ -188,6 +243,8 @@ class Muscle:
         if self.rests_on:
             data['rests_on'] = self.rests_on
         data['law'] = self.law.plain()
+        if self.volume != _BORE:
+            data['volume'] = self.volume
         return data
 
 
@@ -243,7 +300,24 @@ def read_muscle(data: Located, name: str = 'muscle') -> Muscle:
     rests_on = data.get('rests_on', str, base.rests_on if not numbers else 'stated by the model')
     law = read_law(data, base.law, numbers.get('bore_m', base.bore_m)
                    ) if 'law' in data else base.law
-    return replace(base, name=name, **numbers, law=law, rests_on=' '.join(rests_on.split()))
+    made = replace(base, name=name, **numbers, law=law, rests_on=' '.join(rests_on.split()))
+    return with_volume_of(made, data)
+
+
+def with_volume_of(muscle: Muscle, data: Located) -> Muscle:
+    """
+    Return the muscle with the volume that a mapping states, or with its own.
+
+    Raises
+    ------
+    InputError
+        As of ``Muscle.with_volume``, with file and line.
+
+    """
+    if 'volume' not in data:
+        return muscle
+    return muscle.with_volume(
+        data.require('volume', str, choices=tuple(VOLUMES)), data.where('volume'))
 
 
 def read_law(data: Located, base: LawChoice | None = None, bore_m: float | None = None

@@ -106,14 +106,17 @@ def _chain(name: str, hook: str, users: list[str]) -> Iterator[str]:
 
 
 def _law_calls() -> Iterator[str]:
-    """Write the calls of the force laws and of their dampers."""
+    """Write the calls of the force laws, of their dampers and of their volumes."""
     fast, *others = law_codes()
     dampers = [name for name in law_codes() if laws()[name].COMPILED_DAMPER is not None]
+    volumes = [name for name in law_codes() if laws()[name].COMPILED_VOLUME is not None]
     for name in law_codes():
         yield f'_law_{name} = _LAWS[{name!r}].COMPILED'
         yield f'_packed_{name} = _LAWS[{name!r}].PACKED'
     for name in dampers:
         yield f'_damper_{name} = _LAWS[{name!r}].COMPILED_DAMPER'
+    for name in volumes:
+        yield f'_volume_{name} = _LAWS[{name!r}].COMPILED_VOLUME'
     yield from ('', '', '@compiled', 'def _other_law(gauge_pa, strain, par):')
     for name in others:
         yield f'    if par.law == {law_codes()[name]}:'
@@ -129,6 +132,12 @@ def _law_calls() -> Iterator[str]:
     for name in dampers:
         yield f'    if par.law == {law_codes()[name]}:'
         yield (f'        return _damper_{name}(velocity_m_per_s, gauge_pa, strain, '
+               f'part(par, LAW_PLACE, _packed_{name}))')
+    yield from ('    return 0.0', '', '', '@compiled', 'def law_volume(gauge_pa, strain, par):',
+                '    """Inner volume of the law [m^3]."""')
+    for name in volumes:
+        yield f'    if par.law == {law_codes()[name]}:'
+        yield (f'        return _volume_{name}(gauge_pa, strain, '
                f'part(par, LAW_PLACE, _packed_{name}))')
     yield '    return 0.0'
 

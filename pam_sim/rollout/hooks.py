@@ -79,7 +79,7 @@ HOOKS = {
         'Set point [Pa] and time constant [s] of the PPR; called once a physics step, may '
         'advance state.', ('set_point_pa', 'time_constant_s'), ('pressure_pa', 'contraction_m')),
     'pressure_rate': Hook(
-        'The pressure rate [Pa/s] behind the PPR; the volume is that of the air.',
+        'The pressure rate [Pa/s] behind the PPR; the volume is d(p V)/dp of the air.',
         ('rate_pa_per_s',), ('pressure_pa', 'contraction_m', 'volume_m3')),
     'opening': Hook(
         'Mean openings of the averaged HSV pair from its duties.',

@@ -105,6 +105,7 @@ PARAMETERS = record(
     'inverse_rt_kg_per_j',
     'law',                          # number of the force law, see places.law_codes
     'law_damper',                   # 1: the law has a damper of its own
+    'own_volume',                   # 1: the volume is that of the law
     'load',                         # number of a load with its own force, see places.load_codes
     'beyond_nominal',               # how far the rig is beyond the nominal one, see below
     ('used', record(*HOOKS)),       # 1: an effect with this hook acts

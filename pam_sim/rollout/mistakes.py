@@ -67,10 +67,12 @@ def _parts() -> Iterator[_Part]:
         for hook, function in effect.hooks.items():
             yield _Part(f'hook `{hook}`', function, records, HOOKS[hook].returns)
     for law in laws().values():
-        for name, formula in (('tension_n', law.COMPILED),
-                              ('damper_force_n', law.COMPILED_DAMPER)):
+        for name, formula, returns in (
+                ('tension_n', law.COMPILED, 'force_n'),
+                ('damper_force_n', law.COMPILED_DAMPER, 'force_n'),
+                ('volume_m3', law.COMPILED_VOLUME, 'volume_m3')):
             if formula is not None:
-                yield _Part(f'`{name}`', formula, {'par': law.PACKED}, ('force_n',))
+                yield _Part(f'`{name}`', formula, {'par': law.PACKED}, (returns,))
     for load in LOADS.values():
         if has_force(load):
             yield _Part('`load_force_n`', load.load_force_n, {'par': packed_of(load)},

@@ -35,6 +35,7 @@ from pam_sim.units import (
     GAS_CONSTANT_AIR, GRAVITY_M_PER_S2, P_ATM_PA, RHO_REFERENCE, T_REFERENCE_K, TEMPERATURE_K)
 from pam_sim.valve import hsv, ppr
 from pam_sim.valve.flow import flow_function, RATIO_LINEAR
+from pam_sim.volume import law as law_volume
 
 if TYPE_CHECKING:
     from pam_sim.rig import Rig
@@ -126,7 +127,7 @@ def _substep(rig: 'Rig', dt_s: float) -> float:
                       2.0 * math.sqrt(stiffness / value['mass_kg']))
     if rig.valve == 'ppr':
         return dt_s / max(1, math.ceil(dt_s * max(fastest, 1.0 / value['T_m'])))
-    smallest = rig.volume_m3(0.0)
+    smallest = value['V_dead'] + rig.muscle.least_volume_m3
     # Slope of the linear part of the flow law at equal pressures, as a rate of the chamber.
     slope = interpreted(flow_function)(RATIO_LINEAR, value['b']) / (1.0 - RATIO_LINEAR)
     rate = _RT_J_PER_KG / smallest * value['C'] * RHO_REFERENCE * slope
@@ -185,6 +186,7 @@ def _pack_base(rig: 'Rig', numbers: Numbers, state: FloatArray, par: FloatArray)
         'inverse_rt_kg_per_j': 1.0 / _RT_J_PER_KG,
         'law': law,
         'law_damper': type(muscle.law.law).COMPILED_DAMPER is not None,
+        'own_volume': muscle.volume == law_volume.NAME,
         'load': load,
         'beyond_nominal': layout.EFFECTS if law != 0.0 or load != 0.0 else layout.NOMINAL,
         'used': 0.0,

@@ -33,7 +33,7 @@ import math
 import numpy as np
 from pam_sim.compiled import inlined
 from pam_sim.load.hanging_mass import acceleration
-from pam_sim.muscle.geometry import volume_m3
+from pam_sim.rollout.air import air_pressure, air_volume, filled_volume
 from pam_sim.rollout.dispatch import hooks
 from pam_sim.rollout.layout import HSV_AVERAGED, NOMINAL, PPR
 from pam_sim.valve.flow import mass_flow_kg_per_s
@@ -41,14 +41,6 @@ from pam_sim.valve.hsv import clip_duty, open_time_in, pulse_edges
 from pam_sim.valve.ppr import set_point_pa
 
 _HALVINGS = 52              # of the stroke, to the last bit
-
-
-@inlined
-def air_volume(p: float, x: float, beyond: int, state: np.record, par: np.record) -> float:
-    """Return the volume the air has [m^3] at pressure p [Pa] and contraction x [m]."""
-    volume = par.dead_volume_m3 + volume_m3(
-        x, par.length_m, par.thread_squared_m2, par.inverse_4_pi_n2)
-    return hooks.volume(volume, p, x, beyond, state, par)
 
 
 @inlined
@@ -107,24 +99,11 @@ def valve_flows(fill: float, vent: float, p: float, supply: float, altered: bool
 
 
 @inlined
-def pressure_per_kg(mass: float, inflow: float, net: float, p: float, volume: float, per_m3: float,
-                    elapsed: float, beyond: int, state: np.record, par: np.record) -> float:
-    """
-    Return R T / V [Pa/kg] ``elapsed`` into a step that began with ``mass`` at pressure p.
-
-    ``per_m3`` is 1 / V, which is known before the flows are.
-    """
-    return hooks.air_rt(
-        par.rt_j_per_kg, mass, inflow, inflow - net, p, volume, elapsed, beyond, state,
-        par) * per_m3
-
-
-@inlined
 def rate_behind_ppr(target: float, time_constant: float, p: float, x: float, beyond: int,
                     state: np.record, par: np.record) -> float:
     """Return the pressure rate [Pa/s] behind the PPR with what effects change of it."""
     return hooks.pressure_rate((target - p) / time_constant, p, x,
-                               air_volume(p, x, beyond, state, par), beyond, state, par)
+                               filled_volume(p, x, beyond, state, par), beyond, state, par)
 
 
 @inlined
@@ -282,17 +261,13 @@ def physics_step(signal_0: float, signal_1: float, external: float, x_target: fl
             q1 = hooks.mass_flow(in1 - out1, p0, x0, supply, beyond, state, par)
         volume = air_volume(p0, x_mid, beyond, state, par)
         per_m3 = 1.0 / volume
-        density = par.rt_j_per_kg * per_m3                                 # Pa/kg
-        if warm:
-            density = pressure_per_kg(mass0, in1, q1, p0, volume, per_m3, g, beyond, state, par)
-        p_mid = (mass0 + g * q1) * density
+        p_mid = air_pressure(mass0 + g * q1, mass0, in1, q1, p0, x_mid, volume, per_m3, g, warm,
+                             beyond, state, par)
         if flowing:
             in2, out2 = valve_flows(fill, vent, p_mid, supply, altered, beyond, state, par)
             q2 = hooks.mass_flow(in2 - out2, p_mid, x_mid, supply, beyond, state, par)
-            if warm:
-                density = pressure_per_kg(
-                    mass0, in2, q2, p0, volume, per_m3, g, beyond, state, par)
-            p_mid = (mass0 + g * q2) * density
+            p_mid = air_pressure(mass0 + g * q2, mass0, in2, q2, p0, x_mid, volume, per_m3, g,
+                                 warm, beyond, state, par)
             in3, out3 = valve_flows(fill, vent, p_mid, supply, altered, beyond, state, par)
             q3 = hooks.mass_flow(in3 - out3, p_mid, x_mid, supply, beyond, state, par)
     a_mid = 0.0
@@ -325,10 +300,8 @@ def physics_step(signal_0: float, signal_1: float, external: float, x_target: fl
     if not is_ppr:
         volume = air_volume(p_mid, x1, beyond, state, par)
         per_m3 = 1.0 / volume
-        density = par.rt_j_per_kg * per_m3
-        if warm:
-            density = pressure_per_kg(mass0, in3, q3, p0, volume, per_m3, h, beyond, state, par)
-        p_end = (mass0 + h * q3) * density
+        p_end = air_pressure(mass0 + h * q3, mass0, in3, q3, p0, x1, volume, per_m3, h, warm,
+                             beyond, state, par)
         if flowing:
             in4, out4 = valve_flows(fill, vent, p_end, supply, altered, beyond, state, par)
             q4 = hooks.mass_flow(in4 - out4, p_end, x1, supply, beyond, state, par)
@@ -338,10 +311,8 @@ def physics_step(signal_0: float, signal_1: float, external: float, x_target: fl
             state.air_mass_kg = mass1
             state.filled_kg += h * inflow
             state.vented_kg += sixth * (out1 + 2.0 * (out2 + out3) + out4)
-            if warm:
-                density = pressure_per_kg(
-                    mass0, inflow, net_flow, p0, volume, per_m3, h, beyond, state, par)
-            p_end = mass1 * density
+            p_end = air_pressure(mass1, mass0, inflow, net_flow, p0, x1, volume, per_m3, h, warm,
+                                 beyond, state, par)
     tension = map_tension(p_end, x1, beyond, state, par)
     if moving:
         dx = x1 - x0
@@ -375,11 +346,8 @@ def physics_step(signal_0: float, signal_1: float, external: float, x_target: fl
             if not is_ppr:
                 volume = air_volume(p_end, x1, beyond, state, par)
                 per_m3 = 1.0 / volume
-                density = par.rt_j_per_kg * per_m3
-                if warm:
-                    density = pressure_per_kg(
-                        mass0, inflow, net_flow, p0, volume, per_m3, h, beyond, state, par)
-                p_end = state.air_mass_kg * density
+                p_end = air_pressure(state.air_mass_kg, mass0, inflow, net_flow, p0, x1, volume,
+                                     per_m3, h, warm, beyond, state, par)
     state.pressure_pa = p_end
     state.contraction_m = x1
     state.velocity_m_per_s = v1

@@ -196,7 +196,7 @@ def test_air_use_counts_fillings_and_not_noise():
     t = np.linspace(0, 10, 10001)
     p = 2e5 + 1e5 * np.sin(2 * np.pi * t) + np.random.default_rng(0).normal(0, 300, t.size)
     one = 2e5 * 1e-5 / (287.05 * 293.15)
-    used = metrics.air_use(p, 0 * t, lambda x: 1e-5 + 0 * x)
+    used = metrics.air_use(p, 0 * t, lambda x, p: 1e-5 + 0 * x)
     assert used == pytest.approx(10 * one, rel=0.03)
 
 

@@ -1,0 +1,120 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The air of a physics step: its volume, and its pressure from its mass.
+
+Arguments as in :mod:`pam_sim.rollout.step`.
+"""
+
+import math
+
+import numpy as np
+from pam_sim.compiled import compiled, inlined
+from pam_sim.muscle.geometry import volume_m3
+from pam_sim.rollout.dispatch import hooks
+from pam_sim.rollout.layout import NOMINAL
+
+_TRIES = 60                 # of a solution for the pressure; three do as a rule
+_CLOSE = 1e-13              # of p V: when it is found
+_WARM_PASSES = 3            # temperature and volume in turn
+_SMALL = 1e-6               # of the pressure, for a slope
+
+
+@inlined
+def air_volume(p: float, x: float, beyond: int, state: np.record, par: np.record) -> float:
+    """Return the volume the air has [m^3] at pressure p [Pa] and contraction x [m]."""
+    if beyond > NOMINAL and par.own_volume > 0.0:
+        volume = par.dead_volume_m3 + hooks.law_volume(
+            p - par.atmosphere_pa, x * par.inverse_length_per_m, par)
+    else:
+        volume = par.dead_volume_m3 + volume_m3(
+            x, par.length_m, par.thread_squared_m2, par.inverse_4_pi_n2)
+    return hooks.volume(volume, p, x, beyond, state, par)
+
+
+@inlined
+def filled_volume(p: float, x: float, beyond: int, state: np.record, par: np.record) -> float:
+    """Return d(p V)/dp [m^3] at constant contraction: what a change of pressure fills."""
+    volume = air_volume(p, x, beyond, state, par)
+    if beyond > NOMINAL and par.own_volume > 0.0:
+        step = _SMALL * p
+        return ((p + step) * air_volume(p + step, x, beyond, state, par) - p * volume) / step
+    return volume
+
+
+@compiled
+def pressure_of(energy: float, p: float, x: float, beyond: int, state: np.record,
+                par: np.record) -> float:
+    """
+    Return the pressure [Pa] at which p V(p, x) is ``energy`` = m R T [J], from a guess p.
+
+    Secant steps, the first one from p = 0, within pressures known as too low and too high.
+    """
+    low = 0.0
+    high = math.inf
+    before = 0.0
+    missing_before = energy
+    for _ in range(_TRIES):
+        missing = energy - p * air_volume(p, x, beyond, state, par)
+        if abs(missing) <= _CLOSE * energy:
+            return p
+        if missing > 0.0:
+            low = p
+        else:
+            high = p
+        per_pa = (missing_before - missing) / (p - before)
+        before = p
+        missing_before = missing
+        p += missing / per_pa
+        if not low < p < high:
+            p = 0.5 * (low + high) if high < math.inf else 2.0 * low
+    return energy / air_volume(p, x, beyond, state, par)
+
+
+@compiled
+def pressure_in_own_volume(mass: float, mass0: float, inflow: float, net: float, p: float,
+                           x: float, volume: float, elapsed: float, warm: bool, beyond: int,
+                           state: np.record, par: np.record) -> float:
+    """Return the pressure [Pa] in a volume that depends on it; arguments of ``air_pressure``."""
+    rt = par.rt_j_per_kg
+    if not warm:
+        return pressure_of(mass * rt, p, x, beyond, state, par)
+    found = p
+    for _ in range(_WARM_PASSES):
+        rt = hooks.air_rt(par.rt_j_per_kg, mass0, inflow, inflow - net, p, volume, elapsed, beyond,
+                          state, par)
+        found = pressure_of(mass * rt, found, x, beyond, state, par)
+        volume = air_volume(found, x, beyond, state, par)
+    return found
+
+
+@inlined
+def air_pressure(mass: float, mass0: float, inflow: float, net: float, p: float, x: float,
+                 volume: float, per_m3: float, elapsed: float, warm: bool, beyond: int,
+                 state: np.record, par: np.record) -> float:
+    """
+    Return the pressure [Pa] of ``mass``, ``elapsed`` into a step.
+
+    The step began with ``mass0`` at pressure p. ``per_m3`` is 1 / V, which is known before the
+    flows are, and ``warm`` tells that the temperature changes.
+    """
+    if beyond > NOMINAL and par.own_volume > 0.0:
+        return pressure_in_own_volume(
+            mass, mass0, inflow, net, p, x, volume, elapsed, warm, beyond, state, par)
+    density = par.rt_j_per_kg * per_m3                                     # Pa/kg
+    if warm:
+        density = hooks.air_rt(par.rt_j_per_kg, mass0, inflow, inflow - net, p, volume, elapsed,
+                               beyond, state, par) * per_m3
+    return mass * density
