@@ -19,6 +19,7 @@ import csv
 from dataclasses import dataclass
 import os
 from pathlib import Path
+import re
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from pam_sim.muscle.law import MuscleLaw
 
 COLUMNS = ('pressure_gauge_pa', 'load_n', 'strain', 'air_mass_kg')
+_DEAD_VOLUME = re.compile(r'dead volume ([\d.e+-]+) mL')
 
 
 @short_repr
@@ -50,7 +52,8 @@ class LookupTable:
         Shape (P, L). Contraction rises with pressure and falls with load (or
         rests at 0); air mass rises with pressure.
     source : str
-        What the points are.
+        What the points are. ``dead volume 3 mL`` in it says whose air is in ``air_mass_kg``
+        besides that of the muscle.
 
     Raises
     ------
@@ -91,6 +94,12 @@ class LookupTable:
         if np.any(self.air_mass_kg <= 0) or np.any(np.diff(self.air_mass_kg, axis=0) <= 0.0):
             raise InputError('air mass must be positive and rise with pressure',
                              'lookup table, air_mass_kg')
+
+    @property
+    def dead_volume_m3(self) -> float | None:
+        """Volume [m^3] of tube and fittings whose air is in the table; None if not said."""
+        found = _DEAD_VOLUME.search(self.source)
+        return 1e-6 * float(found[1]) if found else None
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, LookupTable) and self.source == other.source and all(
@@ -189,4 +198,5 @@ def table_from_law(law: 'MuscleLaw', volume_m3: Callable[..., Any], pressure_gau
     mass = absolute_pa(pressure)[:, None] * (volume_m3(strain) + dead_volume_m3) / (
         GAS_CONSTANT_AIR * TEMPERATURE_K)
     return LookupTable(pressure, load, strain, mass,
-                       f'computed from law {law.NAME}, set {law.muscle}; not a measurement')
+                       f'computed from law {law.NAME}, set {law.muscle}; dead volume '
+                       f'{1e6 * dead_volume_m3:g} mL; not a measurement')

@@ -35,6 +35,7 @@ from pam_sim.errors import InputError
 from pam_sim.muscle.law import ExtrapolationWarning, MuscleLaw, OUTSIDE, ParameterSet, Validity
 from pam_sim.muscle.lookup_table import LookupTable, read_table
 from pam_sim.records import part, record, size_of, values_of
+from pam_sim.units import absolute_pa, GAS_CONSTANT_AIR, P_ATM_PA, TEMPERATURE_K
 
 if TYPE_CHECKING:
     from scipy.interpolate._rgi import RegularGridInterpolator
@@ -42,9 +43,10 @@ if TYPE_CHECKING:
 STRAIN_POINTS = 41
 SHIPPED = Path(__file__).parent.parent / 'lookup_tables'
 _SMALL = 1e-7           # contraction below this counts as rest
-# What the compiled formula reads: a head, and behind it the values of each pressure.
+# What the compiled formulas read: a head, behind it for each pressure the force [N] over
+# contraction, and then for each the p V [J] of the air in the muscle.
 HEAD = record('pressures', 'points_per_strain')
-ISOBAR = record('pressure_pa', ('force_n', STRAIN_POINTS), ('slope_n', STRAIN_POINTS))
+ISOBAR = record('pressure_pa', ('value', STRAIN_POINTS), ('slope', STRAIN_POINTS))
 _HEAD_SIZE, _ISOBAR_SIZE = size_of(HEAD), size_of(ISOBAR)
 
 
@@ -79,38 +81,44 @@ def end_slope(width0: float, width1: float, slope0: float, slope1: float) -> flo
 
 
 @compiled
-def row_force(isobar: np.record, column: int, share: float, width: float) -> float:
-    """Return F [N] of one tabulated pressure within a strain interval."""
-    return hermite(isobar.force_n[column], isobar.force_n[column + 1], isobar.slope_n[column],
-                   isobar.slope_n[column + 1], width, share)
+def in_row(isobar: np.record, column: int, share: float, width: float) -> float:
+    """Return the value at one tabulated pressure within a strain interval."""
+    return hermite(isobar.value[column], isobar.value[column + 1], isobar.slope[column],
+                   isobar.slope[column + 1], width, share)
 
 
 @compiled
 def isobar_of(par: np.record, row: int) -> np.record:
-    """Return the tabulated values of one pressure, an ``ISOBAR``; they stand behind the head."""
+    """Return an ``ISOBAR``; those of the force stand behind the head, then those of the air."""
     return part(par, _HEAD_SIZE + row * _ISOBAR_SIZE, ISOBAR)
 
 
 @compiled
-def tension_n(gauge_pa: float, strain: float, par: np.record) -> float:
-    """
-    Return F(eps, P) [N], one point; PCHIP along contraction, then along pressure.
+def clipped(gauge_pa: float, par: np.record) -> float:
+    """Return the pressure [Pa gauge] of the table that is nearest."""
+    return min(max(gauge_pa, isobar_of(par, 0).pressure_pa),
+               isobar_of(par, int(par.pressures) - 1).pressure_pa)
 
-    Beyond the table its edge is used.
+
+@compiled
+def on_surface(gauge_pa: float, strain: float, first: int, par: np.record) -> float:
+    """
+    Return the value of the surface whose isobars begin at ``first``, one point.
+
+    PCHIP along contraction, then along pressure. Beyond the table its edge is used.
     """
     rows = int(par.pressures)
     place = min(max(strain * par.points_per_strain, 0.0), STRAIN_POINTS - 1.0)
     column = min(int(place), STRAIN_POINTS - 2)
     share = place - column
     width = 1.0 / par.points_per_strain
-    pressure = min(max(gauge_pa, isobar_of(par, 0).pressure_pa),
-                   isobar_of(par, rows - 1).pressure_pa)
+    pressure = clipped(gauge_pa, par)
     row = 0
-    while row < rows - 2 and isobar_of(par, row + 1).pressure_pa < pressure:
+    while row < rows - 2 and isobar_of(par, first + row + 1).pressure_pa < pressure:
         row += 1
-    low, high = isobar_of(par, row), isobar_of(par, row + 1)
-    y0 = row_force(low, column, share, width)
-    y1 = row_force(high, column, share, width)
+    low, high = isobar_of(par, first + row), isobar_of(par, first + row + 1)
+    y0 = in_row(low, column, share, width)
+    y1 = in_row(high, column, share, width)
     h = high.pressure_pa - low.pressure_pa
     slope = (y1 - y0) / h
     slope0 = 0.0
@@ -120,20 +128,33 @@ def tension_n(gauge_pa: float, strain: float, par: np.record) -> float:
     h_before = h
     h_after = h
     if row > 0:
-        lower = isobar_of(par, row - 1)
+        lower = isobar_of(par, first + row - 1)
         h_before = low.pressure_pa - lower.pressure_pa
-        before = (y0 - row_force(lower, column, share, width)) / h_before
+        before = (y0 - in_row(lower, column, share, width)) / h_before
         slope0 = middle_slope(h_before, h, before, slope)
     if row < rows - 2:
-        higher = isobar_of(par, row + 2)
+        higher = isobar_of(par, first + row + 2)
         h_after = higher.pressure_pa - high.pressure_pa
-        after = (row_force(higher, column, share, width) - y1) / h_after
+        after = (in_row(higher, column, share, width) - y1) / h_after
         slope1 = middle_slope(h, h_after, slope, after)
     if row == 0:
         slope0 = end_slope(h, h_after, slope, after)
     if row == rows - 2:
         slope1 = end_slope(h, h_before, slope, before)
     return hermite(y0, y1, slope0, slope1, h, (pressure - low.pressure_pa) / h)
+
+
+@compiled
+def tension_n(gauge_pa: float, strain: float, par: np.record) -> float:
+    """Return F(eps, P) [N], one point."""
+    return on_surface(gauge_pa, strain, 0, par)
+
+
+@compiled
+def volume_m3(gauge_pa: float, strain: float, par: np.record) -> float:
+    """Return the volume [m^3] that the air mass of the muscle fills, one point."""
+    return on_surface(gauge_pa, strain, int(par.pressures), par) / (
+        clipped(gauge_pa, par) + P_ATM_PA)
 
 
 def _isobar(strain: FloatArray, load: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -215,18 +236,19 @@ class Lookup(MuscleLaw):
         self._pressure = RegularGridInterpolator((fraction, load), np.transpose(columns), 'pchip')
         strain = np.linspace(0.0, limit, STRAIN_POINTS)
         force = np.array([self._pulls(row, strain) for row in self.table.strain])
-        slope = np.array([PchipInterpolator(strain, row).derivative()(strain) for row in force])
-        self.PACKED = record(*(HEAD.names or ()), ('isobars', (ISOBAR, pressure.size)))
+        value = np.concatenate([force, self._air(strain)])
+        slope = np.array([PchipInterpolator(strain, row).derivative()(strain) for row in value])
+        self.PACKED = record(*(HEAD.names or ()), ('isobars', (ISOBAR, len(value))))
         self._packed = {
             'pressures': pressure.size, 'points_per_strain': (STRAIN_POINTS - 1) / limit,
-            'isobars': np.column_stack([pressure, force, slope])}
+            'isobars': np.column_stack([np.tile(pressure, 2), value, slope])}
         self._values = values_of(self.PACKED, self._packed)
 
     def _check(self, where: str) -> None:
         """Leave it to the interpolation, which keeps what the table keeps."""
 
     def pack(self) -> dict[str, Any]:
-        """Return the head, then pressures, forces and their slopes along contraction."""
+        """Return the head, then pressures, values and their slopes along contraction."""
         return self._packed
 
     def _pulls(self, strain_of_load: FloatArray, strain: FloatArray) -> FloatArray:
@@ -238,6 +260,47 @@ class Lookup(MuscleLaw):
             return np.zeros_like(strain)
         inside = np.clip(strain, 0.0, eps[-1])
         return np.where(strain > eps[-1], 0.0, PchipInterpolator(eps, pull[first])(inside))
+
+    def _air(self, strain: FloatArray) -> FloatArray:
+        """
+        Return p V [J] of the air in the muscle on a grid of contractions, a row per pressure.
+
+        A muscle that is slack, contracted further than without load, keeps its volume. At rest
+        it has the volume of the points that do not move, of the next pressure where one has none.
+        """
+        from scipy.interpolate import PchipInterpolator
+        table = self.table
+        pressure = absolute_pa(table.pressure_gauge_pa)
+        volume = (table.air_mass_kg * GAS_CONSTANT_AIR * TEMPERATURE_K / pressure[:, np.newaxis]
+                  - (table.dead_volume_m3 or 0.0))
+        moving = table.strain > _SMALL
+        at_rest = ~moving.all(axis=1)
+        least = np.argmin(moving, axis=1)           # of the loads that are not lifted
+        rest = np.interp(pressure, pressure[at_rest], volume[at_rest, least[at_rest]]
+                         ) if at_rest.any() else volume[:, -1]
+        rows = []
+        for k, lifted in enumerate(moving):
+            eps, first = np.unique(np.append(0.0, table.strain[k, lifted]), return_index=True)
+            held = np.append(rest[k], volume[k, lifted])[first]
+            rows.append(np.full_like(strain, held[0]) if eps.size < 2 else PchipInterpolator(
+                eps, held)(np.minimum(strain, eps[-1])))
+        return pressure[:, np.newaxis] * np.array(rows)
+
+    def air_grid_pa(self) -> FloatArray:
+        """
+        Return the pressures of the table.
+
+        Raises
+        ------
+        InputError
+            The table does not say which dead volume its air mass includes.
+
+        """
+        if self.table.dead_volume_m3 is None:
+            raise InputError('the table does not say whose air its air_mass_kg is; write into a '
+                             'line of comment (#) or its `source`: dead volume 3 mL, that of tube '
+                             'and fittings, or 0 mL for the muscle alone', 'lookup table')
+        return self.table.pressure_gauge_pa
 
     def _packed_values(self) -> FloatArray:
         return self._values
