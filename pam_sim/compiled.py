@@ -134,6 +134,8 @@ class _Compiler:
 # Functions for other compiled functions; Python may call them as well.
 compiled: Compiler = _Compiler('linked')
 inlined: Compiler = _Compiler('linked', forceinline=True)
+# What few rigs need stays a call, not optimised itself, so that the code of the others is small.
+called: Compiler = _Compiler('linked', _dbg_optnone=True)
 # Functions that Python calls, their machine code stored on disk; the second one may make arrays.
 entry_point: Compiler = _Compiler('kept', _nrt=False)
 allocating_entry_point: Compiler = _Compiler('kept')

@@ -21,7 +21,7 @@ Arguments as in :mod:`pam_sim.rollout.step`.
 import math
 
 import numpy as np
-from pam_sim.compiled import compiled, inlined
+from pam_sim.compiled import called, compiled, inlined
 from pam_sim.muscle.geometry import volume_m3
 from pam_sim.rollout.dispatch import hooks
 from pam_sim.rollout.layout import NOMINAL
@@ -33,25 +33,43 @@ _SMALL = 1e-6               # of the pressure, for a slope
 
 
 @inlined
-def air_volume(p: float, x: float, beyond: int, state: np.record, par: np.record) -> float:
-    """Return the volume the air has [m^3] at pressure p [Pa] and contraction x [m]."""
-    if beyond > NOMINAL and par.own_volume > 0.0:
-        volume = par.dead_volume_m3 + hooks.law_volume(
-            p - par.atmosphere_pa, x * par.inverse_length_per_m, par)
-    else:
-        volume = par.dead_volume_m3 + volume_m3(
-            x, par.length_m, par.thread_squared_m2, par.inverse_4_pi_n2)
+def bore_volume(p: float, x: float, beyond: int, state: np.record, par: np.record) -> float:
+    """Return the volume of the air [m^3] at pressure p [Pa] and contraction x [m] in a bore."""
+    volume = par.dead_volume_m3 + volume_m3(
+        x, par.length_m, par.thread_squared_m2, par.inverse_4_pi_n2)
     return hooks.volume(volume, p, x, beyond, state, par)
+
+
+@called
+def own_volume(p: float, x: float, beyond: int, state: np.record, par: np.record) -> float:
+    """Return the same of a muscle whose volume is that of its law."""
+    volume = par.dead_volume_m3 + hooks.law_volume(
+        p - par.atmosphere_pa, x * par.inverse_length_per_m, par)
+    return hooks.volume(volume, p, x, beyond, state, par)
+
+
+@inlined
+def air_volume(p: float, x: float, beyond: int, state: np.record, par: np.record) -> float:
+    """Return the volume of the air [m^3] at pressure p [Pa] and contraction x [m]."""
+    if beyond > NOMINAL and par.own_volume > 0.0:
+        return own_volume(p, x, beyond, state, par)
+    return bore_volume(p, x, beyond, state, par)
+
+
+@called
+def own_filled_volume(p: float, x: float, beyond: int, state: np.record, par: np.record) -> float:
+    """Return d(p V)/dp [m^3] at constant contraction of a muscle with the volume of its law."""
+    step = _SMALL * p
+    return ((p + step) * own_volume(p + step, x, beyond, state, par)
+            - p * own_volume(p, x, beyond, state, par)) / step
 
 
 @inlined
 def filled_volume(p: float, x: float, beyond: int, state: np.record, par: np.record) -> float:
     """Return d(p V)/dp [m^3] at constant contraction: what a change of pressure fills."""
-    volume = air_volume(p, x, beyond, state, par)
     if beyond > NOMINAL and par.own_volume > 0.0:
-        step = _SMALL * p
-        return ((p + step) * air_volume(p + step, x, beyond, state, par) - p * volume) / step
-    return volume
+        return own_filled_volume(p, x, beyond, state, par)
+    return bore_volume(p, x, beyond, state, par)
 
 
 @compiled
@@ -62,14 +80,16 @@ def pressure_of(energy: float, p: float, x: float, beyond: int, state: np.record
 
     Secant steps, the first one from p = 0, within pressures known as too low and too high.
     """
+    if not energy > 0.0:        # no mass of air, or none that is a number: unphysical
+        return energy
     low = 0.0
     high = math.inf
     before = 0.0
     missing_before = energy
     for _ in range(_TRIES):
-        missing = energy - p * air_volume(p, x, beyond, state, par)
+        missing = energy - p * own_volume(p, x, beyond, state, par)
         if abs(missing) <= _CLOSE * energy:
-            return p
+            break
         if missing > 0.0:
             low = p
         else:
@@ -80,39 +100,38 @@ def pressure_of(energy: float, p: float, x: float, beyond: int, state: np.record
         p += missing / per_pa
         if not low < p < high:
             p = 0.5 * (low + high) if high < math.inf else 2.0 * low
-    return energy / air_volume(p, x, beyond, state, par)
+    return p
 
 
-@compiled
+@called
 def pressure_in_own_volume(mass: float, mass0: float, inflow: float, net: float, p: float,
-                           x: float, volume: float, elapsed: float, warm: bool, beyond: int,
-                           state: np.record, par: np.record) -> float:
+                           x: float, elapsed: float, warm: bool, beyond: int, state: np.record,
+                           par: np.record) -> float:
     """Return the pressure [Pa] in a volume that depends on it; arguments of ``air_pressure``."""
     rt = par.rt_j_per_kg
-    if not warm:
-        return pressure_of(mass * rt, p, x, beyond, state, par)
     found = p
-    for _ in range(_WARM_PASSES):
-        rt = hooks.air_rt(par.rt_j_per_kg, mass0, inflow, inflow - net, p, volume, elapsed, beyond,
-                          state, par)
+    for _ in range(_WARM_PASSES if warm else 1):
+        if warm:
+            rt = hooks.air_rt(par.rt_j_per_kg, mass0, inflow, inflow - net, p, own_volume(
+                found, x, beyond, state, par), elapsed, beyond, state, par)
         found = pressure_of(mass * rt, found, x, beyond, state, par)
-        volume = air_volume(found, x, beyond, state, par)
     return found
 
 
 @inlined
 def air_pressure(mass: float, mass0: float, inflow: float, net: float, p: float, x: float,
-                 volume: float, per_m3: float, elapsed: float, warm: bool, beyond: int,
+                 volume: float, per_m3: float, elapsed: float, warm: bool, own: bool, beyond: int,
                  state: np.record, par: np.record) -> float:
     """
     Return the pressure [Pa] of ``mass``, ``elapsed`` into a step.
 
-    The step began with ``mass0`` at pressure p. ``per_m3`` is 1 / V, which is known before the
-    flows are, and ``warm`` tells that the temperature changes.
+    The step began with ``mass0`` at pressure p. ``per_m3`` is 1 / V of a bore, which is known
+    before the flows are. ``warm`` tells that the temperature changes, ``own`` that the volume is
+    that of the law.
     """
-    if beyond > NOMINAL and par.own_volume > 0.0:
+    if own:
         return pressure_in_own_volume(
-            mass, mass0, inflow, net, p, x, volume, elapsed, warm, beyond, state, par)
+            mass, mass0, inflow, net, p, x, elapsed, warm, beyond, state, par)
     density = par.rt_j_per_kg * per_m3                                     # Pa/kg
     if warm:
         density = hooks.air_rt(par.rt_j_per_kg, mass0, inflow, inflow - net, p, volume, elapsed,

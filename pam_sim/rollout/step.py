@@ -33,7 +33,7 @@ import math
 import numpy as np
 from pam_sim.compiled import inlined
 from pam_sim.load.hanging_mass import acceleration
-from pam_sim.rollout.air import air_pressure, air_volume, filled_volume
+from pam_sim.rollout.air import air_pressure, air_volume, bore_volume, filled_volume
 from pam_sim.rollout.dispatch import hooks
 from pam_sim.rollout.layout import HSV_AVERAGED, NOMINAL, PPR
 from pam_sim.valve.flow import mass_flow_kg_per_s
@@ -233,6 +233,7 @@ def physics_step(signal_0: float, signal_1: float, external: float, x_target: fl
     altered = False
     flowing = False
     warm = False
+    own = False
     mass0 = 0.0
     net_flow = 0.0
     inflow = 0.0
@@ -253,21 +254,22 @@ def physics_step(signal_0: float, signal_1: float, external: float, x_target: fl
         mass0 = state.air_mass_kg
         altered = beyond > NOMINAL and par.used.valve_flow > 0.0
         warm = beyond > NOMINAL and par.used.air_rt > 0.0
+        own = beyond > NOMINAL and par.own_volume > 0.0
         # Both valves shut and no air lost: the mass stays, and no stage needs a flow.
         flowing = fill > 0.0 or vent > 0.0 or altered or (
             beyond > NOMINAL and par.used.mass_flow > 0.0)
         if flowing:
             in1, out1 = valve_flows(fill, vent, p0, supply, altered, beyond, state, par)
             q1 = hooks.mass_flow(in1 - out1, p0, x0, supply, beyond, state, par)
-        volume = air_volume(p0, x_mid, beyond, state, par)
+        volume = bore_volume(p0, x_mid, beyond, state, par)
         per_m3 = 1.0 / volume
         p_mid = air_pressure(mass0 + g * q1, mass0, in1, q1, p0, x_mid, volume, per_m3, g, warm,
-                             beyond, state, par)
+                             own, beyond, state, par)
         if flowing:
             in2, out2 = valve_flows(fill, vent, p_mid, supply, altered, beyond, state, par)
             q2 = hooks.mass_flow(in2 - out2, p_mid, x_mid, supply, beyond, state, par)
             p_mid = air_pressure(mass0 + g * q2, mass0, in2, q2, p0, x_mid, volume, per_m3, g,
-                                 warm, beyond, state, par)
+                                 warm, own, beyond, state, par)
             in3, out3 = valve_flows(fill, vent, p_mid, supply, altered, beyond, state, par)
             q3 = hooks.mass_flow(in3 - out3, p_mid, x_mid, supply, beyond, state, par)
     a_mid = 0.0
@@ -298,9 +300,9 @@ def physics_step(signal_0: float, signal_1: float, external: float, x_target: fl
     if moving:
         x1 = min(max(x1, 0.0), top)
     if not is_ppr:
-        volume = air_volume(p_mid, x1, beyond, state, par)
+        volume = bore_volume(p_mid, x1, beyond, state, par)
         per_m3 = 1.0 / volume
-        p_end = air_pressure(mass0 + h * q3, mass0, in3, q3, p0, x1, volume, per_m3, h, warm,
+        p_end = air_pressure(mass0 + h * q3, mass0, in3, q3, p0, x1, volume, per_m3, h, warm, own,
                              beyond, state, par)
         if flowing:
             in4, out4 = valve_flows(fill, vent, p_end, supply, altered, beyond, state, par)
@@ -312,7 +314,7 @@ def physics_step(signal_0: float, signal_1: float, external: float, x_target: fl
             state.filled_kg += h * inflow
             state.vented_kg += sixth * (out1 + 2.0 * (out2 + out3) + out4)
             p_end = air_pressure(mass1, mass0, inflow, net_flow, p0, x1, volume, per_m3, h, warm,
-                                 beyond, state, par)
+                                 own, beyond, state, par)
     tension = map_tension(p_end, x1, beyond, state, par)
     if moving:
         dx = x1 - x0
@@ -344,10 +346,10 @@ def physics_step(signal_0: float, signal_1: float, external: float, x_target: fl
                 x1 = min(max(x1 + 0.5 * v1 * rest, 0.0), top)
                 tension = map_tension(p_end, x1, beyond, state, par)
             if not is_ppr:
-                volume = air_volume(p_end, x1, beyond, state, par)
+                volume = bore_volume(p_end, x1, beyond, state, par)
                 per_m3 = 1.0 / volume
                 p_end = air_pressure(state.air_mass_kg, mass0, inflow, net_flow, p0, x1, volume,
-                                     per_m3, h, warm, beyond, state, par)
+                                     per_m3, h, warm, own, beyond, state, par)
     state.pressure_pa = p_end
     state.contraction_m = x1
     state.velocity_m_per_s = v1
