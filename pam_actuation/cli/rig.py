@@ -63,6 +63,9 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument('--load', default='hanging_mass', metavar='NAME',
                         help='hanging_mass, isometric, driven or a load of your own '
                         '(default: %(default)s)')
+    parser.add_argument('--volume', metavar='bore|law', default='bore',
+                        help='inner volume of the muscle: a cylinder of its bore, or that of its '
+                        'force law or table (default: %(default)s)')
     parser.add_argument('--valve', metavar='ppr|hsv', default='ppr',
                         help='regulator or pair of on/off valves (default: %(default)s)')
     parser.add_argument('--regulator', type=source, default=None, metavar='NAME',
@@ -151,7 +154,7 @@ def _nothing_said(args: argparse.Namespace) -> bool:
     said = (args.muscle, args.length_mm, args.bore_mm, args.angle_deg, args.max_strain,
             args.force_map, args.regulator, args.regulator_volts, args.regulator_kpa)
     return (all(one is None for one in said) and not (args.known or args.about or args.unknown)
-            and args.load == 'hanging_mass' and args.valve == 'ppr')
+            and args.load == 'hanging_mass' and args.valve == 'ppr' and args.volume == 'bore')
 
 
 def _described(args: argparse.Namespace) -> 'Description':
@@ -162,8 +165,10 @@ def _described(args: argparse.Namespace) -> 'Description':
     from pam_sim.load import LOADS
     from pam_sim.muscle.muscle import get_muscle
     from pam_sim.valve import VALVES
+    from pam_sim.volume import VOLUMES
     found = Description(args.muscle, load=_one_of('--load', args.load, LOADS),
-                        valve=_one_of('--valve', args.valve, VALVES), regulator=args.regulator)
+                        valve=_one_of('--valve', args.valve, VALVES), regulator=args.regulator,
+                        volume=_one_of('--volume', args.volume, VOLUMES))
     if args.muscle is not None:
         get_muscle(args.muscle)
     for name, value, factor in (('length_m', args.length_mm, 1e-3), ('bore_m', args.bore_mm, 1e-3),

@@ -56,8 +56,8 @@ class Description:
         How far it is off the points it was made from, as a fraction of the largest force.
     force_map_unknown : list of str
         Sentences on what the table does not know.
-    load, valve : str
-        As in a rig.
+    load, valve, volume : str
+        As in a rig and its muscle.
     regulator : str or None
         Name of a regulator.
     volts, gauge_pa : tuple of float or None
@@ -80,6 +80,7 @@ class Description:
     force_map_unknown: list[str] = field(default_factory=list)
     load: str = 'hanging_mass'
     valve: str = 'ppr'
+    volume: str = 'bore'
     regulator: str | None = None
     volts: tuple[float, float] | None = None
     gauge_pa: tuple[float, float] | None = None

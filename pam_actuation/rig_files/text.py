@@ -30,6 +30,7 @@ from pam_sim.parameters import Parameter
 from pam_sim.sensors import SENSOR_PARAMETERS, ZEROS
 from pam_sim.tolerance import AbsoluteSd, Tolerance, UNKNOWN, WORD
 from pam_sim.valve import hsv, ppr
+from pam_sim.volume import VOLUMES
 
 if TYPE_CHECKING:
     from pam_sim.rig import Rig
@@ -77,7 +78,9 @@ def rig_file(described: Description, out: str) -> tuple[str, 'Rig']:
 
 def _text(described: Description, force_map: str) -> str:
     lines = _comment(HEAD, keep=True)
-    lines += ['', *_muscle(described, force_map), '', f'# {LOADS[described.load].SENTENCE}',
+    lines += ['', *_muscle(described, force_map), '',
+              f'# {VOLUMES[described.volume].SENTENCE}', f'volume: {described.volume}', '',
+              f'# {LOADS[described.load].SENTENCE}',
               f'load: {described.load}', '',
               f'# {ppr.SENTENCE if described.valve == "ppr" else hsv.SENTENCE}',
               f'valve: {described.valve}', '', 'parameters:']

@@ -17,6 +17,7 @@
 import json
 import math
 import os
+from pathlib import Path
 import pty
 import re
 import subprocess
@@ -26,6 +27,7 @@ from pam_actuation.cli.main import main
 from pam_actuation.rig_files.questions import ask_description
 from pam_actuation.rig_files.text import rig_file
 from pam_sim import load_rig
+from pam_sim.muscle.laws.lookup import SHIPPED
 from pam_sim.tolerance import AbsoluteSd, UNKNOWN
 from pam_sim.units import P_ATM_PA
 from pam_sim.valve.regulator_presets import get_regulator, regulator_names
@@ -97,6 +99,19 @@ def test_the_force_law_may_be_unknown(capsys):
     assert new('--unknown', 'law.a2_n', '--overwrite').unknown == ('law.a2_n',)
     assert main(['rig', 'new', '--out', 'other.yaml', '--unknown', 'law.a9']) == 2
     assert 'law.a9' in capsys.readouterr().err and not os.path.exists('other.yaml')
+
+
+def test_the_volume_of_the_muscle_is_a_choice(folder, capsys):
+    table = SHIPPED / 'dmsp_5_300.csv'
+    assert new('--valve', 'hsv', '--force-map', str(table)).muscle.volume == 'bore'
+    assert new('--overwrite', '--valve', 'hsv', '--force-map', str(table), '--volume',
+               'law').muscle.volume == 'law'
+    capsys.readouterr()
+    assert main(['rig', 'new', '--volume', 'law', '--out', 'none.yaml']) == 2
+    assert 'law `sarosi` has no volume of its own; these have: ' in capsys.readouterr().err
+    assert main(['rig', 'new', '--volume', 'lav', '--out', 'none.yaml']) == 2
+    assert '--volume: `lav` is not known (did you mean `law`?)' in capsys.readouterr().err
+    assert not Path('none.yaml').exists()
 
 
 @pytest.mark.parametrize('options, tolerance', [
