@@ -104,7 +104,7 @@ def test_lookup_returns_the_law_its_table_came_from(table):
 
 def test_lookup_gives_the_surface_of_scipy_through_its_points(table):
     law = make_law('lookup', table)
-    isobars = law.pack()['isobars']
+    isobars = law.pack()['isobars'][:table.pressure_gauge_pa.size]      # those of the force
     strain = np.linspace(0.0, law.validity.strain[1], STRAIN_POINTS)
     pressure, force = isobars[:, 0], isobars[:, 1:1 + STRAIN_POINTS]
     surface = RegularGridInterpolator((pressure, strain), force, 'pchip')

@@ -15,6 +15,9 @@
 """The volume of a muscle: the work of its air, filling through valves, tables, refusals."""
 
 from dataclasses import replace
+import os
+import subprocess
+import sys
 
 from both_ways import compiled_and_not
 import numpy as np
@@ -53,6 +56,12 @@ def test_the_air_does_the_work_of_the_force_in_the_volume_of_the_law(rig, law, i
     bore = load_rig(rig).with_(law=law)
     assert work_over_air(bore.with_(volume='law')) == pytest.approx(1.0, rel=0.01)
     assert work_over_air(bore) == pytest.approx(in_bore, rel=0.01)
+
+
+@pytest.mark.parametrize('muscle, ratio', [
+    ('dmsp_5_300', 1.29), ('dmsp_10_250', 1.05), ('dmsp_20_300', 1.17)])
+def test_the_volume_of_the_bore_is_not_that_of_the_force_as_the_docs_say(muscle, ratio):
+    assert work_over_air(load_rig(f'{muscle}_hanging_mass')) == pytest.approx(ratio, abs=0.006)
 
 
 def test_a_table_fills_through_the_valves_as_the_rig_it_was_made_of():
@@ -275,6 +284,53 @@ np.save(sys.argv[1], np.array(rows))
 def test_volumes_give_the_same_bits_with_the_compiler_off(tmp_path):
     compiled, plain = compiled_and_not(SCRIPT, tmp_path)
     assert np.array_equal(compiled, plain)
+
+
+OWN_LAW = """
+from pam_sim.compiled import compiled
+from pam_sim.muscle.law import MuscleLaw, ParameterSet
+from pam_sim.parameters import Parameter
+
+@compiled
+def tension_n(gauge_pa, strain, par):
+    return par.a_m2 * gauge_pa * (1.0 - strain / 0.2)
+
+@compiled
+def volume_m3(gauge_pa, strain, par):
+    return par.a_m2 * par.length_m * (0.1 + strain - strain * strain / 0.4)
+
+class Linear(MuscleLaw):
+    NAME = 'linear'
+    PARAMETERS = (Parameter('a_m2', 'm^2', 2e-4, 1e-6, 1.0),
+                  Parameter('length_m', 'm', 0.3, 0.1, 1.0))
+    SETS = {'one': ParameterSet({}, 'nothing')}
+    CLAIMS = (1, 2, 3, 4)
+
+LAW = Linear
+"""
+USE_OF_LAW = """
+import numpy as np
+from pam_sim import load_rig
+rig = load_rig('rig: dmsp_5_300_driven\\nvalve: hsv\\nlaw: linear\\nvolume: law\\n')
+x = np.linspace(0.0, 0.03, 41)
+seen = rig.simulate(np.zeros((40, 2)), contraction_m=x, initial_pressure_pa=5e5)
+volume = 3e-6 + 2e-4 * 0.3 * (0.1 + x / 0.3 - (x / 0.3) ** 2 / 0.4)
+print(abs(seen.pressure_pa * volume / (5e5 * volume[0]) - 1.0).max() < 1e-9)
+"""
+
+
+@pytest.mark.parametrize('old, new, said', [
+    ('', '', 'True'), ('volume_m3(gauge_pa, strain, par)', 'volume_m3(strain, par)',
+                       'write `def volume_m3(gauge_pa, strain, par)`'),
+    ('(0.1 + strain -', '(0.1 - strain -', 'claims rule 1 ("Contraction goes with an increasing '
+     'volume.") and breaks it: the volume does not grow with contraction at ')])
+def test_a_law_of_the_user_has_a_volume(tmp_path, old, new, said):
+    (tmp_path / 'linear.py').write_text(OWN_LAW.replace(old, new) if old else OWN_LAW)
+    answer = subprocess.run(
+        [sys.executable, '-c', USE_OF_LAW], capture_output=True, text=True,
+        env={**os.environ, 'PAM_MUSCLE_LAWS_PATH': str(tmp_path), 'NUMBA_DISABLE_JIT': '1',
+             'PYTHONPATH': os.pathsep.join(sys.path), 'PAM_CACHE_DIR': str(tmp_path / 'cache')})
+    assert said in answer.stdout + answer.stderr
 
 
 def test_a_muscle_of_another_volume_is_another_muscle():
