@@ -20,7 +20,7 @@ from pam_actuation.models.cells import facts, groups, tables
 
 _INTRODUCTION = """# Models
 
-Every muscle law, valve, load, effect and sensor setting of the simulator. This page is
+Every muscle law, volume, valve, load, effect and sensor setting of the simulator. This page is
 made from the code by `pam models --markdown docs/reference/models.md`; do not edit it.
 `pam models` also lists your own files in the folders that `PAM_EFFECTS_PATH`,
 `PAM_LOADS_PATH` or `PAM_MUSCLE_LAWS_PATH` name.
