@@ -20,6 +20,7 @@ from typing import Any
 
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.gap.data.signals import READABLE
+from pam_sim.gap.share import Share
 from pam_sim.plain_json import finite
 from pam_sim.short_repr import short_repr
 
@@ -56,36 +57,6 @@ class SignalGap:
         return {'unit': self.unit, 'noise_floor': self.noise_floor,
                 'rmse_before': self.rmse_before, 'rmse_refit': self.rmse_refit,
                 'rmse_after': self.rmse_after, 'shrink_percent': self.shrink_percent}
-
-
-@dataclass(frozen=True)
-class Share:
-    """
-    A part of the gap: of ``signal``, caused in ``subsystem``, under ``condition``.
-
-    ``certainty`` that it is this subsystem, 0 to 1, is stated of the first row alone.
-    """
-
-    subsystem: str
-    signal: str
-    condition: str
-    share_of_gap: float
-    certainty: float | None = None
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the entry of gap.json."""
-        return {'subsystem': self.subsystem, 'signal': self.signal,
-                'condition': self.condition, 'share_of_gap': self.share_of_gap,
-                'certainty': self.certainty}
-
-    def text(self) -> str:
-        """Return the place in one sentence."""
-        subsystem = {'sensor': f'sensor of the {self.signal}'}.get(self.subsystem, self.subsystem)
-        when = '' if self.condition == 'all' else f', {_when(self.condition)}'
-        sure = '' if self.certainty is None else f' (certainty {self.certainty:.2f})'
-        return (f'After calibration the disagreement lives in the {subsystem}{sure}: '
-                f'{100 * self.share_of_gap:.0f} % of the squared gap in {self.signal}{when}, each '
-                'subsystem on its own measured inputs.')
 
 
 @dataclass(frozen=True)
@@ -318,10 +289,3 @@ class GapResult:
             'fingerprint': self.fingerprint, 'minimum_detectable': self.minimum_detectable,
             'runtime_s': self.runtime_s, 'simulations': self.simulations,
             'reason': self.reason, 'numbers_first': self.numbers_first})
-
-
-def _when(condition: str) -> str:
-    """Return a condition as the end of a sentence."""
-    if condition in ('contracting', 'extending'):
-        return f'while {condition}'
-    return f'at {condition}' if condition[0].isdigit() else condition

@@ -30,10 +30,11 @@ from pam_sim.gap.report.by_subsystem import add_place
 from pam_sim.gap.report.encoder import sensor_part
 from pam_sim.gap.report.location import force_errors, ForceErrors
 from pam_sim.gap.report.place import Evidence, first_place
-from pam_sim.gap.result import GapResult, Share, SignalGap, SubsystemVerdict
+from pam_sim.gap.result import GapResult, SignalGap, SubsystemVerdict
 from pam_sim.gap.select.candidates import candidates
 from pam_sim.gap.select.rival import NamedEffect, Rival
 from pam_sim.gap.select.screening import Screened
+from pam_sim.gap.share import Share
 from pam_sim.gap.subsystems.simulation import pressure_driven, simulate_driven
 import pytest
 

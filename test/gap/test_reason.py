@@ -28,10 +28,10 @@ from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.gap import find_gap
 from pam_sim.gap.report.reason import explain
-from pam_sim.gap.report.words import in_words
 from pam_sim.gap.result import Calibrated, GapResult, SignalGap, SubsystemVerdict
 from pam_sim.gap.select.rival import NamedEffect
 from pam_sim.gap.verify.notice import Notice
+from pam_sim.gap.words import in_words
 from pam_sim.run import Run, Series
 import pytest
 

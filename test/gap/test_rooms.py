@@ -24,8 +24,8 @@ from pam_sim.gap.criteria import CRITERIA, Criteria, GROUPS, table
 import pytest
 
 FOLDER = Path(__file__).resolve().parents[2] / 'pam_sim' / 'gap'
-ROOMS = ('criteria', 'data', 'result', 'subsystems', 'fit', 'select', 'verify', 'report', 'plan',
-         'verdict', 'propose', 'workflow', '__init__')
+ROOMS = ('criteria', 'words', 'share', 'data', 'result', 'subsystems', 'fit', 'select', 'verify',
+         'report', 'plan', 'verdict', 'propose', 'workflow', '__init__')
 
 
 def room_of(path):

@@ -343,8 +343,7 @@ def test_rivals_come_with_an_experiment_that_tells_them_apart(tmp_path, monkeypa
     result = write_gap([run], NOMINAL, tmp_path, effects=['coulomb_friction', 'guide_friction'])
     assert result.verdict == 'ambiguous'
     assert_form(result)
-    assert set(result.ambiguity_set) == {
-        'valve_dead_time', 'coulomb_friction', 'guide_friction'}
+    assert set(result.ambiguity_set) == {'coulomb_friction', 'guide_friction'}
     # Inside the muscle or at the rail: only a load cell between them can tell.
     assert 'force' in result.next_experiment['needs']
     found = load_experiment(str(tmp_path / 'next_experiment.yaml'))

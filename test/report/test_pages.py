@@ -25,7 +25,8 @@ from pam_actuation.report.sections.replay import Overlay
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.files import write_text
-from pam_sim.gap.result import Calibrated, GapResult, Share, SignalGap, Trace
+from pam_sim.gap.result import Calibrated, GapResult, SignalGap, Trace
+from pam_sim.gap.share import Share
 from pam_sim.run import Series
 import pytest
 from tracking_runs import step_run, tracking_run

@@ -24,7 +24,7 @@ from pam_actuation.report.page import paragraph, plot, Section, table
 from pam_actuation.report.sections.gap_witness import coloured_part, witness_part
 from pam_actuation.report.sections.replay import SHOWN
 from pam_sim.gap.criteria import CRITERIA
-from pam_sim.gap.report.words import in_words
+from pam_sim.gap.words import in_words
 
 if TYPE_CHECKING:
     from pam_sim.gap.result import GapResult, SignalGap

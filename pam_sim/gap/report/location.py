@@ -28,7 +28,7 @@ import numpy as np
 from pam_sim.annotations import BoolArray, FloatArray
 from pam_sim.gap.data.noise import noise_of, STAMP_SD_S
 from pam_sim.gap.data.recording import GRID_S, Recording
-from pam_sim.gap.result import Share
+from pam_sim.gap.share import Share
 from pam_sim.gap.subsystems.simulation import (
     FAST_GAIN_PA_PER_V, FAST_T_S, pressure_driven, run_from_pressure, simulate_driven)
 from pam_sim.rig import Rig

@@ -35,10 +35,11 @@ from pam_sim.gap.report.by_subsystem import subsystem_of
 from pam_sim.gap.report.condition import condition_of
 from pam_sim.gap.report.encoder import sensor_part
 from pam_sim.gap.report.location import force_errors, ForceErrors, locate
-from pam_sim.gap.result import GapResult, Share
+from pam_sim.gap.result import GapResult
 from pam_sim.gap.select.rival import NamedEffect
 from pam_sim.gap.select.screening import Screened
 from pam_sim.gap.select.search import Outcome
+from pam_sim.gap.share import Share
 from pam_sim.gap.subsystems.effects import acts_on
 from pam_sim.gap.verify.model import held_without, model_of
 from pam_sim.gap.verify.own_runs import largest, OwnRuns

@@ -19,10 +19,10 @@ from typing import Any
 
 from pam_sim.effects.registry import effects
 from pam_sim.gap.data.signals import READABLE
-from pam_sim.gap.report.words import in_words
 from pam_sim.gap.result import Calibrated, GapResult
 from pam_sim.gap.select.search import Outcome
 from pam_sim.gap.verify.harm import Harm
+from pam_sim.gap.words import in_words
 
 SEEN = 1.2                   # times the noise floor: a gap in a signal that is worth a word
 BENT = 1.2                   # times the gap of the given model: calibration made it clearly worse

@@ -24,9 +24,9 @@ from collections.abc import Iterator, Sequence
 from pam_sim.effects.registry import get_effect
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit
-from pam_sim.gap.report.words import in_words
 from pam_sim.gap.select.rival import NamedEffect
 from pam_sim.gap.verify.model import numbers_of
+from pam_sim.gap.words import in_words
 
 NEAR = 0.05                  # of an end of the range that is not 0, as near counts as at it
 AT_END = ('`{}` would need {} = {:.4g} {}, at the end of its range, so it is not named. Check '
