@@ -42,6 +42,22 @@ class Valley:
         return np.array([[-1.0 / SD, 1.0 / SD], [bend + beyond, bend + beyond]])
 
 
+class Gate(Valley):
+    """The same, and a third number that shuts the way early, but for values near 0."""
+
+    bounds = (np.zeros(3), np.full(3, 9.0))
+
+    def residuals(self, x):
+        """Return the errors."""
+        most = 2.0 if x[2] < 0.5 else 0.7
+        return np.array([(x[1] - x[0] - 0.3) / SD, 1e3 * max(x[0] + x[1] - most, 0.0),
+                         1e-6 * x[2]])
+
+    def slopes(self, x):
+        """Return slopes that see nothing of the third number."""
+        return np.column_stack([np.vstack([super().slopes(x), np.zeros(2)]), [0.0, 0.0, 1e-6]])
+
+
 class Plane:
     """Two numbers, each with its own standard deviation."""
 
@@ -65,21 +81,30 @@ def test_the_ends_reach_as_far_as_the_errors_stay_the_same():
     problem, x = Valley(), np.array([0.1, 0.4])
     own = covariance(problem, x)
     assert 1.96 * np.sqrt(own[0, 0]) < 2.0           # by its slopes alone
-    ends = profile_ends(problem, x, [0, 1], [own])
+    ends = profile_ends(problem, x, [[0, 1]], [own])
     assert ends[0, :, 0] == pytest.approx([0.0, 0.85], abs=0.03)
     assert ends[1, :, 1] == pytest.approx([0.3, 1.15], abs=0.03)
     assert ends[:, :, 1] - ends[:, :, 0] == pytest.approx(0.3, abs=5 * SD)
+
+
+def test_a_number_without_effect_here_makes_room_for_the_others():
+    problem, x = Gate(), np.array([0.1, 0.4, 5.0])
+    own = covariance(problem, x)
+    assert profile_ends(problem, x, [[0, 1]], [own])[0, 1, 0] == pytest.approx(0.2, abs=0.02)
+    ends = profile_ends(problem, x, [[0, 1, 2]], [own])
+    assert ends[0, :, 0] == pytest.approx([0.0, 0.85], abs=0.03)
+    assert ends[1, 1, 1] == pytest.approx(1.15, abs=0.03)
 
 
 def test_where_the_slopes_tell_all_the_ends_are_those_of_the_covariance():
     problem, x = Plane(), np.zeros(2)
     own = covariance(problem, x)
     half = NORMAL_95 * np.sqrt(np.diag(own))
-    ends = profile_ends(problem, x, [0, 1], [own])
+    ends = profile_ends(problem, x, [[0, 1]], [own])
     assert ends[0, :, 0] == pytest.approx([-half[0], half[0]])
     assert ends[1, :, 1] == pytest.approx([-half[1], half[1]])
     # Blocks of errors that last tell less.
-    ends = profile_ends(problem, x, [0], [own, 4.0 * own])
+    ends = profile_ends(problem, x, [[0]], [own, 4.0 * own])
     assert ends[0, :, 0] == pytest.approx([-2.0 * half[0], 2.0 * half[0]])
 
 

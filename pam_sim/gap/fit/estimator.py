@@ -206,7 +206,9 @@ class Estimator:
         return Precision(
             likelihood, blocks, search.join(held.theta, held.known_z),
             profile_ends(search, search.join(found.theta, found.known_z),
-                         range(len(found.theta)), (likelihood, blocks)))
+                         [range(len(found.theta))[found.hypothesis.rows(place)]
+                          for place in range(len(found.hypothesis.effects))],
+                         (likelihood, blocks)))
 
     def certainty(self, found: Fit, place: int) -> float:
         """

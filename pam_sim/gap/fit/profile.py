@@ -23,6 +23,7 @@ begins where the covariance has its end, which stays if the cost has risen about
 """
 
 from collections.abc import Sequence
+from itertools import product
 import math
 from typing import NamedTuple, Protocol
 
@@ -40,6 +41,7 @@ LEAST_PART, MOST_PART = 0.1, 0.9     # of the way between two tries
 STEEP = 30.0                 # times the rise wanted: far off, with no root to follow
 STEPS = 5                    # of a fit, one simulation each
 GAIN = 0.02                  # of the cost, which ends them
+SIGNS = (-1.0, 1.0)          # of the way to both ends
 TIGHT = 1e-9                 # least room of a number
 ROUNDING = 1e-9              # information of a number that nothing depends on
 
@@ -56,7 +58,7 @@ class Problem(Protocol):
         """Return the derivatives of ``residuals``."""
 
 
-def profile_ends(problem: Problem, x: FloatArray, places: Sequence[int],
+def profile_ends(problem: Problem, x: FloatArray, groups: Sequence[Sequence[int]],
                  covariances: Sequence[FloatArray]) -> FloatArray:
     """
     Return all numbers at both ends of the 95 % interval of some of them.
@@ -67,8 +69,10 @@ def profile_ends(problem: Problem, x: FloatArray, places: Sequence[int],
         With settled weights.
     x : numpy.ndarray, shape (K,)
         Its solution.
-    places : sequence of int, length P
-        Which numbers.
+    groups : sequence of sequence of int
+        Which numbers, P in all, those of one effect together. One of them on which nothing
+        depends at the solution may make room for the others where it is at its bound: from
+        there they are looked at again.
     covariances : sequence of numpy.ndarray, shape (K, K)
         By the likelihood first, then others by which numbers may be known less well.
 
@@ -79,16 +83,42 @@ def profile_ends(problem: Problem, x: FloatArray, places: Sequence[int],
     """
     slopes = _Slopes.at(problem, x)
     _, least = _fit(problem, x, -1, slopes)
-    found = np.empty((len(places), 2, x.size))
-    for row, place in enumerate(places):
-        widest = max(covariances, key=lambda c: float(c[place, place]))
-        variance = float(widest[place, place])
-        wanted = RISE_95 * variance / float(covariances[0][place, place])
-        for side, sign in enumerate((-1.0, 1.0)):
-            found[row, side] = _end(problem, x, place, slopes, least, wanted,
-                                    NORMAL_95 * math.sqrt(variance),
-                                    sign * widest[:, place] / variance)
-    return found
+
+    def widest(place: int) -> FloatArray:
+        return max(covariances, key=lambda c: float(c[place, place]))
+
+    def wanted(place: int) -> float:
+        """Return by how much the cost rises: more, where another covariance is wider."""
+        return RISE_95 * float(widest(place)[place, place] / covariances[0][place, place])
+
+    def end(start: FloatArray, at: _Slopes, place: int, sign: float) -> FloatArray:
+        own = widest(place)
+        variance = float(own[place, place])
+        return _end(problem, start, place, at, least, wanted(place),
+                    NORMAL_95 * math.sqrt(variance), sign * own[:, place] / variance)
+
+    def is_free(far: FloatArray, place: int) -> bool:
+        """Tell whether a number is at its bound, and the cost is still the least."""
+        return far[place] in (low[place], high[place]) and (
+            _cost(problem, far) - least < FLAT * RISE_95)
+
+    low, high = problem.bounds
+    found = [np.zeros((0, 2, x.size))]
+    for places in groups:
+        ends = np.array([[end(x, slopes, place, sign) for sign in SIGNS] for place in places])
+        starts = [far for place, pair in zip(places, np.array(ends)) for far in pair
+                  if is_free(far, place)]
+        for far in starts:
+            there = _Slopes.at(problem, far)
+            for (row, place), side in product(enumerate(places), (0, 1)):
+                known = ends[row, side, place]
+                if low[place] < known < high[place]:
+                    _, cost = _fit(problem, np.where(np.arange(x.size) == place, known, far),
+                                   place, there)
+                    if cost - least < NEARLY * wanted(place):
+                        ends[row, side] = end(far, there, place, SIGNS[side])
+        found.append(ends)
+    return np.concatenate(found)
 
 
 def _end(problem: Problem, x: FloatArray, place: int, slopes: '_Slopes', least: float,
@@ -127,6 +157,12 @@ def _end(problem: Problem, x: FloatArray, place: int, slopes: '_Slopes', least: 
     if math.isinf(outside) or outside <= start:
         return near
     return np.clip(near + (outside - inside) * way, low, high)
+
+
+def _cost(problem: Problem, x: FloatArray) -> float:
+    """Return the sum of the squared errors."""
+    residuals = problem.residuals(x)
+    return float(residuals @ residuals)
 
 
 class _Slopes(NamedTuple):
