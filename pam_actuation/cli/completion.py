@@ -33,7 +33,8 @@ REGULATOR = 'valve/regulators'
 LAW = 'muscle/laws', 'PAM_MUSCLE_LAWS_PATH', 'LAW'
 LOAD = 'load', 'PAM_LOADS_PATH', 'NAME'
 EFFECT = 'effects', 'PAM_EFFECTS_PATH', 'EFFECT'
-BUILT_IN = ('antagonistic_joint', 'hsv', 'ppr', 'sensors')      # models without a file each
+# What models have beside files of presets, laws, loads and effects.
+BUILT_IN = ('antagonistic_joint', 'bore', 'hsv', 'law', 'ppr', 'sensors')
 ASKED = '_ARGCOMPLETE'      # in the environment while a shell asks
 
 
