@@ -97,7 +97,9 @@ def _is_read(parameter: Parameter, rig: 'Rig', numbers: Numbers) -> bool:
     """Return whether an effect of the rig depends on a number of the other valve."""
     other = numbers._replace(parameters={
         **rig.parameters, parameter.name: 1.01 * rig.parameters[parameter.name] + 1e-9})
-    return any(repr(part(one.parameters, numbers)) != repr(part(one.parameters, other))
-               for one in rig.effects for effect in [get_effect(one.name)]
-               if effect.is_active(one.parameters, numbers)
-               for part in (effect.pack, effect.initial))
+    acting = [(one.parameters, effect) for one in rig.effects
+              for effect in [get_effect(one.name)] if effect.is_active(one.parameters, numbers)]
+    if parameter.name == 'V_dead' and any('pressure_rate' in e.hooks for _, e in acting):
+        return True         # the step gives this hook the volume
+    return any(repr(part(values, numbers)) != repr(part(values, other))
+               for values, effect in acting for part in (effect.pack, effect.initial))
