@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-The air of a physics step: its volume, and its pressure from its mass.
+The volume of the air, and its pressure where the volume depends on it.
 
 Arguments as in :mod:`pam_sim.rollout.step`.
 """
@@ -28,7 +28,6 @@ from pam_sim.rollout.layout import NOMINAL
 
 _TRIES = 60                 # of a solution for the pressure; three do as a rule
 _CLOSE = 1e-13              # of p V: when it is found
-_WARM_PASSES = 3            # temperature and volume in turn
 _SMALL = 1e-6               # of the pressure, for a slope
 
 
@@ -101,39 +100,3 @@ def pressure_of(energy: float, p: float, x: float, beyond: int, state: np.record
         if not low < p < high:
             p = 0.5 * (low + high) if high < math.inf else 2.0 * low
     return p
-
-
-@called
-def pressure_in_own_volume(mass: float, mass0: float, inflow: float, net: float, p: float,
-                           x: float, elapsed: float, warm: bool, beyond: int, state: np.record,
-                           par: np.record) -> float:
-    """Return the pressure [Pa] in a volume that depends on it; arguments of ``air_pressure``."""
-    rt = par.rt_j_per_kg
-    found = p
-    for _ in range(_WARM_PASSES if warm else 1):
-        if warm:
-            rt = hooks.air_rt(par.rt_j_per_kg, mass0, inflow, inflow - net, p, own_volume(
-                found, x, beyond, state, par), elapsed, beyond, state, par)
-        found = pressure_of(mass * rt, found, x, beyond, state, par)
-    return found
-
-
-@inlined
-def air_pressure(mass: float, mass0: float, inflow: float, net: float, p: float, x: float,
-                 volume: float, per_m3: float, elapsed: float, warm: bool, own: bool, beyond: int,
-                 state: np.record, par: np.record) -> float:
-    """
-    Return the pressure [Pa] of ``mass``, ``elapsed`` into a step.
-
-    The step began with ``mass0`` at pressure p. ``per_m3`` is 1 / V of a bore, which is known
-    before the flows are. ``warm`` tells that the temperature changes, ``own`` that the volume is
-    that of the law.
-    """
-    if own:
-        return pressure_in_own_volume(
-            mass, mass0, inflow, net, p, x, elapsed, warm, beyond, state, par)
-    density = par.rt_j_per_kg * per_m3                                     # Pa/kg
-    if warm:
-        density = hooks.air_rt(par.rt_j_per_kg, mass0, inflow, inflow - net, p, volume, elapsed,
-                               beyond, state, par) * per_m3
-    return mass * density

@@ -28,7 +28,7 @@ from pam_sim.annotations import FloatArray
 from pam_sim.compiled import allocating_entry_point, compiled, entry_point, source_key
 from pam_sim.errors import InputError
 from pam_sim.records import part, size_of
-from pam_sim.rollout import layout, physical, step as steps
+from pam_sim.rollout import forces, layout, physical, step as steps
 from pam_sim.rollout.dispatch import hooks
 from pam_sim.rollout.layout import (
     EFFECTS, INPUT, NOMINAL, OUTPUT, PARAMETERS, STATE, TERMS)
@@ -102,8 +102,8 @@ def _entries(key: int, beyond: int) -> Entries:
         if key < 0:
             return 0.0
         of_rig = part(state, 0, STATE)
-        return steps.map_tension(of_rig.pressure_pa, of_rig.contraction_m, beyond, of_rig,
-                                 part(par, 0, PARAMETERS))
+        return forces.map_tension(of_rig.pressure_pa, of_rig.contraction_m, beyond, of_rig,
+                                  part(par, 0, PARAMETERS))
 
     @entry_point
     def driven_force(tension: float, velocity: float, state: FloatArray,
@@ -113,7 +113,7 @@ def _entries(key: int, beyond: int) -> Entries:
             return 0.0, 0.0
         of_rig, numbers = part(state, 0, STATE), part(par, 0, PARAMETERS)
         p, x = of_rig.pressure_pa, of_rig.contraction_m
-        return (steps.muscle_force(tension, p, x, velocity, 0.0, 0.0, beyond, of_rig, numbers),
+        return (forces.muscle_force(tension, p, x, velocity, 0.0, 0.0, beyond, of_rig, numbers),
                 hooks.muscle_friction(0.0, p, x, velocity, beyond, of_rig, numbers))
 
     @allocating_entry_point
