@@ -59,8 +59,8 @@ class HiddenJointLoop(JointLoop):
         self._valve, self._hidden_seed = valve, hidden_seed
 
     def run_raw(self, controller, learn=True):
-        """Return a ``JOINT_LOG`` of ``mode_rollouts`` for every tick, shape (ticks,)."""
-        from pam_actuation.tuning.mode_rollouts import JOINT_LOG
+        """Return a ``JOINT_LOG`` of ``joint_rollouts`` for every tick, shape (ticks,)."""
+        from pam_actuation.tuning.joint_rollouts import JOINT_LOG
         plant = hidden_joint(self._valve, self._hidden_seed)
         controller.pause()
         log = np.empty(self.ticks * size_of(JOINT_LOG))

@@ -22,13 +22,14 @@ from typing import Any, TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
+from pam_actuation.control.modes.force import FORCE_INPUT
 from pam_actuation.control.modes.tracked import FORCE, Tracked, tracked_by
 from pam_actuation.tuning.closed_loop import Course, MuscleLoop
 from pam_actuation.tuning.loop_setup import fresh_rise, learning_mask, Learns
 from pam_actuation.tuning.mode_result import ModeResult
 from pam_sim.errors import InputError
 from pam_sim.load import LOADS
-from pam_sim.records import size_of
+from pam_sim.records import size_of, zeros
 
 if TYPE_CHECKING:
     from pam_actuation.control.modes.force import ForceController
@@ -120,19 +121,20 @@ class ForceLoop(MuscleLoop):
             self.experiment.cycles)
 
     def run_raw(self, controller: 'ForceController', learn: Learns = True) -> npt.NDArray[np.void]:
-        """Return a ``FORCE_LOG`` of ``mode_rollouts`` for every tick, shape (ticks,)."""
+        """Return a ``FORCE_LOG`` of ``force_rollouts`` for every tick, shape (ticks,)."""
         check_controller(controller, FORCE, self.rate_hz)
-        from pam_actuation.tuning import mode_rollouts      # brings the compiler with it
+        from pam_actuation.tuning import force_rollouts      # brings the compiler with it
         controller.pause()
-        log = np.empty(self.ticks * size_of(mode_rollouts.FORCE_LOG))
+        log = np.empty(self.ticks * size_of(force_rollouts.FORCE_LOG))
         mode, law = controller.compiled_arguments()
-        mode_rollouts.force_rollout(
+        raw = zeros(FORCE_INPUT)
+        force_rollouts.force_rollout(
+            self.ticks, (*mode, raw, controller.static_inverse, controller.law.input_array), law,
             self._fresh_plant(self._start_m), self.hsv, *self._fresh_driver(controller.driver),
             self._reference.rows(controller.lead_s), self._noise, self._quantum, self._way_m,
             learning_mask(controller, learn, self.ticks, self.rate_hz),
-            fresh_rise(self.slow_start, self.rate_hz), mode,
-            controller.static_inverse, law, controller.law.input_array, log)
-        return log.view(mode_rollouts.FORCE_LOG)
+            fresh_rise(self.slow_start, self.rate_hz), raw, log)
+        return log.view(force_rollouts.FORCE_LOG)
 
 
 def _made_of(rig: 'Rig', experiment: 'Experiment', contraction_m: Course | float | None,

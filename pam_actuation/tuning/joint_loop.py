@@ -24,6 +24,7 @@ from typing import Any, TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
+from pam_actuation.control.modes.joint import COMMANDS, JOINT_INPUT
 from pam_actuation.control.modes.tracked import JOINT
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.tuning.closed_loop import Course
@@ -190,20 +191,22 @@ class JointLoop:
             self.experiment.cycles)
 
     def run_raw(self, controller: 'JointController', learn: Learns = True) -> npt.NDArray[np.void]:
-        """Return a ``JOINT_LOG`` of ``mode_rollouts`` for every tick, shape (ticks,)."""
+        """Return a ``JOINT_LOG`` of ``joint_rollouts`` for every tick, shape (ticks,)."""
         check_controller(controller, JOINT, self.rate_hz)
-        from pam_actuation.tuning import mode_rollouts      # brings the compiler with it
+        from pam_actuation.tuning import joint_rollouts      # brings the compiler with it
         controller.pause()
         # Copies: several threads may track the experiment at the same time.
         plant = tuple(tuple(array.copy() for array in part) for part in self._plant.arrays)
-        log = np.empty(self.ticks * size_of(mode_rollouts.JOINT_LOG))
-        mode, law = controller.compiled_arguments()
-        mode_rollouts.joint_rollout(
-            plant, tuple(driver.hsv for driver in self._drivers),
+        log = np.empty(self.ticks * size_of(joint_rollouts.JOINT_LOG))
+        (par, state), law = controller.compiled_arguments()
+        raw = zeros(JOINT_INPUT)
+        joint_rollouts.joint_rollout(
+            self.ticks, (par, raw, controller.law.input_array), law, state, plant,
+            tuple(driver.hsv for driver in self._drivers),
             *self._fresh_drivers(controller.driver),
             self._reference.rows(controller.lead_s), self._noise,
             self._quantum, self._torque,
             learning_mask(controller, learn, self.ticks, self.rate_hz),
-            tuple(fresh_rise(self.slow_start, self.rate_hz) for _ in self._drivers), mode, law,
-            controller.law.input_array, log)
-        return log.view(mode_rollouts.JOINT_LOG)
+            tuple(fresh_rise(self.slow_start, self.rate_hz) for _ in self._drivers), raw,
+            zeros(COMMANDS), log)
+        return log.view(joint_rollouts.JOINT_LOG)
