@@ -28,9 +28,17 @@ from source_trees import statements
 
 ROOT = Path(__file__).resolve().parent.parent
 HIDDEN = ('build', 'install', 'log')        # of colcon, beside what begins with a dot
-SOURCES = sorted(
-    path for path in ROOT.rglob('*.py')
-    if not any(part.startswith('.') or part in HIDDEN for part in path.relative_to(ROOT).parts))
+
+
+def shown(part):
+    """Tell whether a part of a path is of the project."""
+    return not part.startswith('.') and part not in HIDDEN
+
+
+# The folder of an environment, with ten thousand files, is not entered.
+SOURCES = sorted([*ROOT.glob('*.py'), *(
+    path for top in ROOT.iterdir() if top.is_dir() and shown(top.name)
+    for path in top.rglob('*.py') if all(map(shown, path.relative_to(top).parts)))])
 HEADER = ''.join(
     f'{line}\n' for line in (ROOT / 'setup.py').read_text(encoding='utf-8').splitlines()[:13])
 # What ament_flake8 and ament_pep257 of ROS 2 Jazzy leave out, of the rules that Ruff has.
