@@ -14,6 +14,8 @@
 
 """What every test needs: a ROS graph of its own that never leaves this machine."""
 
+import contextlib
+import fcntl
 import gc
 import importlib.util
 import os
@@ -56,15 +58,29 @@ def pytest_collection_modifyitems(items):
             item.add_marker(pytest.mark.skip(reason='rclpy is not installed'))
 
 
+@contextlib.contextmanager
+def first_alone():
+    """Let one process do something before all others: it leaves the byte code of its imports."""
+    with open(__file__) as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            fcntl.flock(file, fcntl.LOCK_SH)
+            fcntl.flock(file, fcntl.LOCK_UN)        # nobody waits for those who waited
+        yield
+
+
 @pytest.hookimpl(hookwrapper=True)
-def pytest_collection():
+def pytest_collection(session):
     """
     Collect without a look for garbage: it takes a third of the time, and all of this stays.
 
     The tests then look for it more rarely: imports and compiled code stay as well.
     """
     gc.disable()
-    yield
+    is_worker = hasattr(session.config, 'workerinput')
+    with first_alone() if is_worker else contextlib.nullcontext():
+        yield
     gc.freeze()
     gc.set_threshold(20_000, 20, 50)
     gc.enable()
