@@ -141,9 +141,12 @@ class _Within(CPUDispatcher):     # type: ignore[misc]  # numba has no annotatio
     """
 
     def __call__(self, *args: object, **kwargs: object) -> object:
-        given = inspect.signature(self.py_func).bind(*args, **kwargs)
-        given.apply_defaults()
-        return self._called_from_python(*given.args)
+        # Loops call some at each tick: to bind the arguments takes ten times as long as the call.
+        if kwargs or len(args) != self.py_func.__code__.co_argcount:
+            given = inspect.signature(self.py_func).bind(*args, **kwargs)
+            given.apply_defaults()
+            args = given.args
+        return self._called_from_python(*args)
 
     @functools.cached_property
     def _called_from_python(self) -> Callable[..., object]:
