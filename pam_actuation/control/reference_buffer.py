@@ -198,10 +198,7 @@ class ReferenceBuffer:
 
     def uses_trajectory(self, now_ns: int) -> bool:
         """Return whether the trajectory is the one that counts now."""
-        if self._course is None or now_ns > self._course.times_ns[-1]:
-            return False
-        age_s = (now_ns - self._course.message.stamp_ns) * 1e-9
-        return age_s <= TRAJECTORY_LIFE_S or self._is_whole_movement()
+        return self._course is not None and now_ns <= self._counts_until_ns(self._course)
 
     def _is_whole_movement(self) -> bool:
         """Tell whether the trajectory was sent after the last reference."""
@@ -225,8 +222,15 @@ class ReferenceBuffer:
         if self.reference is not None:
             times.append(self.reference.stamp_ns)
         if self._course is not None:
-            times.append(self._course.times_ns[-1])
+            times.append(self._counts_until_ns(self._course))
         return max(times)
+
+    def _counts_until_ns(self, course: Course) -> int:
+        """Return until when a trajectory counts [ns]: its end, or less with a reference."""
+        end_ns = course.times_ns[-1]
+        if self._is_whole_movement():
+            return end_ns
+        return min(end_ns, course.message.stamp_ns + round(TRAJECTORY_LIFE_S * 1e9))
 
     def at(self, now_ns: int, time_ns: int) -> tuple[float, float]:
         """

@@ -18,9 +18,10 @@ from types import SimpleNamespace
 
 from pam_actuation.control.joint_setpoint import JointSetpoint
 from pam_actuation.control.loop import ControllerLoop
-from pam_actuation.control.reference_buffer import LOST, NONE, ReferenceBuffer
+from pam_actuation.control.modes.tracked import CONTRACTION, FORCE
+from pam_actuation.control.reference_buffer import FRESH, HELD, LOST, NONE, ReferenceBuffer
 from pam_actuation.messages import (
-    AngleReference, AngleTrajectory, Contraction, Reference, ReferenceTrajectory)
+    AngleReference, AngleTrajectory, Contraction, NamedEfforts, Reference, ReferenceTrajectory)
 from pam_actuation.nodes.refusals import RefusalLog
 from pam_sim.units import P_ATM_PA
 import pytest
@@ -155,3 +156,35 @@ def test_the_log_tells_a_reason_once_whatever_its_numbers():
     log.note('', 'a reference is stamped before the newest one', '')
     assert lines == ['a set point was refused: a reference is stamped 5.0 s ago',
                      'a set point was refused: a reference is stamped before the newest one']
+
+
+def states_after(last_ns, state_at):
+    return [state_at(last_ns + ms * MS) for ms in (500, 501, 2_000, 2_001, 30_000)]
+
+
+@pytest.mark.parametrize('tracked, field', [(CONTRACTION, 'contraction_m'), (FORCE, 'force_n')])
+def test_a_long_trajectory_that_was_replaced_does_not_hide_that_the_reference_is_lost(
+        tracked, field):
+    buffer = ReferenceBuffer(tracked)
+    buffer.set_trajectory(ReferenceTrajectory(
+        START, (0, 60_000 * MS), **{field: (0.005, 0.02)}))
+    buffer.judge(START)
+    assert buffer.state(START + 4_000 * MS) == FRESH        # a whole movement, to its end
+    last_ns = START + 5_000 * MS
+    buffer.set_reference(Reference(last_ns, **{'contraction_m': 0.01, field: 0.01}))
+    buffer.judge(last_ns)
+    assert states_after(last_ns, buffer.state) == [FRESH, HELD, HELD, LOST, LOST]
+
+
+def test_a_joint_follows_a_torque_where_the_reference_that_replaced_a_trajectory_is_old():
+    setpoint = JointSetpoint((-1.0, 1.0), 'knee', (1e5, 7e5))
+    setpoint.on_trajectory(AngleTrajectory(START, (0, 60_000 * MS), (0.0, 0.4), (0.0, 0.0)))
+    setpoint.begin(START, 0.0)
+    last_ns = START + 5_000 * MS
+    setpoint.references.set_reference(AngleReference(last_ns, -0.1, 0.0))
+    setpoint.begin(last_ns, 0.0)
+    assert states_after(last_ns, setpoint.references.state) == [FRESH, HELD, HELD, LOST, LOST]
+    later_ns = last_ns + 600 * MS
+    setpoint.on_efforts(NamedEfforts(later_ns, ('knee',), (0.05,)))
+    setpoint.begin(later_ns, 0.0)
+    assert setpoint.effort.follows and setpoint.efforts.refusal == ''
