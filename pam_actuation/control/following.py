@@ -38,6 +38,8 @@ _STANDS_NS = 200_000_000
 _INTRODUCED_NS = 5_000_000_000     # by then driver and controller have found each other
 _GAP_PA = 100_000.0
 _FILTER_S = 0.1             # of the pressure expected in the muscle
+# A driver that begins anew from the atmosphere tells less than the first, and fell by the second.
+_ANEW_PA, _FALL_PA = P_ATM_PA + 50_000.0, 20_000.0
 
 
 class CommandFollowing:
@@ -47,6 +49,15 @@ class CommandFollowing:
     One for each driver. A driver that never told is trusted, as long as the pressure that was
     measured before still is: a driver that supervises it vents without. In the first 5 s, while
     driver and controller may not have found each other, the measured pressure must come along.
+
+    Attributes
+    ----------
+    fell_ns : int or None
+        When the driver last fell to the atmosphere although pressure was commanded: it vented, or
+        heard that another node did. From there it rises slowly. None: it never did.
+    recovers : bool
+        Whether it has not met the commands since then.
+
     """
 
     def __init__(self) -> None:
@@ -61,11 +72,25 @@ class CommandFollowing:
         self._reading_pa = math.nan
         self._since_ns = 0
         self._expected_pa = math.nan
+        self.fell_ns: int | None = None
+        self.recovers = False
 
     def on_followed(self, message: 'Pressure') -> None:
         """Take the ``Pressure`` that the driver follows; atmosphere while it vents."""
-        if math.isfinite(message.pressure_pa):
-            self._followed = message
+        if not math.isfinite(message.pressure_pa):
+            return
+        before, self._followed = self._followed, message
+        if before is not None and self._sent:
+            self._note_fall(before.pressure_pa, message.pressure_pa, message.stamp_ns)
+
+    def _note_fall(self, before_pa: float, followed_pa: float, stamp_ns: int) -> None:
+        """Take note of a driver that begins anew from the atmosphere, or that has recovered."""
+        lowest_pa, _ = self._sent_before(stamp_ns)
+        short_pa = min(lowest_pa, self._sent[-1][1]) - followed_pa
+        if short_pa <= TOLERANCE_PA:
+            self.recovers = False
+        elif followed_pa < _ANEW_PA and min(short_pa, before_pa - followed_pa) > _FALL_PA:
+            self.fell_ns, self.recovers = stamp_ns, True
 
     @property
     def told(self) -> bool:

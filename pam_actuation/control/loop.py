@@ -407,10 +407,11 @@ class ControllerLoop:
     def _one_is_slack(self, now_ns: int) -> bool:
         """Return whether one of several muscles is without air although it should not be."""
         commanded_pa = self._commands_pa or self._core.vented_pa
-        one_told = any(muscle.following.told for muscle in self.muscles)
         # Into a list first: all are to be asked, also where the first one is slack.
-        slack = [muscle.slack.judge(now_ns, command_pa, muscle.pressure_pa, one_told)
-                 for muscle, command_pa in zip(self.muscles, commanded_pa)]
+        slack = [muscle.slack.judge(
+            now_ns, command_pa, muscle.pressure_pa,
+            [other.following for other in self.muscles if other is not muscle])
+            for muscle, command_pa in zip(self.muscles, commanded_pa)]
         return any(slack)
 
     def _stands_still(self, now_ns: int) -> bool:

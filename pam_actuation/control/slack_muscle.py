@@ -16,9 +16,12 @@
 Notices that one muscle of a joint is not under air although the controller wants it to be.
 
 Its driver may have vented it (emergency stop, lost sensor, device refusing) or has fallen silent,
-or its supply is gone. The other muscle alone would then pull the limb to its stop.
+or its supply is gone. The other muscle alone would then pull the limb to its stop. So it would
+while a driver that vented for a moment lets its muscle rise slowly from the atmosphere, unless
+both drivers vented together.
 """
 
+from collections.abc import Collection
 import math
 
 from pam_actuation.control.following import CommandFollowing
@@ -31,6 +34,7 @@ SLACK_PA = P_ATM_PA + 30_000.0      # measured at most
 AFTER_NS = 1_000_000_000            # a slow valve fills a large muscle beyond that in this time
 LOST_NS = 300_000_000               # its driver vents after 0.1 s
 VENTS_NS = 100_000_000              # beyond what a command needs to its driver
+TOGETHER_NS = 100_000_000           # two drivers that begin anew within this time rise together
 PROOF_PA = P_ATM_PA + 50_000.0      # turns a limb by a few degrees
 
 
@@ -64,7 +68,7 @@ class SlackMuscle:
         self._noticed_ns = 0
 
     def judge(self, now_ns: int, command_pa: float, pressure_pa: float,
-              others_told: bool = False) -> bool:
+              others: Collection[CommandFollowing] = ()) -> bool:
         """
         Take the newest reading; return whether the muscle is slack.
 
@@ -78,9 +82,9 @@ class SlackMuscle:
             Measured absolute pressure, NaN where none is fresh. Of a muscle whose pressure was
             never measured the word of its driver counts alone; one whose reading is lost
             counts as slack.
-        others_told : bool
-            Whether the driver of another muscle ever told what it follows. This one is then
-            expected to tell as well.
+        others : collection of CommandFollowing
+            Of the drivers of the other muscles. Where one of them ever told what it follows, this
+            one is expected to tell as well.
 
         """
         if math.isfinite(pressure_pa):
@@ -90,16 +94,24 @@ class SlackMuscle:
         if self._obeyed_ns is None or not vents:
             self._obeyed_ns = now_ns
         lost = self._measured_ns is not None and now_ns - self._measured_ns >= LOST_NS
-        silent = self._silent_ns(now_ns, others_told) >= LOST_NS
+        silent = self._silent_ns(now_ns, any(other.told for other in others)) >= LOST_NS
         if self.slack:
             if lost or silent:
                 self._noticed_ns = now_ns
             self.slack = now_ns - self._noticed_ns < RESUME_NS or not self._proven(pressure_pa)
         elif lost or silent or self._empty_ns >= AFTER_NS or (
-                now_ns - self._obeyed_ns >= VENTS_NS):
+                now_ns - self._obeyed_ns >= VENTS_NS) or self._rises_alone(now_ns, others):
             self.slack = True
             self._noticed_ns = now_ns
         return self.slack
+
+    def _rises_alone(self, now_ns: int, others: Collection[CommandFollowing]) -> bool:
+        """Return whether its driver began anew from the atmosphere, and another did not."""
+        fell_ns = self._following.fell_ns
+        if fell_ns is None or not self._following.recovers or now_ns - fell_ns < VENTS_NS:
+            return False
+        return any(other.fell_ns is None or abs(other.fell_ns - fell_ns) >= TOGETHER_NS
+                   for other in others)
 
     def _silent_ns(self, now_ns: int, others_told: bool) -> int:
         """Return for how long [ns] its driver has told nothing, although it does or should."""

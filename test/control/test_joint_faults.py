@@ -248,6 +248,49 @@ def test_a_fault_of_one_muscle_vents_both_until_it_has_ended(valve, key, side):
     comes_back(rig)
 
 
+def _gap(seconds):
+    def begin(rig, side):
+        _silent('pressure')[0](rig, side)
+        rig.run(seconds)
+        rig.spoil.clear()
+    return begin
+
+
+def _vented_elsewhere(rig, side):
+    """Let the watchdog vent for a moment and the driver hear of it."""
+    held = rig.plant.muscles[f'{side}/'].signal
+    held.take(rig.drivers[side].safe_signal(rig.now_ns), None, rig.now_ns)
+    rig.drivers[side].vented_elsewhere(rig.now_ns)
+
+
+@pytest.mark.parametrize('side', SIDES)
+@pytest.mark.parametrize('valve, begin', [
+    ('ppr', _gap(0.105)), ('ppr', _gap(0.115)), ('ppr', _gap(0.15)), ('ppr', _gap(0.2)),
+    ('hsv', _gap(0.115)), ('hsv', _gap(0.2)), ('ppr', _vented_elsewhere),
+    ('hsv', _vented_elsewhere)])
+def test_a_driver_that_vented_for_a_moment_does_not_rise_alone(valve, begin, side):
+    rig = under_pressure(valve)
+    before = len(rig.angle_rad)
+    begin(rig, side)
+    rig.run(0.2 + VENTED_WITHIN_S[valve])
+    assert max(rig.gauge_pa[-1]) < 10e3         # both
+    assert max(rig.angle_rad[before:]) < ANGLE_RAD + 0.2
+    rig.run(VENTED_LEAST_S)
+    comes_back(rig)
+
+
+@pytest.mark.parametrize('valve', ['ppr', 'hsv'])
+def test_drivers_that_vented_together_for_a_moment_rise_together(valve):
+    rig = under_pressure(valve)
+    rig.stopped.add('controller')
+    rig.run(0.15)
+    rig.stopped.clear()
+    rig.run(3.0)
+    assert all('command_timeout' in rig.faults[side] for side in SIDES)
+    assert set(rig.reasons) == {codes.REASONS[codes.OK]}
+    assert abs(rig.angle_rad[-1] - ANGLE_RAD) < 0.05
+
+
 @pytest.mark.parametrize('valve, key, side', cases(FROM_THE_START))
 def test_a_joint_of_which_one_driver_does_not_follow_does_not_begin(valve, key, side):
     begin, end = FROM_THE_START[key]
