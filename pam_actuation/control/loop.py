@@ -224,6 +224,12 @@ class ControllerLoop:
         """Return the number of references and trajectories that were not usable."""
         return self.setpoint.refused
 
+    def values(self) -> tuple[tuple[str, object], ...]:
+        """Return what the diagnostics tell of what is asked for and of the muscles of a joint."""
+        faults = [(f'{muscle.side}.fault', muscle.slack.why) for muscle in self.muscles
+                  if muscle.side]
+        return (*self.setpoint.values(), *faults)
+
     def takes(self) -> dict[str, Callable[[Any], object]]:
         """Return what takes each topic, by name relative to the namespace of the rig."""
         return dict(self._takes)
@@ -283,6 +289,10 @@ class ControllerLoop:
                 self.reason += f'; {remark}'
         elif inputs.reason == codes.TWO_SENSORS:
             self.reason = f'{self.reason}: {self.two_sensors}'
+        elif inputs.reason == codes.MUSCLE_SLACK:
+            self.reason = f'{self.reason}: ' + '; '.join(
+                f'{muscle.side}, {muscle.slack.why}' for muscle in self.muscles
+                if muscle.slack.slack)
         self.state = ControllerState(now_ns, self._core.names, values)
         return tuple(commands), self.state
 

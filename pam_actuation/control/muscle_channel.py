@@ -41,6 +41,8 @@ class MuscleChannel:
 
     Attributes
     ----------
+    side : str
+        Which muscle of a joint it is; '' for the only one.
     pressure_ns, pressure_pa, force_ns, force_n
         Stamp and value of what was measured, absolute pressure and pull; -1, NaN where it is
         missing, stale or not finite.
@@ -52,7 +54,7 @@ class MuscleChannel:
     """
 
     def __init__(self, place: str, rise: SlowRise) -> None:
-        self.place = place
+        self.place, self.side = place, place.rstrip('/')
         self.rise = rise
         self.following = CommandFollowing()
         self.slack = SlackMuscle(self.following)

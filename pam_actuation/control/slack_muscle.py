@@ -51,6 +51,13 @@ class SlackMuscle:
     following : CommandFollowing
         Of the muscle's driver.
 
+    Attributes
+    ----------
+    slack : bool
+        As of the last ``judge``.
+    why : str
+        What is wrong with the muscle while it is slack, else ''.
+
     """
 
     def __init__(self, following: CommandFollowing) -> None:
@@ -59,7 +66,7 @@ class SlackMuscle:
 
     def forget(self) -> None:
         """Begin anew, as before the first reading."""
-        self.slack = False
+        self.slack, self.why = False, ''
         self._measured_ns: int | None = None     # newest fresh reading
         self._judged_ns: int | None = None
         self._empty_ns = 0          # how long it was wanted under air and was not
@@ -90,20 +97,32 @@ class SlackMuscle:
         if math.isfinite(pressure_pa):
             self._measured_ns = now_ns
         self._count(now_ns, command_pa, pressure_pa)
-        vents = self._following.vents(now_ns)
-        if self._obeyed_ns is None or not vents:
+        if self._obeyed_ns is None or not self._following.vents(now_ns):
             self._obeyed_ns = now_ns
         lost = self._measured_ns is not None and now_ns - self._measured_ns >= LOST_NS
         silent = self._silent_ns(now_ns, any(other.told for other in others)) >= LOST_NS
-        if self.slack:
-            if lost or silent:
-                self._noticed_ns = now_ns
-            self.slack = now_ns - self._noticed_ns < RESUME_NS or not self._proven(pressure_pa)
-        elif lost or silent or self._empty_ns >= AFTER_NS or (
-                now_ns - self._obeyed_ns >= VENTS_NS) or self._rises_alone(now_ns, others):
-            self.slack = True
-            self._noticed_ns = now_ns
+        why = ''
+        if lost:
+            why = f'its pressure has not been measured for {LOST_NS * 1e-9:g} s'
+        elif silent:
+            why = f'its driver has been silent for {LOST_NS * 1e-9:g} s'
+        elif not self.slack:
+            why = self._found(now_ns, others)
+        if why:
+            self.slack, self.why, self._noticed_ns = True, why, now_ns
+        elif self.slack and now_ns - self._noticed_ns >= RESUME_NS and self._proven(pressure_pa):
+            self.slack, self.why = False, ''
         return self.slack
+
+    def _found(self, now_ns: int, others: Collection[CommandFollowing]) -> str:
+        """Return what is wrong with a muscle that was sound until now, '' for nothing."""
+        if self._obeyed_ns is not None and now_ns - self._obeyed_ns >= VENTS_NS:
+            return 'its driver vents although pressure is commanded'
+        if self._rises_alone(now_ns, others):
+            return 'its driver vented and begins anew from the atmosphere'
+        if self._empty_ns >= AFTER_NS:
+            return f'it gets no air although {(WANTED_PA - P_ATM_PA) * 1e-3:g} kPa are commanded'
+        return ''
 
     def _rises_alone(self, now_ns: int, others: Collection[CommandFollowing]) -> bool:
         """Return whether its driver began anew from the atmosphere, and another did not."""

@@ -66,8 +66,7 @@ REASONS = (
     'contraction stands still although the pressure changed: sensor frozen or muscle blocked',
     'force stands still although the pressure changed: sensor frozen',
     'joint angle stands still although the pressures changed: sensor frozen or joint blocked',
-    'a muscle is not under air although it should be, or its pressure or driver is lost: '
-    'both vented',
+    'one muscle is at fault, both vented',
     'what is tracked is measured twice, vented',
     'the controller estimated or commanded what is impossible, vented')
 RUNNING = (OK, REFERENCE_HELD)      # reasons with which the controller runs

@@ -188,9 +188,9 @@ class ControllerNode(ManagedNode):
         self.diagnostics.update(level, says)
 
     def diagnostic_values(self) -> Values:
-        """Add set points that were refused."""
+        """Add set points that were refused, and what is wrong with each muscle of a joint."""
         values = super().diagnostic_values()
-        return values if self.loop is None else (*values, *self.loop.setpoint.values())
+        return values if self.loop is None else (*values, *self.loop.values())
 
     def safe_stop(self, why: str) -> None:
         """Command atmospheric pressure: the drivers vent."""
