@@ -19,9 +19,9 @@ import math
 from typing import NamedTuple, TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from pam_actuation.messages import AngleTrajectory, ReferenceTrajectory
+    from pam_actuation.messages import AngleTrajectory, NamedTrajectory, ReferenceTrajectory
 
-    Trajectory = ReferenceTrajectory | AngleTrajectory
+    Trajectory = ReferenceTrajectory | AngleTrajectory | NamedTrajectory
 
 
 class Course(NamedTuple):
@@ -30,7 +30,7 @@ class Course(NamedTuple):
 
     Parameters
     ----------
-    message : ReferenceTrajectory or AngleTrajectory
+    message : ReferenceTrajectory, AngleTrajectory or NamedTrajectory
     times_ns : tuple of int
         When each point holds.
     values : tuple of float
@@ -65,7 +65,7 @@ class Course(NamedTuple):
         v0, v1 = self._rate(i, math.nan), self._rate(after, math.nan)
         if math.isnan(v0) or math.isnan(v1):
             return x0 + (x1 - x0) * part, (x1 - x0) / span_s
-        if abs((x1 - x0) / span_s - 0.5 * (v0 + v1)) > jump_per_s:
+        if _is_jump(x1 - x0, span_s, v0, v1, jump_per_s):
             return x0 + v0 * part * span_s, v0
         a, b = span_s * v0 - (x1 - x0), (x1 - x0) - span_s * v1
         bend = part * (1.0 - part) * ((1.0 - part) * a + part * b)
@@ -73,9 +73,49 @@ class Course(NamedTuple):
                  + part * (1.0 - part) * (b - a))
         return x0 + (x1 - x0) * part + bend, ((x1 - x0) + slope) / span_s
 
+    def beyond(self, lower: float, upper: float, jump_per_s: float) -> tuple[int, float] | None:
+        """
+        Return when it first leaves a range between its points, and to what value; None: never.
+
+        Its points lie within the range; where they are joined by straight lines, so does the rest.
+        """
+        times, values = self.times_ns, self.values
+        for i, (x0, x1) in enumerate(zip(values, values[1:])):
+            v0, v1 = self._rate(i, math.nan), self._rate(i + 1, math.nan)
+            span_s = (times[i + 1] - times[i]) * 1e-9
+            # A cubic stays within the hull of its four control points.
+            hull = x0 + span_s * v0 / 3.0, x0 + span_s * v0, x1 - span_s * v1 / 3.0
+            if math.isnan(v0 + v1) or lower <= min(hull) <= max(hull) <= upper:
+                continue
+            a, b = span_s * v0 - (x1 - x0), (x1 - x0) - span_s * v1
+            parts = sorted(_zeros(3.0 * (a - b), 2.0 * (b - 2.0 * a), span_s * v0))
+            if _is_jump(x1 - x0, span_s, v0, v1, jump_per_s):
+                parts = [1.0 - 1e-9]        # it is farthest out just before
+            for part in parts:
+                time_ns = times[i] + int(part * (times[i + 1] - times[i]))
+                value, _ = self.at(time_ns, jump_per_s)
+                if not lower <= value <= upper:
+                    return time_ns, value
+        return None
+
     def _rate(self, index: int, missing: float = 0.0) -> float:
         """Return the rate of a point, ``missing`` where there is none."""
         rates = self.rates
         if index < len(rates) and math.isfinite(rates[index]):
             return rates[index]
         return missing
+
+
+def _is_jump(change: float, span_s: float, v0: float, v1: float, jump_per_s: float) -> bool:
+    """Return whether a change is more than the rates before and after it explain."""
+    return abs(change / span_s - 0.5 * (v0 + v1)) > jump_per_s
+
+
+def _zeros(square: float, linear: float, constant: float) -> list[float]:
+    """Return where between 0 and 1 a polynomial of second order is zero."""
+    root = linear * linear - 4.0 * square * constant
+    if root < 0.0:
+        return []
+    far = -0.5 * (linear + math.copysign(math.sqrt(root), linear))
+    zeros = [top / bottom for top, bottom in ((far, square), (constant, far)) if bottom != 0.0]
+    return [zero for zero in zeros if 0.0 < zero < 1.0]

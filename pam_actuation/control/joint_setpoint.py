@@ -130,10 +130,9 @@ class JointSetpoint:
                 reference_buffer.FRESH, reference_buffer.HELD):
             present_rad = references.at(now_ns, now_ns)[0]
         try:
-            references.set_trajectory(angle_trajectory(
+            return references.set_trajectory(angle_trajectory(
                 message.stamp_ns, message.names, message.points, self._name, self._range, now_ns,
                 present_rad))
-            return True
         except InputError as error:
             self.refusal = str(error)
             self._refused_trajectories += 1

@@ -23,6 +23,7 @@ present angle. Points without rates are joined by straight lines. No ROS inside.
 from collections.abc import Sequence
 import math
 
+from pam_actuation.control.modes.tracked import JOINT
 from pam_actuation.messages import AngleTrajectory
 from pam_sim.errors import InputError
 
@@ -63,7 +64,7 @@ def angle_trajectory(stamp_ns: int, names: tuple[str, ...], points: Sequence[Poi
     ------
     InputError
         Another joint, no points, lengths that do not fit, times that do not rise or lie in the
-        past, angles that are not finite or out of range.
+        past, angles that are not finite or out of range, rates that no joint has.
 
     """
     column = _column(names, joint)
@@ -85,9 +86,14 @@ def angle_trajectory(stamp_ns: int, names: tuple[str, ...], points: Sequence[Poi
             raise InputError(
                 f'position {angle:g} rad is outside what the joint can do, {lower:g} to '
                 f'{upper:g} rad', where)
+        rate = velocities[column] if len(velocities) else math.nan
+        if abs(rate) > JOINT.fastest and math.isfinite(rate):
+            raise InputError(
+                f'velocity {rate:g} rad/s is beyond what a joint does, {-JOINT.fastest:g} to '
+                f'{JOINT.fastest:g} rad/s', where)
         times.append(time_ns)
         angles.append(min(max(angle, lower), upper))
-        rates.append(velocities[column] if len(velocities) else math.nan)
+        rates.append(rate)
     if not times:
         raise InputError('has no points', WHERE)
     if begin_ns + times[-1] < now_ns:

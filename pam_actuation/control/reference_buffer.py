@@ -24,8 +24,8 @@ is interpolated (cubic through positions and rates). Rules:
   a jump. The first point then holds until the time of the second, so the controller sees a jump
   and not a steep ramp. One that is newer than any ``reference`` is a whole movement, sent once: it
   counts to its end.
-* Otherwise the newest ``reference`` counts. Its rate is trusted for ``TRUST_S``, after
-  that the position stands still; the preview fades out until ``LOST_S``.
+* Otherwise the newest ``reference`` counts. Its rate is trusted for ``TRUST_S``, within the
+  allowed values; after that the position stands still; the preview fades out until ``LOST_S``.
 * After ``LOST_S`` without either the reference is lost. The last position is held with zero rate
   until ``HOLD_S``. Then there is none and the muscle must be vented. A new message resumes at
   once.
@@ -78,6 +78,7 @@ class ReferenceBuffer:
         points of a trajectory it is that of the line through them.
     allowed : tuple of float
         Lowest and highest value; a message that asks for more is refused, not followed half way.
+        So is one with a rate beyond ``tracked.fastest``.
 
     Attributes
     ----------
@@ -90,10 +91,11 @@ class ReferenceBuffer:
 
     def __init__(self, tracked: Tracked = CONTRACTION,
                  allowed: tuple[float, float] = (-math.inf, math.inf)) -> None:
-        self._values = ReferenceValues(tracked, allowed)
+        self._jump_per_s = JUMP_PER_S[tracked]
+        self._values = ReferenceValues(tracked, allowed, self._jump_per_s)
+        self._allowed = allowed
         self.refused = 0
         self.refusal = ''
-        self._jump_per_s = JUMP_PER_S[tracked]
         self._motion = ReferenceMotion(SCALES[tracked])
         self.clear()
 
@@ -131,14 +133,13 @@ class ReferenceBuffer:
         """
         Take a ``ReferenceTrajectory``; an unusable one is ignored and False returned.
 
-        Usable: at least one point, equal lengths, allowed values, times strictly rising.
+        Usable: at least one point, equal lengths, allowed values and rates, also between the
+        points, times strictly rising.
         """
         why = self._values.why_not_trajectory(message)
         if why:
             return self._refuse(why)
-        times = tuple(message.stamp_ns + offset for offset in message.time_from_start_ns)
-        self._course = Course(
-            message, times, self._values.of(message), self._values.rate_of(message, ()))
+        self._course = self._values.course(message)
         self._arrived_courses.append(self._course)
         return True
 
@@ -254,6 +255,9 @@ class ReferenceBuffer:
         trusted_s = min(age_s, TRUST_S)
         fade = min(max((LOST_S - age_s) / (LOST_S - TRUST_S), 0.0), 1.0)
         position, rate = self._motion.at(reference.stamp_ns + round(trusted_s * 1e9))
+        lower, upper = self._allowed
+        if not lower <= position <= upper:      # nobody asked for that; its rate led there
+            return min(max(position, lower), upper), 0.0
         return position + rate * ahead_s * fade, rate * fade
 
 

@@ -22,6 +22,7 @@ ROS type calls them. One of the other kind has nothing for the controller.
 import math
 from typing import Any, NamedTuple
 
+from pam_actuation.control.course import Course
 from pam_actuation.control.modes.tracked import CONTRACTION, FORCE, JOINT, Tracked
 
 
@@ -51,13 +52,17 @@ class ReferenceValues:
     tracked : Tracked
     allowed : tuple of float
         Lowest and highest value.
+    jump_per_s : float
+        As of ``Course``.
 
     """
 
-    def __init__(self, tracked: Tracked, allowed: tuple[float, float]) -> None:
+    def __init__(self, tracked: Tracked, allowed: tuple[float, float],
+                 jump_per_s: float = math.inf) -> None:
         self._kind, self._unit = _KINDS[tracked], _UNITS[tracked]
         self._follows = 'an angle' if tracked == JOINT else f'a {tracked.mode}'
         self._lower, self._upper = allowed
+        self._fastest, self._jump_per_s = tracked.fastest, jump_per_s
 
     def of(self, message: Any) -> Any:
         """Return what a message asks for: a number, of a trajectory a tuple of them."""
@@ -72,7 +77,8 @@ class ReferenceValues:
         other = self._kind.other
         if math.isnan(self.of(message)) and other and math.isfinite(getattr(message, other)):
             return self._wrong_kind('a reference')
-        return self._unusable('a reference', self.of(message))
+        return self._unusable('a reference', self.of(message)) or self._too_fast(
+            'a reference', self.rate_of(message, math.nan))
 
     def why_not_trajectory(self, message: Any) -> str:
         """Return why a trajectory is not usable, '' if it is."""
@@ -88,7 +94,32 @@ class ReferenceValues:
                 return f'the time_from_start of a trajectory does not rise at points[{k + 1}]'
         whys = (self._unusable(f'points[{k}] of a trajectory', value)
                 for k, value in enumerate(values))
-        return next(filter(None, whys), '')
+        fast = (self._too_fast(f'points[{k}] of a trajectory', rate)
+                for k, rate in enumerate(self.rate_of(message, ())))
+        return next(filter(None, (*whys, *fast)), '') or self._leads_beyond(message)
+
+    def course(self, message: Any) -> Course:
+        """Return a trajectory with its points one by one."""
+        times = tuple(message.stamp_ns + offset for offset in message.time_from_start_ns)
+        return Course(message, times, self.of(message), self.rate_of(message, ()))
+
+    def _leads_beyond(self, message: Any) -> str:
+        """Return where the rates of a trajectory lead out of what is allowed, '' if nowhere."""
+        beyond = self.course(message).beyond(self._lower, self._upper, self._jump_per_s)
+        if beyond is None:
+            return ''
+        time_ns, value = beyond
+        return (f'the velocities of a trajectory lead to {self._kind.ros} {value:g} {self._unit} '
+                f'at time_from_start {(time_ns - message.stamp_ns) * 1e-9:.3f} s, which is not '
+                f'within {self._lower:g} to {self._upper:g} {self._unit}')
+
+    def _too_fast(self, what: str, rate: float) -> str:
+        """Return why a rate is not usable, '' if it is, or is not told."""
+        if abs(rate) <= self._fastest or not math.isfinite(rate):
+            return ''
+        unit = f'{self._unit}/s'
+        return (f'{what} has velocity {rate:g} {unit}, which is not within '
+                f'{-self._fastest:g} to {self._fastest:g} {unit}')
 
     def _wrong_kind(self, what: str) -> str:
         kind = self._kind

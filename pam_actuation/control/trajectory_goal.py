@@ -23,6 +23,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 
+from pam_actuation.control.course import Course
+from pam_actuation.control.joint_trajectory import TOLERANCE_RAD
+from pam_actuation.control.modes.tracked import JOINT
 from pam_actuation.messages import AngleTrajectory, NamedTrajectory
 
 # As in control_msgs/action/FollowJointTrajectory.
@@ -207,8 +210,9 @@ def goal_of(trajectory: NamedTrajectory, limits: Limits, now_ns: int, from_rad: 
     Raises
     ------
     GoalRefused
-        Another joint, points that do not fit, an angle outside the stops, a trajectory that
-        is over, a tolerance of what is not measured.
+        Another joint, points that do not fit, an angle outside the stops, also between the
+        points, a velocity that no joint has, a trajectory that is over, a tolerance of
+        what is not measured.
 
     """
     if tuple(trajectory.names) != (limits.joint,):
@@ -229,9 +233,18 @@ def goal_of(trajectory: NamedTrajectory, limits: Limits, now_ns: int, from_rad: 
     arrive_s = goal_time_s if goal_time_s > 0.0 else limits.goal_time_s
     # What lies in the past is left out; the joint begins where it is, with a rate given for now.
     starts = coming > 0 and times[coming - 1] == now_ns
+    course = Course(
+        trajectory, (now_ns, *(max(one, now_ns + 1) for one in times[coming:])),
+        (from_rad, *angles[coming:]),
+        (rates[coming - 1] if starts else math.nan, *rates[coming:]))
+    lower, upper = limits.range_rad
+    beyond = course.beyond(lower - TOLERANCE_RAD, upper + TOLERANCE_RAD, math.inf)
+    if beyond is not None:
+        raise GoalRefused(INVALID_GOAL, f'the velocities lead to {beyond[1]:g} rad at '
+                          f'time_from_start {(beyond[0] - begin_ns) / NS:.3f} s; the stops allow '
+                          f'{lower:g} to {upper:g} rad')
     return JointGoal(
-        (now_ns, *(max(one, now_ns + 1) for one in times[coming:])), (from_rad, *angles[coming:]),
-        (rates[coming - 1] if starts else math.nan, *rates[coming:]),
+        course.times_ns, course.values, course.rates,
         _tolerance(path, limits.joint, limits.path_rad, 'path'),
         _tolerance(goal, limits.joint, limits.goal_rad, 'goal'),
         max(times[-1], now_ns) + round(arrive_s * NS))
@@ -256,8 +269,9 @@ def _checked_points(trajectory: NamedTrajectory,
         if not lower - SLACK_RAD <= angle <= upper + SLACK_RAD:     # NaN neither
             raise GoalRefused(INVALID_GOAL, f'{place} is at {angle:g} rad; the stops allow '
                               f'{lower:g} to {upper:g} rad')
-        if velocities and not math.isfinite(rate):
-            raise GoalRefused(INVALID_GOAL, f'{place} has the velocity {rate:g} rad/s')
+        if velocities and not abs(rate) <= JOINT.fastest:
+            raise GoalRefused(INVALID_GOAL, f'{place} has the velocity {rate:g} rad/s; allowed '
+                              f'are {-JOINT.fastest:g} to {JOINT.fastest:g} rad/s')
         angles.append(min(max(angle, lower), upper))
         rates.append(rate)
         before_ns = after_ns

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import math
 from typing import Any, TYPE_CHECKING
 
+from pam_actuation.control.modes import tracked
 from pam_actuation.experiments.primitives import make_primitive
 from pam_sim.errors import InputError
 from pam_sim.units import allowed_range, P_ATM_PA
@@ -54,9 +55,9 @@ class Domain:
 
 # In a file: hsv_duty above 0 is the duty of the filling valve, below 0 of the venting one.
 DOMAINS = {d.name: d for d in (
-    Domain('contraction', 'm', 0.0, 0.0, 0.25, 1.0),
-    Domain('force', 'n', 0.0, 0.0, 10_000.0, 1e5),
-    Domain('joint_angle', 'rad', 0.0, -3.15, 3.15, 50.0),
+    Domain('contraction', 'm', 0.0, 0.0, 0.25, tracked.CONTRACTION.fastest),
+    Domain('force', 'n', 0.0, 0.0, 10_000.0, tracked.FORCE.fastest),
+    Domain('joint_angle', 'rad', 0.0, -3.15, 3.15, tracked.JOINT.fastest),
     Domain('pressure', 'pa', P_ATM_PA, P_ATM_PA, 1_300_000.0, 2e7),
     Domain('ppr_voltage', 'v', 0.0, 0.0, 12.0, 200.0),      # a rig: to its ppr_highest_v
     Domain('hsv_duty', 'duty', -1.0, -1.0, 1.0, 100.0),

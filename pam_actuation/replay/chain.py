@@ -77,6 +77,8 @@ class ChainReplay:
     ``stamp_ns``, ``recorded`` and ``replayed`` map ``topic.field`` to arrays of equal length,
     SI; ``rig`` is the name of the simulated rig, ``start_ns`` the first stamp of the run.
     ``tracking`` says how well the reference was tracked, where a whole experiment is repeated.
+    ``refused`` counts the references and trajectories that the controller refused, ``refusals``
+    says why the newest of each kind.
     """
 
     rig: str
@@ -85,6 +87,8 @@ class ChainReplay:
     replayed: dict[str, FloatArray]
     start_ns: int
     tracking: tuple[Tracking, ...] = ()
+    refused: int = 0
+    refusals: tuple[str, ...] = ()
 
     @property
     def differences(self) -> list[Difference]:
@@ -102,6 +106,7 @@ class ChainReplay:
         """Return plain data for ``--json``."""
         return {'rig': self.rig, 'identical': self.identical,
                 'tracking': [one.to_dict() for one in self.tracking],
+                'references_refused': self.refused, 'refusals': list(self.refusals),
                 'signals': [one.to_dict() for one in self.differences]}
 
     def lines(self) -> list[str]:
@@ -109,7 +114,9 @@ class ChainReplay:
         what = f'controller, driver and {self.rig} in a closed loop on the recorded reference'
         if not any('pressure_command' in name for name in self.recorded):
             what = f'driver and {self.rig} on the recorded commands'
-        return [f'chain: {what}', *(one.line() for one in self.tracking),
+        refused = [f'  remark: {self.refused} references or trajectories were refused: '
+                   f'{"; ".join(self.refusals)}'] if self.refused else []
+        return [f'chain: {what}', *refused, *(one.line() for one in self.tracking),
                 *(one.line() for one in self.differences)]
 
     def arrays(self) -> dict[str, IntArray | FloatArray]:
@@ -162,9 +169,11 @@ class RepeatedLoops:
             self._measure = attach_plant(self.bus, PlantLoop(rig, seed))
         self._drive = {place: signal_tick(self.bus, driver, place)
                        for place, driver in self._drivers.items()}
+        self._control_loop: ControllerLoop | None = None
         self._decide: Callable[[int, bool], None] | None = None
         if controller is not None and 'controller' in parts:
-            control = ControllerLoop(controller, rig, name, nearly_in(changes or {}))
+            self._control_loop = control = ControllerLoop(
+                controller, rig, name, nearly_in(changes or {}))
             attach(self.bus, control)
             self._decide = controller_tick(self.bus, control)
         self._sensors = tuple(f'{place}{topic}' for place in rig.muscles for topic in SENSORS)
@@ -253,6 +262,14 @@ class RepeatedLoops:
         columns[1].append(recorded)
         columns[2].append(replayed)
 
+    @property
+    def refused(self) -> tuple[int, tuple[str, ...]]:
+        """Return how many references the controller refused, and why the newest of each kind."""
+        if self._control_loop is None:
+            return 0, ()
+        setpoint = self._control_loop.setpoint
+        return setpoint.refused, tuple(filter(None, setpoint.refusals))
+
     def signals(
             self) -> tuple[dict[str, IntArray], dict[str, FloatArray], dict[str, FloatArray]]:
         """Return stamps, recorded and replayed numbers by name of the signal, as arrays."""
@@ -306,7 +323,7 @@ def replay_chain(run: Run,
                           changes=as_recorded(run.metadata, run.path))
     chain.run(recorded)
     signals = chain.signals()
-    return ChainReplay(rig.name, *signals, run.start_ns, tracking(run, *signals))
+    return ChainReplay(rig.name, *signals, run.start_ns, tracking(run, *signals), *chain.refused)
 
 
 def recorded_seed(run: Run) -> int:

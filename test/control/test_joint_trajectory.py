@@ -16,10 +16,11 @@
 
 import math
 
+from pam_actuation.control.joint_setpoint import JointSetpoint
 from pam_actuation.control.joint_trajectory import angle_trajectory
 from pam_actuation.control.modes.tracked import JOINT
-from pam_actuation.control.reference_buffer import FRESH, HELD, LOST, ReferenceBuffer
-from pam_actuation.messages import AngleReference
+from pam_actuation.control.reference_buffer import FRESH, HELD, LOST, NONE, ReferenceBuffer
+from pam_actuation.messages import AngleReference, NamedTrajectory
 from pam_sim.errors import InputError
 import pytest
 
@@ -95,7 +96,21 @@ def test_a_whole_movement_counts_to_its_end_although_references_came_before():
     ({'points': POINTS[::-1]}, 'does not rise'),
     ({'points': ((0, (0.1, 1.5), ()),)}, '1.5 rad is outside'),
     ({'points': ((0, (0.1, math.nan), ()),)}, 'nan rad is outside'),
+    ({'points': ((0, (0.1, 0.1), (0.0, 57.3)),)},
+     r'points\[0\]: velocity 57.3 rad/s is beyond what a joint does, -20 to 20 rad/s'),
     ({'stamp_ns': NOW_NS - 200 * MS}, 'in the past')])
 def test_what_is_wrong_is_said(change, words):
     with pytest.raises(InputError, match=words):
         taken(**change)
+
+
+def test_a_joint_refuses_a_trajectory_whose_velocities_lead_beyond_its_stops():
+    setpoint = JointSetpoint((-1.0, 1.0), 'right', (1e5, 7e5))
+    for points in (((0, (0.9,), (1.5,)), (1000 * MS, (0.9,), (-1.5,))),
+                   ((100 * MS, (0.9,), (1.5,)), (1100 * MS, (0.9,), (-1.5,)))):
+        setpoint.on_trajectory(NamedTrajectory(NOW_NS, ('right',), points))
+        setpoint.begin(NOW_NS, 0.0)
+    assert setpoint.references.state(NOW_NS) == NONE and setpoint.refused == 2
+    assert dict(setpoint.values())['references.refusal'] == (
+        'the velocities of a trajectory lead to position 1.275 rad at time_from_start 0.600 s, '
+        'which is not within -1.02 to 1.02 rad')

@@ -134,6 +134,9 @@ def test_a_goal_that_is_stopped_stands_where_it_was_to_be():
     ([(1.0, 1.2)], {}, INVALID_GOAL, 'at 1.2 rad; the stops allow -0.5 to 1 rad'),
     ([(1.0, NAN)], {}, INVALID_GOAL, 'at nan rad'),
     ([(1.0, 0.2, math.inf)], {}, INVALID_GOAL, 'the velocity inf'),
+    ([(1.0, 0.2, -57.3)], {}, INVALID_GOAL, 'velocity -57.3 rad/s; allowed are -20 to 20 rad/s'),
+    ([(1.0, 0.9, 1.5), (2.0, 0.9, -1.5)], {}, INVALID_GOAL,
+     'lead to 1.275 rad at time_from_start 1.500 s; the stops allow -0.5 to 1 rad'),
     ([(1.0, 0.2, 0.0, 0.0)], {}, INVALID_GOAL, '1 positions and 2 velocities'),
     ([(1.0, 0.2)], {'stamp_ns': NOW_NS - 3 * NS}, OLD_HEADER_TIMESTAMP, '2.000 s ago'),
     ([(4000.0, 0.2)], {}, INVALID_GOAL, 'ends in 4000 s; allowed are 3600 s')])

@@ -229,6 +229,27 @@ def test_a_joint_moved_without_references_is_repeated(messages, tmp_path, monkey
     assert replay_joint(run, chain=True).parts['chain'].identical
 
 
+def test_the_chain_tells_of_references_that_are_refused(tmp_path, monkeypatch, capsys):
+    joint = load_joint('joint_dmsp_5_300_realistic', valve='ppr')
+    in_degrees = AngleTrajectory(
+        0, TRAJECTORY.time_from_start_ns, TRAJECTORY.angle_rad, (0.0, 57.3))
+    monkeypatch.setattr(offline, 'reference_tick', sent_instead([
+        ('joint_trajectory', in_degrees),
+        ('joint_reference', AngleReference(offline.START_NS, 0.1, 1e6))]))
+    simulate_experiment(
+        load_experiment('name: x\ndomain: joint_angle\nsegments: [rest: {duration_s: 0.1}]'),
+        joint, load_controller('sofc_joint_ppr', joint), tmp_path / 'bag')
+    whys = [
+        'joint_trajectory points[1]: velocity 57.3 rad/s is beyond what a joint does, -20 to 20 '
+        'rad/s', 'a reference has velocity 1e+06 rad/s, which is not within -20 to 20 rad/s']
+    main(['replay', str(tmp_path / 'bag'), '--chain', '--json'])
+    chain = json.loads(capsys.readouterr().out)['chain']
+    assert chain['references_refused'] == 2 and chain['refusals'] == whys
+    main(['replay', str(tmp_path / 'bag'), '--chain'])
+    assert '2 references or trajectories were refused: ' + '; '.join(whys) in (
+        capsys.readouterr().out)
+
+
 def test_without_any_reference_the_chain_says_what_it_needs(tmp_path, monkeypatch):
     joint = load_joint('joint_dmsp_5_300', valve='ppr')
     monkeypatch.setattr(offline, 'reference_tick', sent_instead([]))

@@ -32,17 +32,21 @@ class Tracked:
     topic : str
         Topic with the measurement without which the controller cannot run; an experiment
         in this quantity has it as its domain.
+    fastest : float
+        Highest rate per second that is followed. It is a design value, beyond what any muscle or
+        joint of this kind does: 20 rad/s cross the range of a joint in 0.1 s.
 
     """
 
     mode: str
     unit: str
     topic: str
+    fastest: float
 
 
-CONTRACTION = Tracked('contraction', 'm', 'contraction')
-FORCE = Tracked('force', 'n', 'force')
-JOINT = Tracked('joint', 'rad', 'joint_angle')
+CONTRACTION = Tracked('contraction', 'm', 'contraction', 1.0)
+FORCE = Tracked('force', 'n', 'force', 1e5)
+JOINT = Tracked('joint', 'rad', 'joint_angle', 20.0)
 TRACKED = {one.mode: one for one in (CONTRACTION, FORCE, JOINT)}
 
 
