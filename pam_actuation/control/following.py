@@ -106,10 +106,20 @@ class CommandFollowing:
         """Return for how long [ns] a driver that once told has told nothing; 0 before."""
         return 0 if self._followed is None else now_ns - self._followed.stamp_ns
 
+    @property
+    def gives_air(self) -> bool:
+        """Return whether the driver told last that it follows more than the atmosphere."""
+        # A slow rise is above the atmosphere from its first tick on.
+        return self.followed_pa > P_ATM_PA + 1.0
+
+    def asks_for_none(self, now_ns: int) -> bool:
+        """Return whether nothing above the atmosphere was commanded of late."""
+        _, highest_pa = self._sent_before(now_ns)
+        return -math.inf < highest_pa <= P_ATM_PA + TOLERANCE_PA
+
     def vents(self, now_ns: int) -> bool:
         """Return whether the driver tells that it vents although pressure is commanded."""
-        # A slow rise is above the atmosphere from its first tick on.
-        if self._followed is None or self.followed_pa > P_ATM_PA + 1.0 or (
+        if self._followed is None or self.gives_air or (
                 self.silent_ns(now_ns) > MAX_AGE_NS):
             return False
         lowest_pa, _ = self._sent_before(self._followed.stamp_ns)

@@ -48,6 +48,8 @@ followed pressure below or above the command,  integral and rules stand still: t
 or silent; pressure lost, where it is unknown  that of a driver that vents or limits
 the law estimates a contraction that no        vents for 2 s, then starts bumplessly
 muscle has, or commands what is not finite
+its driver vents against the commands or is    drops what was asked for more than 0.2 s
+silent (of a joint: while both are vented)     ago; a new message resumes
 of two muscles one stays empty; its driver     vents both until that one follows again
 vents against the commands or falls silent;    (``slack_muscle``): none is left alone
 its pressure is lost                           under air
@@ -406,8 +408,13 @@ class ControllerLoop:
 
     def _reason(self, now_ns: int) -> int:
         """Return the code for a sound measurement, one of ``codes.RUNNING`` if all is usable."""
-        if len(self.muscles) > 1 and self._one_is_slack(now_ns):
-            return codes.MUSCLE_SLACK
+        if len(self.muscles) > 1:
+            if self._one_is_slack(now_ns):
+                if any(muscle.slack.waits for muscle in self.muscles):
+                    self.references.drop_stored(now_ns)
+                return codes.MUSCLE_SLACK
+        elif self.muscles[0].interruption.judge(now_ns):
+            self.references.drop_stored(now_ns)
         if self.setpoint.effort.follows:
             self.measurement.may_stand_still(now_ns)
         elif self._stands_still(now_ns):

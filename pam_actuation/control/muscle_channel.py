@@ -23,6 +23,7 @@ import math
 from typing import Any
 
 from pam_actuation.control.following import CommandFollowing, LESS
+from pam_actuation.control.interruption import Interruption
 from pam_actuation.control.measurement import fresh
 from pam_actuation.control.slack_muscle import SlackMuscle
 from pam_actuation.slow_rise import SlowRise
@@ -48,6 +49,8 @@ class MuscleChannel:
         missing, stale or not finite.
     following : CommandFollowing
         What its driver does with the commands.
+    interruption : Interruption
+        Whether its driver stopped following; it matters for a single muscle.
     slack : SlackMuscle
         Whether it is without air; it matters where another muscle would pull alone.
 
@@ -57,6 +60,7 @@ class MuscleChannel:
         self.place, self.side = place, place.rstrip('/')
         self.rise = rise
         self.following = CommandFollowing()
+        self.interruption = Interruption(self.following)
         self.slack = SlackMuscle(self.following)
         self.pressure_topic, self.force_topic = f'{place}pressure', f'{place}force'
         self.pressure_ns = self.force_ns = -1
@@ -65,6 +69,7 @@ class MuscleChannel:
     def forget(self) -> None:
         """Begin anew, as before the first message."""
         self.following.forget()
+        self.interruption.forget()
         self.slack.forget()
 
     def look(self, newest: Mapping[str, Any], now_ns: int) -> None:

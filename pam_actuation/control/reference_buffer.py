@@ -34,6 +34,8 @@ is interpolated (cubic through positions and rates). Rules:
 * A reference older than the one held, or one that is older than ``HOLD_S``, does not count, nor
   does a trajectory that ended so long ago. Else a sender with old stamps would vent a muscle that
   another one moves. After the clock was set back, what is held is ahead, and is dropped first.
+* While a driver does not follow, what was stamped more than ``TRUST_S`` ago is dropped. A sender
+  that lives goes on. Of one that does not, nothing is left that would move the muscle later.
 """
 
 import math
@@ -62,7 +64,7 @@ JUMP_PER_S = {CONTRACTION: 0.05, FORCE: math.inf, JOINT: 4.0}
 
 SCALES = {CONTRACTION: Scale(1e-3, 1e-3), FORCE: Scale(5.0, 2.0), JOINT: Scale(0.04, 0.05)}
 
-NONE, FRESH, HELD, LOST = range(4)      # what ``state`` can be
+NONE, FRESH, HELD, LOST, DROPPED = range(5)     # what ``state`` can be
 
 
 class ReferenceBuffer:
@@ -109,6 +111,18 @@ class ReferenceBuffer:
         self._course: Course | None = None
         self._accepted_course: Course | None = None
         self._arrived_courses: list[Course] = []
+        self._dropped = False       # since the last that counted
+
+    def drop_stored(self, now_ns: int) -> None:
+        """Forget what was stamped more than ``TRUST_S`` ago, after ``judge``."""
+        oldest_ns = now_ns - round(TRUST_S * 1e9)
+        if self.reference is not None and self.reference.stamp_ns < oldest_ns:
+            self.reference = self._accepted = self._followed = None
+            self._motion.forget()
+            self._dropped = True
+        if self._course is not None and self._course.message.stamp_ns < oldest_ns:
+            self._course = self._accepted_course = None
+            self._dropped = True
 
     @property
     def trajectory(self) -> 'Trajectory | None':
@@ -195,6 +209,8 @@ class ReferenceBuffer:
                 break
             self._refuse(why)
         self._course = self._accepted_course
+        if self._arrived or self._arrived_courses:
+            self._dropped = self._dropped and self.reference is None and self._course is None
         self._arrived, self._arrived_courses = [], []
 
     def uses_trajectory(self, now_ns: int) -> bool:
@@ -207,11 +223,11 @@ class ReferenceBuffer:
             self.reference is None or self.reference.stamp_ns < self._course.message.stamp_ns)
 
     def state(self, now_ns: int) -> int:
-        """Return ``NONE``, ``FRESH``, ``HELD`` or ``LOST`` for a time."""
+        """Return ``NONE``, ``FRESH``, ``HELD``, ``LOST`` or ``DROPPED`` for a time."""
         if self.uses_trajectory(now_ns):
             return FRESH
         if self.reference is None and self._course is None:
-            return NONE
+            return DROPPED if self._dropped else NONE
         age_s = (now_ns - self._last_ns()) * 1e-9
         if age_s <= LOST_S:
             return FRESH
@@ -237,7 +253,7 @@ class ReferenceBuffer:
         """
         Return (position, rate per second) wanted at ``time_ns``, judged at ``now_ns``.
 
-        Only valid unless ``state`` is ``NONE``.
+        Only valid unless ``state`` is ``NONE`` or ``DROPPED``.
         """
         if self._course is not None and self.uses_trajectory(now_ns):
             return self._course.at(time_ns, self._jump_per_s)

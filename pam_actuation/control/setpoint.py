@@ -29,7 +29,8 @@ from pam_actuation.control.tick import Effort
 
 REFERENCE_REASONS = {
     reference_buffer.NONE: codes.NO_REFERENCE, reference_buffer.FRESH: codes.OK,
-    reference_buffer.HELD: codes.REFERENCE_HELD, reference_buffer.LOST: codes.REFERENCE_LOST}
+    reference_buffer.HELD: codes.REFERENCE_HELD, reference_buffer.LOST: codes.REFERENCE_LOST,
+    reference_buffer.DROPPED: codes.REFERENCE_DROPPED}
 
 
 class Setpoint(Protocol):

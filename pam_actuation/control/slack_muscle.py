@@ -158,6 +158,11 @@ class SlackMuscle:
             return False
         return not self._following.told or self._following.followed_pa > SLACK_PA
 
+    @property
+    def waits(self) -> bool:
+        """Return whether it is slack and its driver gives no air yet."""
+        return self.slack and not self._following.gives_air
+
     def proves(self, now_ns: int) -> bool:
         """Return whether ``PROOF_PA`` is to be asked of it while both muscles are vented."""
         return self.slack and now_ns - self._noticed_ns >= RESUME_NS

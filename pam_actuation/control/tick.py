@@ -38,7 +38,8 @@ from pam_sim.units import P_ATM_PA
  CONTRACTION_IMPLAUSIBLE, NO_REFERENCE, REFERENCE_LOST, REFERENCE_HELD, NO_FORCE, FORCE_OLD,
  FORCE_AHEAD, FORCE_NOT_FINITE, FORCE_IMPLAUSIBLE, NO_ANGLE, ANGLE_OLD, ANGLE_AHEAD,
  ANGLE_NOT_FINITE, ANGLE_IMPLAUSIBLE, EFFORT_LOST, CONTRACTION_FROZEN,
- FORCE_FROZEN, ANGLE_FROZEN, MUSCLE_SLACK, TWO_SENSORS, LAW_FAILED) = range(26)
+ FORCE_FROZEN, ANGLE_FROZEN, MUSCLE_SLACK, TWO_SENSORS, LAW_FAILED,
+ REFERENCE_DROPPED) = range(27)
 NOT_MEASURED = 'measured yet'        # how the reasons of missing sensors end
 _OLD = f'is older than {MAX_AGE_S:g} s'
 _AHEAD = f'is stamped more than {MAX_AHEAD_NS * 1e-9:g} s ahead'
@@ -68,7 +69,8 @@ REASONS = (
     'joint angle stands still although the pressures changed: sensor frozen or joint blocked',
     'one muscle is at fault, both vented',
     'what is tracked is measured twice, vented',
-    'the controller estimated or commanded what is impossible, vented')
+    'the controller estimated or commanded what is impossible, vented',
+    'the driver vented or fell silent, so what was wanted before is dropped; send a new reference')
 RUNNING = (OK, REFERENCE_HELD)      # reasons with which the controller runs
 
 _NS = 1_000_000_000
