@@ -78,7 +78,7 @@ class ChainReplay:
     SI; ``rig`` is the name of the simulated rig, ``start_ns`` the first stamp of the run.
     ``tracking`` says how well the reference was tracked, where a whole experiment is repeated.
     ``refused`` counts the references and trajectories that the controller refused, ``refusals``
-    says why the newest of each kind.
+    says why the first of each kind.
     """
 
     rig: str
@@ -170,6 +170,7 @@ class RepeatedLoops:
         self._drive = {place: signal_tick(self.bus, driver, place)
                        for place, driver in self._drivers.items()}
         self._control_loop: ControllerLoop | None = None
+        self._refusals: dict[int, str] = {}
         self._decide: Callable[[int, bool], None] | None = None
         if controller is not None and 'controller' in parts:
             self._control_loop = control = ControllerLoop(
@@ -224,6 +225,10 @@ class RepeatedLoops:
         recorded = dict(zip(message.names, message.values))
         assert self._decide is not None         # without a controller nobody plays its states
         self._decide(now_ns, bool(recorded.get('learning', 1.0)))
+        assert self._control_loop is not None
+        for kind, why in enumerate(self._control_loop.setpoint.refusals[:2]):   # of references
+            if why:
+                self._refusals.setdefault(kind, why)
         self._commands = {topic: self._newest[topic] for topic in self._command_topics}
         state = self._newest['controller_state']
         for name, value in zip(state.names, state.values):
@@ -264,11 +269,10 @@ class RepeatedLoops:
 
     @property
     def refused(self) -> tuple[int, tuple[str, ...]]:
-        """Return how many references the controller refused, and why the newest of each kind."""
+        """Return how many references the controller refused, and why the first of each kind."""
         if self._control_loop is None:
             return 0, ()
-        setpoint = self._control_loop.setpoint
-        return setpoint.refused, tuple(filter(None, setpoint.refusals))
+        return self._control_loop.setpoint.refused, tuple(self._refusals.values())
 
     def signals(
             self) -> tuple[dict[str, IntArray], dict[str, FloatArray], dict[str, FloatArray]]:

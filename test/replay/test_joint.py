@@ -197,14 +197,15 @@ def test_torques_faults_and_co_contraction_are_reproduced_from_the_states_alone(
     assert found.parts['controller'].identical and found.internals == {}
 
 
-def sent_instead(messages):
-    """Return what stands in for ``reference_tick``: it sends these messages on its first tick."""
+def sent_instead(messages, a_tick=None):
+    """Return what stands in for ``reference_tick``: it sends so many messages a tick, or all."""
     def instead(bus, loop):
         waiting = list(messages)
 
         def tick(now_ns):
-            while waiting:
-                bus.send(*waiting.pop(0), now_ns)
+            for topic, message in waiting[:a_tick]:
+                bus.send(topic, message, now_ns)
+            del waiting[:a_tick]
 
         return tick
 
@@ -235,7 +236,8 @@ def test_the_chain_tells_of_references_that_are_refused(tmp_path, monkeypatch, c
         0, TRAJECTORY.time_from_start_ns, TRAJECTORY.angle_rad, (0.0, 57.3))
     monkeypatch.setattr(offline, 'reference_tick', sent_instead([
         ('joint_trajectory', in_degrees),
-        ('joint_reference', AngleReference(offline.START_NS, 0.1, 1e6))]))
+        ('joint_reference', AngleReference(offline.START_NS, 0.1, 1e6)),
+        ('joint_trajectory', TRAJECTORY)], a_tick=1))
     simulate_experiment(
         load_experiment('name: x\ndomain: joint_angle\nsegments: [rest: {duration_s: 0.1}]'),
         joint, load_controller('sofc_joint_ppr', joint), tmp_path / 'bag')
