@@ -98,6 +98,25 @@ class Course(NamedTuple):
                     return time_ns, value
         return None
 
+    def contradiction(self, jump_per_s: float) -> tuple[int, float, float] | None:
+        """
+        Return time, told rate and that of the positions where the rates belong to another motion.
+
+        None where they do not. They do where most segments that are told to move faster than
+        ``jump_per_s`` move slower than told by more than that. A jump is faster than told.
+        """
+        fast, found = 0, []
+        for i in range(len(self.times_ns) - 1):
+            told = 0.5 * (self._rate(i, math.nan) + self._rate(i + 1, math.nan))
+            if not abs(told) > jump_per_s:
+                continue
+            fast += 1
+            moves = (self.values[i + 1] - self.values[i]) / (
+                (self.times_ns[i + 1] - self.times_ns[i]) * 1e-9)
+            if abs(told) - abs(moves) > jump_per_s:
+                found.append((self.times_ns[i], told, moves))
+        return found[0] if 2 * len(found) > fast else None
+
     def _rate(self, index: int, missing: float = 0.0) -> float:
         """Return the rate of a point, ``missing`` where there is none."""
         rates = self.rates

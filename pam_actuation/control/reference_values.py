@@ -96,22 +96,29 @@ class ReferenceValues:
                 for k, value in enumerate(values))
         fast = (self._too_fast(f'points[{k}] of a trajectory', rate)
                 for k, rate in enumerate(self.rate_of(message, ())))
-        return next(filter(None, (*whys, *fast)), '') or self._leads_beyond(message)
+        return next(filter(None, (*whys, *fast)), '') or self._wrong_course(message)
 
     def course(self, message: Any) -> Course:
         """Return a trajectory with its points one by one."""
         times = tuple(message.stamp_ns + offset for offset in message.time_from_start_ns)
         return Course(message, times, self.of(message), self.rate_of(message, ()))
 
-    def _leads_beyond(self, message: Any) -> str:
-        """Return where the rates of a trajectory lead out of what is allowed, '' if nowhere."""
-        beyond = self.course(message).beyond(self._lower, self._upper, self._jump_per_s)
-        if beyond is None:
+    def _wrong_course(self, message: Any) -> str:
+        """Return why the rates of a trajectory do not fit its positions, '' if they do."""
+        course, unit = self.course(message), self._unit
+        beyond = course.beyond(self._lower, self._upper, self._jump_per_s)
+        if beyond is not None:
+            time_ns, value = beyond
+            return (f'the velocities of a trajectory lead to {self._kind.ros} {value:g} {unit} '
+                    f'at time_from_start {(time_ns - message.stamp_ns) * 1e-9:.3f} s, which is '
+                    f'not within {self._lower:g} to {self._upper:g} {unit}')
+        contradiction = course.contradiction(self._jump_per_s)
+        if contradiction is None:
             return ''
-        time_ns, value = beyond
-        return (f'the velocities of a trajectory lead to {self._kind.ros} {value:g} {self._unit} '
-                f'at time_from_start {(time_ns - message.stamp_ns) * 1e-9:.3f} s, which is not '
-                f'within {self._lower:g} to {self._upper:g} {self._unit}')
+        time_ns, told, moves = contradiction
+        return (f'the velocities of a trajectory do not fit its positions: from time_from_start '
+                f'{(time_ns - message.stamp_ns) * 1e-9:.3f} s on {told:g} {unit}/s are told, and '
+                f'the positions change by {moves:g} {unit}/s; another unit?')
 
     def _too_fast(self, what: str, rate: float) -> str:
         """Return why a rate is not usable, '' if it is, or is not told."""

@@ -87,6 +87,14 @@ def test_a_refused_reference_names_its_field_or_value(tracked, message, why):
     (CONTRACTION, (Point(0, (0.01,), (-0.9,), ()), Point(100 * MS, (0.02,), (0.0,), ())),
      'the velocities of a trajectory lead to position -0.08 m at time_from_start 0.100 s, '
      'which is not within -0.01 to 0.1 m'),
+    (CONTRACTION, (Point(0, (0.01,), (0.02,), ()), Point(100 * MS, (0.011,), (0.6,), ()),
+                   Point(200 * MS, (0.012,), (0.6,), ()), Point(300 * MS, (0.013,), (0.0,), ())),
+     'the velocities of a trajectory do not fit its positions: from time_from_start 0.000 s on '
+     '0.31 m/s are told, and the positions change by 0.01 m/s; another unit?'),
+    # Jumps, and a motion that begins anew as a sawtooth does.
+    (CONTRACTION, (Point(0, (0.01,), (0.0,), ()), Point(20 * MS, (0.03,), (0.1,), ()),
+                   Point(40 * MS, (0.032,), (0.1,), ()), Point(60 * MS, (0.032,), (0.1,), ()),
+                   Point(80 * MS, (0.034,), (0.1,), ())), ''),
     (CONTRACTION, (Point(0, (0.09,), (0.03,), ()), Point(1000 * MS, (0.09,), (-0.03,), ())), ''),
     (FORCE, (Point(0, (), (), (30.0,)),), '')])
 def test_a_refused_trajectory_names_its_point(tracked, points, why):
