@@ -21,10 +21,12 @@ from typing import Any, TYPE_CHECKING
 import numpy as np
 from pam_actuation.control.controller_text import controller_to_yaml
 from pam_actuation.control.inputs import INPUT, write_inputs
+from pam_actuation.control.settings import limits_within
 from pam_actuation.control.static_inverse import inverse_to_mapping
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.records import zeros
+from pam_sim.units import P_ATM_PA
 
 if TYPE_CHECKING:
     from pam_actuation.control.sofc.rule_table import RuleBase
@@ -34,8 +36,9 @@ class CompiledController:
     """
     A control law as a class: owner of the arrays its compiled step works on.
 
-    Subclasses have ``kind`` and ``state_names``, set ``_step`` and ``_arguments`` (what it
-    takes, ``_inputs`` and ``_outputs`` among them) and know what ``learning_reason`` is.
+    Subclasses have ``kind`` and ``state_names``, set ``_step``, ``_arguments`` (what it takes,
+    ``_inputs`` and ``_outputs`` among them) and ``_limits`` (the cells of ``settings.LIMITS`` in
+    its parameters), and know what ``learning_reason`` is.
 
     Parameters
     ----------
@@ -60,6 +63,7 @@ class CompiledController:
 
     _step: Callable[..., float]
     _arguments: tuple[Any, ...]
+    _limits: tuple[FloatArray, FloatArray]
 
     def __init__(self, settings: dict[str, float], state: 'np.dtype[np.record]',
                  rig_name: str = '') -> None:
@@ -130,6 +134,16 @@ class CompiledController:
     def step_on_inputs(self) -> float:
         """Run one tick on what ``input_array`` holds; return the command, absolute Pa."""
         return self._step(*self._arguments)
+
+    def limit_pressure(self, highest_pa: float) -> None:
+        """Keep the commands below a pressure [absolute Pa] as well; NaN: no such limit."""
+        self.limit_commands(-math.inf, highest_pa - P_ATM_PA)
+
+    def limit_commands(self, lowest_gauge_pa: float, highest_gauge_pa: float) -> None:
+        """Keep the commands within a range as well as that of the settings; NaN: no limit."""
+        lowest, highest = self._limits
+        lowest[...], highest[...] = limits_within(
+            self.settings, lowest_gauge_pa, highest_gauge_pa)
 
     def compiled_arguments(self) -> tuple[Any, ...]:
         """Return the arrays the compiled step takes, for compiled closed loops."""

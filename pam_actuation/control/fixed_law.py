@@ -23,9 +23,10 @@ from collections.abc import Callable
 
 import numpy as np
 from pam_actuation.control.compiled_controller import CompiledController
+from pam_actuation.control.settings import LIMITS
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import direct
-from pam_sim.records import values_of
+from pam_sim.records import cells, values_of
 
 
 class FixedLawController(CompiledController):
@@ -58,6 +59,7 @@ class FixedLawController(CompiledController):
                  state: 'np.dtype[np.record]', rig_name: str = '', *more: FloatArray) -> None:
         super().__init__(settings, state, rig_name)
         self.parameters = values_of(parameters, settings)
+        self._limits = tuple(vars(cells(self.parameters, parameters))[name] for name in LIMITS)
         self._step = step
         self._arguments = (
             self.parameters, knowledge, *more, self._state, self._inputs, self._outputs)

@@ -86,6 +86,11 @@ class JointTorque:
         self._wanted.forget()
         self._angle.forget()
 
+    def limit_pressure(self, highest_pa: float) -> None:
+        """Keep both commands below a pressure [absolute Pa] as well; NaN: no such limit."""
+        low, high = self._limits[0], float(self._pressures[-1])
+        self._limits = low, max(low, min(high, highest_pa))
+
     def state_values(self) -> tuple[float, float, float]:
         """Return the values of ``STATE_NAMES`` of the last tick."""
         return self._given, self._measured, self._integral
@@ -132,7 +137,7 @@ class JointTorque:
         wanted = min(max(self._wanted.at(self._given) + self._offset, torques[0]), torques[-1])
         self._offset *= _START_TIME_S / (_START_TIME_S + self._period_s)
         torque = wanted + self._correction(wanted, torques)
-        difference = float(np.interp(torque, torques, self._differences))
+        difference = float(np.interp(torque, torques, self._within_limits()))
         mean = min(max(self._mean, low + abs(difference)), high - abs(difference))
         return mean + difference, mean - difference
 
@@ -149,14 +154,20 @@ class JointTorque:
         row = min(int(place), _ANGLES - 2)
         part = place - row
         low, high = self._limits
-        size = np.abs(self._differences)
+        differences = self._within_limits()
+        size = np.abs(differences)
         mean = np.minimum(np.maximum(self._mean, low + size), high - size)
         flexor, extensor = (
             np.interp(pressure, self._pressures,
                       (1.0 - part) * table[row] + part * table[row + 1])
             for pressure, table in zip(
-                (mean + self._differences, mean - self._differences), self._tables))
+                (mean + differences, mean - differences), self._tables))
         return flexor - extensor + _SLOPE_N_M_PER_PA * self._differences
+
+    def _within_limits(self) -> FloatArray:
+        """Return the differences of the tables, cut to what the limits let both have."""
+        low, high = self._limits
+        return np.clip(self._differences, -0.5 * (high - low), 0.5 * (high - low))
 
     def _start(self, torque_n_m: float) -> None:
         """Begin at the torque of the pressures before; an offset to it fades."""

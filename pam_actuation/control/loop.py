@@ -46,6 +46,8 @@ co-contraction out of reach or not finite      ignored and counted; what was hel
 pressure, force missing, stale or not finite   not used (they only guard start and learning)
 followed pressure below or above the command,  integral and rules stand still: the error is
 or silent; pressure lost, where it is unknown  that of a driver that vents or limits
+followed pressure stands still below the       that is the limit of the driver: commands stay
+command for 0.3 s in all                       below it, 1 kPa above to notice its end
 the law estimates a contraction that no        vents for 2 s, then starts bumplessly
 muscle has, or commands what is not finite
 its driver vents against the commands or is    drops what was asked for more than 0.2 s
@@ -68,6 +70,7 @@ import math
 from typing import Any, TYPE_CHECKING
 
 from pam_actuation.control import tick as codes
+from pam_actuation.control.driver_limit import BEYOND_PA
 from pam_actuation.control.following import FOLLOWS, UNKNOWN
 from pam_actuation.control.law_check import LawCheck
 from pam_actuation.control.measurement import fresh, Measurement
@@ -339,10 +342,13 @@ class ControllerLoop:
                 max(muscle.following.silent_ns(now_ns) for muscle in muscles))
             if self.controller.learns:
                 still = self._on_time.says
-        self._remarks = self._tick_rate.says, still
+        held_back = self._held_back(now_ns)
+        limit_pa = min((muscle.limit.limit_pa for muscle in muscles
+                        if muscle.limit.limit_pa == muscle.limit.limit_pa), default=math.nan)
+        self._remarks = self._tick_rate.says, still, self._limited(limit_pa)
         inputs = TickInputs(reason, may_learn, stalled)
         inputs.effort, inputs.co_contraction_pa = effort, setpoint.co_contraction_pa
-        held_back = self._held_back(now_ns)
+        inputs.limit_pa = limit_pa + BEYOND_PA
         running = reason in codes.RUNNING
         if stalled or not running:
             self._commands_pa = None
@@ -447,6 +453,18 @@ class ControllerLoop:
             sign = -sign
         return self.measurement.stands_still(
             now_ns, moving_pa, None if all_believed else should_be_pa)
+
+    def _limited(self, limit_pa: float) -> str:
+        """Return what to say of the limit of a driver, '' where none is known."""
+        if math.isnan(limit_pa):
+            return ''
+        whose = ' and '.join(muscle.place.rstrip('/') for muscle in self.muscles
+                             if muscle.limit.limit_pa == limit_pa)
+        own = f'{whose}/valve_driver' if whose else 'valve_driver'
+        gauge_pa = limit_pa - P_ATM_PA
+        return (f'{own} limits its command to {gauge_pa * 1e-3:.0f} kPa gauge: set '
+                f'max_pressure_gauge_pa of the controller to {gauge_pa:.0f} as well, or raise '
+                'that of the driver')
 
     def _held_back(self, now_ns: int) -> float:
         """Return a code of ``following``; of several muscles less or more tells nothing."""

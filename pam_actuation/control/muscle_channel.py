@@ -22,6 +22,7 @@ from collections.abc import Mapping
 import math
 from typing import Any
 
+from pam_actuation.control.driver_limit import DriverLimit
 from pam_actuation.control.following import CommandFollowing, LESS
 from pam_actuation.control.interruption import Interruption
 from pam_actuation.control.measurement import fresh
@@ -51,6 +52,8 @@ class MuscleChannel:
         What its driver does with the commands.
     interruption : Interruption
         Whether its driver stopped following; it matters for a single muscle.
+    limit : DriverLimit
+        The pressure to which its driver cuts the commands.
     slack : SlackMuscle
         Whether it is without air; it matters where another muscle would pull alone.
 
@@ -61,6 +64,7 @@ class MuscleChannel:
         self.rise = rise
         self.following = CommandFollowing()
         self.interruption = Interruption(self.following)
+        self.limit = DriverLimit()
         self.slack = SlackMuscle(self.following)
         self.pressure_topic, self.force_topic = f'{place}pressure', f'{place}force'
         self.pressure_ns = self.force_ns = -1
@@ -70,6 +74,7 @@ class MuscleChannel:
         """Begin anew, as before the first message."""
         self.following.forget()
         self.interruption.forget()
+        self.limit.forget()
         self.slack.forget()
 
     def look(self, newest: Mapping[str, Any], now_ns: int) -> None:
@@ -85,4 +90,5 @@ class MuscleChannel:
     def held_back(self, now_ns: int) -> float:
         """Return what the driver does with the commands, a code of ``following``."""
         does = self.following.judge(now_ns, self.pressure_pa)
+        self.limit.look(now_ns, self.following.followed_pa, does == LESS)
         return LESS if self.rise.limiting else does

@@ -115,3 +115,10 @@ def checked_settings(
         raise InputError(f'{highest} must be larger than {lowest}',
                          where(highest) if where else highest)
     return settings
+
+
+def limits_within(settings: Mapping[str, float], lowest_gauge_pa: float,
+                  highest_gauge_pa: float) -> tuple[float, float]:
+    """Return the pressure limits of settings cut to a range; NaN cuts nothing."""
+    lowest, highest = (settings[name] for name in LIMITS)
+    return max(lowest, lowest_gauge_pa), max(lowest, min(highest, highest_gauge_pa))

@@ -77,6 +77,7 @@ _NS = 1_000_000_000
 HELD_BACK = 'held_back'     # not 0 while the driver does not follow the command
 # From the stamps of what a law tracks and of the pressure to the tick; of two pressures the mean.
 AGES = ('measurement_age_s', 'pressure_age_s')
+LIMIT = 'driver_limit_pa'     # to which a driver cuts the commands, absolute; NaN: none known
 # Of which topics ``controller_state`` tells the stamps.
 STAMPED: tuple[str, ...] = (
     'contraction', 'pressure', 'force', 'reference', 'reference_trajectory')
@@ -121,6 +122,7 @@ class TickInputs:
     tracks. Pressures and forces are one of each muscle. ``proves`` tells which muscle of a joint
     is asked for a little pressure while all are vented. ``co_contraction_pa`` is the one asked
     for by message, absolute, NaN before the first. Other fields: see ``step`` of the controller.
+    ``limit_pa``: to which a driver cuts the commands, absolute; NaN: none is known.
     ``ages_s``: of what the law tracks, and of the pressure; of several pressures their mean.
     ``restarted``: the loop stood still, so that the motion known from before means nothing.
     """
@@ -142,6 +144,7 @@ class TickInputs:
     proves: Sequence[bool] = ()
     effort: Effort = Effort()
     co_contraction_pa: float = math.nan
+    limit_pa: float = math.nan
 
 
 def split_stamps(stamps_ns: Iterable[int]) -> list[float]:
@@ -198,6 +201,7 @@ class MuscleLaw:
 
     def step(self, inputs: TickInputs) -> tuple[float, ...]:
         """Return the wanted absolute pressure [Pa]."""
+        self.controller.limit_pressure(inputs.limit_pa)
         (pressure_pa,), (force_n,) = inputs.pressures_pa, inputs.forces_n
         return float(self.controller.step(
             inputs.position, inputs.reference, inputs.reference_rate,
@@ -234,7 +238,7 @@ class TickCore:
         self._nothing = (math.nan,) * len(law.places)
         self._no_stamps_ns = (-1,) * len(law.stamped)
         self.ticks = 0
-        self.names = (*input_names(law.tracked), *AGES, *law.names)
+        self.names = (*input_names(law.tracked), *AGES, LIMIT, *law.names)
 
     def run(self, inputs: TickInputs) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """
@@ -270,6 +274,6 @@ class TickCore:
             inputs.position, inputs.reference, inputs.reference_rate,
             inputs.lead_reference, inputs.lead_reference_rate, inputs.elapsed_s,
             *(inputs.pressures_pa or self._nothing), *(inputs.forces_n or self._nothing),
-            inputs.held_back, *inputs.ages_s, *law.internals(inputs))
+            inputs.held_back, *inputs.ages_s, inputs.limit_pa, *law.internals(inputs))
         self.ticks += 1
         return commands_pa, values

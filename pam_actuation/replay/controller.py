@@ -23,6 +23,7 @@ and internals bit for bit.
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+import math
 import os
 from typing import Any, TYPE_CHECKING
 
@@ -31,7 +32,7 @@ from pam_actuation.bags.renamed import may_be_in
 from pam_actuation.control.config import load_controller
 from pam_actuation.control.modes.tracked import TRACKED, Tracked, tracked_by
 from pam_actuation.control.tick import (
-    AGES, HELD_BACK, input_names, join_stamp, MuscleLaw, reference_names, RUNNING, STAMPED,
+    AGES, HELD_BACK, input_names, join_stamp, LIMIT, MuscleLaw, reference_names, RUNNING, STAMPED,
     TickCore, TickInputs)
 from pam_actuation.drivers.recorded import as_recorded, nearly_in
 from pam_actuation.replay.difference import difference
@@ -227,10 +228,11 @@ def columns_of(states: 'Series') -> dict[str, FloatArray]:
     Return the columns of ``controller_state``, with those that older recordings lack.
 
     Before ``HELD_BACK``, every command was taken to be followed. Before ``AGES``, all measurements
-    counted as new.
+    counted as new. Before ``LIMIT``, no limit of a driver was known.
     """
     nothing = np.zeros(len(states.stamp_ns))
-    return {**dict.fromkeys((HELD_BACK, *AGES), nothing), **states.values}
+    return {**dict.fromkeys((HELD_BACK, *AGES), nothing),
+            LIMIT: np.full(len(nothing), math.nan), **states.values}
 
 
 def _columns(states: 'Series', tracked: Tracked, path: str) -> dict[str, FloatArray]:
@@ -299,4 +301,5 @@ def _inputs(columns: dict[str, FloatArray], row: int, lookups: dict[str, dict[in
         bool(columns['restarted'][row]), stamps, measured['contraction'], reference, rate,
         lead_reference, lead_rate, float(columns['elapsed_s'][row]), (measured['pressure'],),
         (measured['force'],), float(columns[HELD_BACK][row]),
-        tuple([float(columns[name][row]) for name in AGES]))
+        tuple([float(columns[name][row]) for name in AGES]),
+        limit_pa=float(columns[LIMIT][row]))

@@ -26,7 +26,7 @@ import numpy as np
 from pam_actuation.bags.load_joint import MEASURED
 from pam_actuation.control.joint_law import ADDED_NAMES, CO_CONTRACTION, JointLaw, PROVES
 from pam_actuation.control.tick import (
-    AGES, Effort, HELD_BACK, join_stamp, reference_names, TickCore, TickInputs)
+    AGES, Effort, HELD_BACK, join_stamp, LIMIT, reference_names, TickCore, TickInputs)
 from pam_actuation.drivers.recorded import as_recorded, nearly_in
 from pam_actuation.replay.chain import ChainReplay, same_bits
 from pam_actuation.replay.controller import check_complete, columns_of
@@ -159,4 +159,4 @@ def _inputs(columns: dict[str, FloatArray], row: int, angle_at: dict[int, float]
         forces_n=numbers(*(f'{side}_force_n' for side in SIDES)), held_back=held_back,
         proves=[bool(proof) for proof in numbers(*PROVES)],
         ages_s=(age_s, pressure_age_s), effort=Effort(bool(follows), effort_ns, torque_n_m),
-        co_contraction_pa=co_contraction_pa)
+        co_contraction_pa=co_contraction_pa, limit_pa=float(columns[LIMIT][row]))

@@ -36,6 +36,8 @@ class FaultyJoint:
     """
     Controller, both drivers with their watchdogs and the realistic joint on one bus.
 
+    ``of_driver``: parameters of both drivers that differ from what the rig tells.
+
     Attributes
     ----------
     spoil : dict
@@ -51,12 +53,12 @@ class FaultyJoint:
 
     """
 
-    def __init__(self, valve, wanted=lambda time_s: 0.1, seed=3):
+    def __init__(self, valve, wanted=lambda time_s: 0.1, seed=3, of_driver=None):
         self.joint = joint = load_joint('joint_dmsp_5_300_realistic', valve=valve)
         self.wanted = wanted
         self.plant = PlantLoop(joint, seed=seed)
         self.control = ControllerLoop(load_controller(f'sofc_joint_{valve}', joint), joint)
-        self.drivers = {side: DriverLoop(valve, driver_config(rig))
+        self.drivers = {side: DriverLoop(valve, driver_config(rig, of_driver))
                         for side, rig in zip(SIDES, (joint.flexor, joint.extensor))}
         self.spoil, self.stopped, self.late_ns = {}, set(), dict.fromkeys(SIDES, 0)
         self.unnoticed_ns = dict.fromkeys(SIDES, 0)

@@ -71,6 +71,8 @@ class FaultyRig:
         Of the sensor noise.
     rig : pam_sim.rig.Rig, optional
         What moves, in place of the realistic rig.
+    of_driver : dict, optional
+        Parameters of the driver that differ from what rig and controller tell.
 
     Attributes
     ----------
@@ -83,7 +85,7 @@ class FaultyRig:
 
     """
 
-    def __init__(self, valve, controller, tells=True, seed=1, rig=None):
+    def __init__(self, valve, controller, tells=True, seed=1, rig=None, of_driver=None):
         moved = rig
         rig = load_rig('dmsp_5_300_realistic', valve=valve)
         self.contraction_m, self.gauge_pa, self.reference_m = [], [], []
@@ -95,7 +97,8 @@ class FaultyRig:
         self._fault, self._topics, self._reference = '', (), None
         self._now_ns = START_NS
         self._bus = bus = Bus(on_sent=self._heard)
-        driver = DriverLoop(valve, driver_config(rig, law.driver))
+        driver = DriverLoop(valve, driver_config(
+            rig, {**(law.driver or {}), **(of_driver or {})}))
         self._plant = SuppliedPlant(moved or rig, seed=seed)
         self._measure = attach_plant(bus, self._plant)
         self._decide = controller_tick(bus, self._control)

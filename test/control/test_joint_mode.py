@@ -47,20 +47,20 @@ def settle(controller, joint, angle_rad, wanted_rad, ticks=400):
 @pytest.mark.parametrize('co_contraction_pa', [LOW, LOW + 2.2e5, HIGH])
 def test_the_difference_is_kept_and_co_contraction_gives_way(co_contraction_pa):
     for u_pa in np.linspace(LOW, HIGH, 25):
-        flexor, extensor = pair_of(u_pa, co_contraction_pa, LOW, HIGH)
+        flexor, extensor = pair_of(u_pa, co_contraction_pa, LOW, HIGH, HIGH)
         assert LOW - 1e-6 <= min(flexor, extensor) and max(flexor, extensor) <= HIGH + 1e-6
         assert as_one(flexor, extensor, LOW, HIGH) == pytest.approx(u_pa)
         size = 0.5 * abs(flexor - extensor)
         if LOW + size <= co_contraction_pa <= HIGH - size:
             assert 0.5 * (flexor + extensor) == pytest.approx(co_contraction_pa)
-    assert pair_of(HIGH + 1e5, co_contraction_pa, LOW, HIGH) == pytest.approx((HIGH, LOW))
+    assert pair_of(HIGH + 1e5, co_contraction_pa, LOW, HIGH, HIGH) == pytest.approx((HIGH, LOW))
 
 
 def test_the_static_pair_holds_the_angle(joint):
     table = load_controller(TEXT, joint).static_inverse
     for angle_rad in (-0.3, 0.0, 0.2):
         u_pa = inverse_pressure_pa(table, joint.contractions_m(angle_rad)[0])
-        flexor_pa, extensor_pa = pair_of(u_pa, P_ATM_PA + 3e5, LOW, HIGH)
+        flexor_pa, extensor_pa = pair_of(u_pa, P_ATM_PA + 3e5, LOW, HIGH, HIGH)
         assert joint.static_angle_rad(flexor_pa, extensor_pa) == pytest.approx(angle_rad, abs=2e-3)
         assert 0.5 * (flexor_pa + extensor_pa) == pytest.approx(P_ATM_PA + 3e5)
 

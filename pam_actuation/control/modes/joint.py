@@ -31,6 +31,7 @@ from pam_actuation.control.modes.joint_statics import (
     as_one, NODES, pair_of, tabulate_joint_inverse)
 from pam_actuation.control.modes.tracked import JOINT
 from pam_actuation.control.modes.wrapped import blank_inverse, in_mode, WrappedLaw
+from pam_actuation.control.settings import limits_within
 from pam_actuation.control.static_inverse import inverse_to_mapping
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import allocating_entry_point, compiled, source_key
@@ -64,6 +65,7 @@ PARAMETERS = record(
     'co_contraction_pa',              # wanted, absolute
     'lowest_pa',                      # absolute
     'highest_pa',                     # absolute
+    'limit_pa',                       # absolute, at most that: of a driver
     'reach_pa',                       # change of the co-contraction per tick
 )
 STATE = record(
@@ -159,7 +161,8 @@ def _commands(par: np.record, st: np.record, u_pa: float, raw: np.record,
     step = par.co_contraction_pa - st.co_contraction_pa
     mean_pa: float = st.co_contraction_pa + min(max(step, -par.reach_pa), par.reach_pa)
     st.co_contraction_pa = mean_pa
-    flexor_pa, extensor_pa = pair_of(u_pa, mean_pa, par.lowest_pa, par.highest_pa)
+    flexor_pa, extensor_pa = pair_of(
+        u_pa, mean_pa, par.lowest_pa, par.highest_pa, par.limit_pa)
     commands.flexor_pa = flexor_pa
     commands.extensor_pa = extensor_pa
 
@@ -227,6 +230,7 @@ class JointController(WrappedLaw):
             'radius_m': flexor_radius_m, 'zero_m': flexor_contraction_at_zero_m,
             'co_contraction_pa': P_ATM_PA + co_contraction_gauge_pa,
             'lowest_pa': P_ATM_PA + lowest, 'highest_pa': P_ATM_PA + highest,
+            'limit_pa': P_ATM_PA + highest,
             'reach_pa': _CO_CONTRACTION_SLEW_PA_PER_S / law.rate_hz})
         self._st, self._raw = zeros(STATE), np.full(size_of(JOINT_INPUT), math.nan)
         self._commands = np.full(size_of(COMMANDS), P_ATM_PA)
@@ -305,6 +309,18 @@ class JointController(WrappedLaw):
         par = self._parameters
         par.co_contraction_pa[...] = min(
             max(P_ATM_PA + gauge_pa, par.lowest_pa.item()), par.highest_pa.item())
+
+    def limit_pressure(self, highest_pa: float) -> None:
+        """
+        Keep both commands below a pressure [absolute Pa] as well; NaN: no such limit.
+
+        The co-contraction gives way to it; the law saturates at the difference that is left.
+        """
+        par, (lowest, highest) = self._parameters, limits_gauge_pa(self.settings)
+        _, limit = limits_within(self.settings, lowest, highest_pa - P_ATM_PA)
+        par.limit_pa[...] = P_ATM_PA + limit
+        lost = 0.5 * (highest - limit)
+        self.law.limit_commands(lowest + lost, highest - lost)
 
     @property
     def wanted_co_contraction_pa(self) -> float:

@@ -43,8 +43,8 @@ def room_for(co_contraction_pa: float, difference_pa: float, lowest_pa: float,
 
 
 @compiled
-def pair_of(u_pa: float, co_contraction_pa: float, lowest_pa: float,
-            highest_pa: float) -> tuple[float, float]:
+def pair_of(u_pa: float, co_contraction_pa: float, lowest_pa: float, highest_pa: float,
+            limit_pa: float) -> tuple[float, float]:
     """
     Return the pressures of flexor and extensor [absolute Pa].
 
@@ -54,12 +54,14 @@ def pair_of(u_pa: float, co_contraction_pa: float, lowest_pa: float,
         The pair as one pressure, absolute.
     co_contraction_pa, lowest_pa, highest_pa : float
         Wanted mean pressure and limits, absolute.
+    limit_pa : float
+        Pressure that neither muscle may exceed now, at most ``highest_pa``.
 
     """
-    highest_difference = 0.5 * (highest_pa - lowest_pa)
+    highest_difference = 0.5 * (limit_pa - lowest_pa)
     difference = u_pa - 0.5 * (lowest_pa + highest_pa)
     difference = min(max(difference, -highest_difference), highest_difference)
-    mean = room_for(co_contraction_pa, difference, lowest_pa, highest_pa)
+    mean = room_for(co_contraction_pa, difference, lowest_pa, limit_pa)
     return mean + difference, mean - difference
 
 

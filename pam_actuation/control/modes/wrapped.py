@@ -122,6 +122,10 @@ class WrappedLaw:
         """Return to the initial rules without a step in the command."""
         self.law.reset_rules()
 
+    def limit_pressure(self, highest_pa: float) -> None:
+        """Keep the commands below a pressure [absolute Pa] as well; NaN: no such limit."""
+        self.law.limit_pressure(highest_pa)
+
     def learning_reason(self) -> str:
         """Return in words whether the last tick learned, or why not."""
         return self.law.learning_reason()

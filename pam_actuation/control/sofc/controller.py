@@ -20,7 +20,7 @@ import math
 import numpy as np
 from pam_actuation.control.compiled_controller import CompiledController
 from pam_actuation.control.inputs import MAX_AGE_S
-from pam_actuation.control.settings import checked_settings
+from pam_actuation.control.settings import checked_settings, LIMITS
 from pam_actuation.control.sofc import muscle_model
 from pam_actuation.control.sofc.credit import ring_rows
 from pam_actuation.control.sofc.learning import REASONS
@@ -34,7 +34,7 @@ from pam_actuation.control.sofc.settings import (
 from pam_actuation.control.sofc.step import sofc_step
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
-from pam_sim.records import fields, size_of
+from pam_sim.records import cells, fields, size_of
 
 OF_THE_MODE = 'tracked_'    # what of the scaling of rules turns metres of the law into radians
 
@@ -105,6 +105,7 @@ class SelfOrganizingFuzzyController(CompiledController):
             check_fit(rules, self.rules, 'rules')
             self.rules.assign(rules)
         self.parameters = parameter_array(self.settings)
+        self._limits = tuple(vars(cells(self.parameters, PARAMETERS))[name] for name in LIMITS)
         par = fields(self.parameters, PARAMETERS)
         rows = ring_rows(
             int(par.delay_ticks), int(par.spread_ticks),
