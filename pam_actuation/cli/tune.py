@@ -48,6 +48,8 @@ def add_arguments(parser: Parser) -> None:
     """Declare the options of the verb."""
     parser.add_argument('bag', type=source, nargs='*',
                         help='bags that say rig, controller and experiment')
+    parser.add_argument(
+        '--namespace', default=None, help='namespace of the muscle or joint in the bags')
     add_topic_option(parser)
     parser.add_argument('--model', '--rig', dest='rig', type=source, default=None,
                         metavar='NAME|FILE',
@@ -103,7 +105,7 @@ def run(args: argparse.Namespace) -> int | None:
     from pam_sim.files import whole_files
     from pam_sim.joint import load_rig_or_joint
     written = _targets(args)
-    runs = [load_recording(bag, topics=args.renamed) for bag in args.bag]
+    runs = [load_recording(bag, args.namespace, topics=args.renamed) for bag in args.bag]
     note_implausible(args, runs, must_be_right=True)
     rig = load_rig_or_joint(_rig_source(args, runs), args.valve)
     check_kind(runs, rig)

@@ -139,3 +139,11 @@ def test_allowed_values_are_read():
     assert out_path('runs/ä b') == 'runs/ä b' and source('x.yaml') == 'x.yaml'
     with pytest.raises(argparse.ArgumentTypeError, match='at most 3 mm'):
         number(None, 3.0, 'mm')('4')
+
+
+def test_every_verb_that_reads_a_bag_lets_one_rig_of_several_be_chosen():
+    has = {verb: [option for of, action in _options() if of == verb
+                  for option in action.option_strings] for verb in VERBS}
+    lacking = [verb for verb, options in has.items()
+               if '--topic' in options and '--namespace' not in options]
+    assert [verb for verb in has if '--topic' in has[verb]] and lacking == []
