@@ -34,6 +34,7 @@ from pam_actuation.bags.completeness import (
 from pam_actuation.bags.ending import Ending, ending_of
 from pam_actuation.bags.facts import recorded_rig_title
 from pam_actuation.bags.info_text import render_text
+from pam_actuation.bags.load_joint import half_joints, MEASURED
 from pam_actuation.bags.losses import DIAGNOSTICS
 from pam_actuation.bags.markers import markers_of
 from pam_actuation.bags.recorder import RECORDING_RECORD
@@ -167,6 +168,8 @@ def bag_info(path: StrPath, recover: bool = False, namespace: str | None = None,
     infos = _topic_infos(bag, remarks)
     muscles = namespaces(bag)
     missing, notes = plausibility.missing_topics(muscles, experiment.get('valve', ''))
+    remarks += [f'{joint} has no messages on {MEASURED}: the analyses of a joint need it.'
+                for joint in half_joints(bag)]
     remarks += missing
     ending = ending_of(experiment)
     if ending.early:

@@ -23,7 +23,7 @@ import os
 
 from pam_actuation.bags.load import NAMESPACE, read_series, RecordedRun, run_of
 from pam_actuation.bags.markers import is_marker, markers_of
-from pam_actuation.bags.renamed import full_names
+from pam_actuation.bags.renamed import full_names, may_be_in
 from pam_actuation.bags.source import Bag, read_bag, TopicData
 from pam_actuation.topics.table import BY_NAME, JOINT, MUSCLE, short_name
 from pam_sim.errors import InputError
@@ -91,14 +91,22 @@ def joints_of(bag: Bag) -> list[str]:
 
 def _check_no_half_joint(bag: Bag, path: str | os.PathLike[str]) -> None:
     """Raise InputError for a bag with both muscles of a joint, but without the joint."""
+    for joint in half_joints(bag):
+        renamed = may_be_in(str(path), MEASURED)
+        raise InputError(
+            f'has both muscles of the joint {joint} but no {MEASURED}: the recording of '
+            f'the joint is not complete; choose one muscle with {NAMESPACE}'
+            + (f'; {renamed}' if renamed else ''), str(path))
+
+
+def half_joints(bag: Bag) -> list[str]:
+    """Return the joints of which a bag has both muscles but no message on the angle."""
     places = {name.rpartition('/')[0] for name, topic in bag.topics.items()
               if is_joint_topic(topic)}
-    for place in sorted(places):
-        joint, _, side = place.rpartition('/')
-        if side == SIDES[0] and all(f'{joint}/{other}' in places for other in SIDES):
-            raise InputError(
-                f'has both muscles of the joint {joint} but no {MEASURED}: the recording of '
-                f'the joint is not complete; choose one muscle with {NAMESPACE}', str(path))
+    measured = {joint for joint in joints_of(bag)
+                if len(bag.topics[f'{joint}/{MEASURED}'].payloads)}
+    return [joint for joint in sorted({place.rpartition('/')[0] for place in places} - measured)
+            if all(f'{joint}/{side}' in places for side in SIDES)]
 
 
 def topics_of_joint(bag: Bag, namespace: str) -> dict[str, TopicData]:

@@ -20,10 +20,10 @@ from typing import NamedTuple, TYPE_CHECKING
 
 import numpy as np
 
+from pam_actuation.bags.rig_topics import side_of
 from pam_actuation.topics.table import (
     BY_NAME, NEEDED, OF_A_RUN, OFTEN_EMPTY, RECORDED, RECORDED_OF_JOINT, short_name, Topic, USED)
 from pam_sim.annotations import FloatArray, IntArray
-from pam_sim.joint.parameters import SIDES
 from pam_sim.muscle.geometry import MOST_STRAIN
 from pam_sim.units import allowed_range, gauge_kpa, P_ATM_PA
 
@@ -225,11 +225,9 @@ def missing_topics(namespaces: Mapping[str, Collection[str]],
 
 def _topics_of_muscle(namespace: str, namespaces: Collection[str]) -> list[Topic]:
     """Return what a recording of a muscle can hold, alone or as one of the two of a joint."""
-    joint, _, side = namespace.rpartition('/')
-    if side not in SIDES or not all(f'{joint}/{other}' in namespaces for other in SIDES):
-        return [*OF_A_RUN.values()]
-    return [row for row in OF_A_RUN.values()
-            if row.name != 'contraction' and f'{side}/{row.name}' in RECORDED_OF_JOINT]
+    side = side_of(namespace, namespaces)
+    return [row for row in OF_A_RUN.values() if not side or (
+        row.name != 'contraction' and f'{side}{row.name}' in RECORDED_OF_JOINT)]
 
 
 def _time_remarks(topic: 'TopicData', info: 'TopicInfo', stamp_ns: IntArray) -> list[str]:

@@ -105,7 +105,7 @@ def full_names(path: StrPath, topics: Mapping[str, object] | None, namespace: st
     return place, {f'{place}/{short}': name for short, name in wanted.items()}
 
 
-def may_be(short: str, types: Mapping[str, str]) -> str:
+def may_be(short: str, types: Mapping[str, str], place: str = '', which: int = 0) -> str:
     """
     Return which topics of a bag may be one of ours under another name, as a sentence, or ''.
 
@@ -115,17 +115,22 @@ def may_be(short: str, types: Mapping[str, str]) -> str:
         Our name of the topic that the bag lacks.
     types : mapping of str to str
         Message type of every topic of the bag, by full name.
+    place : str
+        Of the topic below the joint, such as ``flexor/``; '' for a muscle by itself.
+    which : int
+        Which of them is given as an example, from 0; the last one where there are fewer.
 
     """
     others = sorted(name for name, type_name in types.items()
-                    if type_name == OF_A_RUN[short].type_name and short_name(name) not in BY_NAME)
+                    if type_name == BY_NAME[short].type_name and short_name(name) not in BY_NAME)
     if not others:
         return ''
     more = f' and {len(others) - _MOST} more' if len(others) > _MOST else ''
     verb = 'has' if len(others) == 1 else 'have'
-    return (f'{short} may have another name in the bag: {", ".join(others[:_MOST])}{more} {verb} '
-            f"its type. `--topic {short}={others[0]}` reads it (in Python: topics={{'{short}': "
-            f"'{others[0]}'}})")
+    own, example = f'{place}{short}', others[min(which, len(others) - 1)]
+    return (f'{own} may have another name in the bag: {", ".join(others[:_MOST])}{more} {verb} '
+            f"its type. `--topic {own}={example}` reads it (in Python: topics={{'{own}': "
+            f"'{example}'}})")
 
 
 def may_be_in(path: StrPath, short: str) -> str:

@@ -14,8 +14,11 @@
 
 """Which topics of a bag are those of a muscle, by their names and message types."""
 
+from collections.abc import Collection
+
 from pam_actuation.bags.source import Bag, TopicData
 from pam_actuation.topics.table import OF_A_RUN, RECORDED, short_name
+from pam_sim.joint.parameters import SIDES
 
 
 def is_rig_topic(topic: TopicData) -> bool:
@@ -41,3 +44,10 @@ def namespaces(bag: Bag) -> dict[str, set[str]]:
         if short in OF_A_RUN and is_rig_topic(topic) and len(topic.payloads):
             found.setdefault(parent, set()).add(short)
     return found
+
+
+def side_of(namespace: str, present: Collection[str]) -> str:
+    """Return ``flexor/`` or ``extensor/`` for a muscle of a joint, '' for any other namespace."""
+    joint, _, side = namespace.rpartition('/')
+    is_of_joint = side in SIDES and all(f'{joint}/{other}' in present for other in SIDES)
+    return f'{side}/' if is_of_joint else ''

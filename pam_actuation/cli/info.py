@@ -21,13 +21,15 @@ from typing import TYPE_CHECKING
 
 from pam_actuation.cli.common import add_topic_option, emit, EXIT_DONE, EXIT_FINDING
 from pam_actuation.cli.options import Parser, source
+from pam_sim.joint.parameters import SIDES
 
 if TYPE_CHECKING:
     from pam_actuation.bags.info import BagInfo
 
 HELP = 'Show topics, rates, gaps, losses, metadata and plausibility of a bag.'
 EXAMPLE = 'pam info runs/first'
-_MEASURED = ('pressure', 'contraction', 'force')
+_PLACES = ('', *(f'{side}/' for side in SIDES))
+_MEASURED = ('joint_state', 'pressure', 'contraction', 'force')
 
 
 def add_arguments(parser: Parser) -> None:
@@ -77,10 +79,15 @@ def run(args: argparse.Namespace) -> int:
 def _renamed(info: 'BagInfo', types: dict[str, str]) -> list[str]:
     """Return a sentence for each topic that is told as missing and may have another name."""
     from pam_actuation.bags.renamed import may_be
-    told = [text.partition(' has no messages on ')[2] for text in (*info.remarks, *info.notes)]
-    missing = {*re.split(r'[ ,:.]+', ' '.join(told))}
-    found = (may_be(short, types) for short in _MEASURED if short in missing)
-    return [f'{text}.' for text in found if text]
+    from pam_actuation.bags.rig_topics import side_of
+    lacking: dict[str, list[str]] = {}        # of each topic the places where it is missing
+    for text in (*info.remarks, *info.notes):
+        namespace, _, told = text.partition(' has no messages on ')
+        for short in re.split(r'[ ,:.]+', told):
+            lacking.setdefault(short, []).append(side_of(namespace, info.namespaces))
+    found = (may_be(short, types, place, which) for short in _MEASURED
+             for which, place in enumerate(sorted(lacking.get(short, ()), key=_PLACES.index)))
+    return [f'{text}.' for text in dict.fromkeys(found) if text]
 
 
 def _is_mcap(path: Path) -> bool:

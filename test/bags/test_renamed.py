@@ -251,3 +251,24 @@ def test_topics_of_a_joint_have_their_place_in_the_name(tmp_path):
         questions('joint_dmsp_5_300', other, None, {'pressure': '/daq/p1'})
     question, = questions('joint_dmsp_5_300', other, '/knee/flexor', {'pressure': '/daq/p1'})
     assert_same(question.load(other), load_run(plain, '/knee/flexor'))
+
+
+def test_info_says_how_the_topics_of_a_joint_are_read(tmp_path, capsys):
+    plain = simulate_experiment(
+        load_experiment(ANGLE), rig := load_rig_or_joint('joint_dmsp_5_300_realistic'),
+        load_controller('sofc_joint_ppr', rig), tmp_path / 'plain')['bag']
+    other = str(with_other_names(plain, tmp_path / 'other', {
+        '/knee/flexor/pressure': '/daq/p1', '/knee/extensor/pressure': '/daq/p2',
+        '/knee/joint_state': '/daq/angle'}, told=False))
+    hints = ('joint_state=/daq/angle', 'flexor/pressure=/daq/p1', 'extensor/pressure=/daq/p2')
+    for options in ((), ('--namespace', '/knee')):
+        assert main(['info', other, *options]) == 1
+        said = capsys.readouterr().out
+        assert '/knee has no messages on joint_state: the analyses of a joint need it.' in said
+        assert all(f'`--topic {hint}` reads it' in said for hint in hints), said
+        assert '`--topic pressure=' not in said
+    with pytest.raises(InputError, match='`--topic joint_state=/daq/angle` reads it'):
+        load_recording(other)
+    options = [word for hint in hints for word in ('--topic', hint)]
+    assert main(['info', other, '--namespace', '/knee', *options]) == 0
+    assert 'has no messages on' not in capsys.readouterr().out
