@@ -41,7 +41,7 @@ from launch_ros.actions import LifecycleNode
 from launch_ros.parameter_descriptions import ParameterValue
 from pam_actuation.control.modes.files import joint_preset_for
 from pam_actuation.hardware.files import hardware_file
-from pam_actuation.namespaces import launch_namespace
+from pam_actuation.namespaces import launch_namespace, name_in
 from pam_actuation.nodes.hardware_check import check_hardware
 from pam_actuation.nodes.launched import full_namespace, RigEnd
 from pam_actuation.rigging import layouts
@@ -51,12 +51,12 @@ from pam_sim.joint import load_joint
 PACKAGE = 'pam_actuation'
 SIDES = ('flexor', 'extensor')
 RECORDER = 'experiment_recorder'
-# Noted from the arguments: the joint's name and valves, the file of the hardware, and what the
-# recorder is, '' for none, and tells.
-(NAME, VALVE, HARDWARE_FILE, RECORDER_NAME, RECORDED_CONTROLLER, RECORDED_EXPERIMENT,
+# Noted from the arguments: the joint's name, valves and seed, the file of the hardware, and what
+# the recorder is, '' for none, and tells.
+(NAME, VALVE, SEED, HARDWARE_FILE, RECORDER_NAME, RECORDED_CONTROLLER, RECORDED_EXPERIMENT,
  RECORDED_SEED) = (
-    'joint_name', 'valve_of_joint', 'hardware_file', 'recorder_name', 'recorded_controller',
-    'recorded_experiment', 'recorded_seed')
+    'joint_name', 'valve_of_joint', 'seed_of_sensors', 'hardware_file', 'recorder_name',
+    'recorded_controller', 'recorded_experiment', 'recorded_seed')
 
 
 def _arguments():
@@ -92,7 +92,8 @@ def _arguments():
             'experiment', default_value='joint_sine',
             description='Experiment by name, or path of its file; none: wait for references.'),
         DeclareLaunchArgument(
-            'seed', default_value='0', description='Seed of the simulated sensors.'),
+            'seed', default_value='',
+            description='Seed of the simulated sensors; empty: by the namespace.'),
         DeclareLaunchArgument(
             'record', default_value='false', choices=['true', 'false'],
             description='Whether to record a bag of the joint with both muscles.'),
@@ -110,6 +111,9 @@ def _arguments():
             description='Whether the end of the joint ends the launch; false: its nodes alone.'),
         DeclareLaunchArgument(
             'namespace', default_value='knee', description='Namespace of the joint.'),
+        DeclareLaunchArgument(
+            'name', default_value='',
+            description='Name of the joint in messages and URDF; empty: by the namespace.'),
     ]
 
 
@@ -138,7 +142,7 @@ def generate_launch_description():
     kind = {'valve_type': _text(LaunchConfiguration(VALVE))}
     valve = {**kind, 'await_subscriber': _text(LaunchConfiguration(RECORDER_NAME))}
     joint = {'joint': _text(LaunchConfiguration('joint'))}
-    seed = {'seed': ParameterValue(LaunchConfiguration('seed'), value_type=int)}
+    seed = {'seed': ParameterValue(LaunchConfiguration(SEED), value_type=int)}
     control = {
         'controller': _text(LaunchConfiguration('controller_file')),
         'accept_other_rig': ParameterValue(
@@ -200,16 +204,19 @@ def _note_names(context, end):
     end.shuts_launch_down = given('shutdown_at_end') == 'true'
     namespace = launch_namespace(given('namespace'))
     valve = given('valve') or load_joint(given('joint')).valve
+    place = full_namespace(context, namespace)
+    seed = given('seed') or str(layouts.seed_in(place))
     check_hardware(layouts.knee(
-        full_namespace(context, namespace), given('joint'), valve, layouts.NO_CONTROLLER,
+        place, given('joint'), valve, layouts.NO_CONTROLLER,
         hardware=given('hardware'), angle=given('angle')))
-    noted = {'namespace': namespace, VALVE: valve, NAME: namespace.rsplit('/', 1)[-1] or 'knee',
+    noted = {'namespace': namespace, VALVE: valve, SEED: seed,
+             NAME: given('name') or name_in(place),
              HARDWARE_FILE: hardware_file(given('hardware')),
              # Real sensors have no seed.
-             RECORDED_SEED: given('seed') if given('hardware') == SIMULATED else '-1',
+             RECORDED_SEED: seed if given('hardware') == SIMULATED else '-1',
              RECORDER_NAME: '', RECORDED_CONTROLLER: '', RECORDED_EXPERIMENT: ''}
     if given('record') == 'true':
-        noted[RECORDER_NAME] = f'{full_namespace(context, namespace)}/{RECORDER}'
+        noted[RECORDER_NAME] = f'{place}/{RECORDER}'
         if given('controller') != 'none':
             noted[RECORDED_CONTROLLER] = given('controller_file') or joint_preset_for(
                 load_joint(given('joint')), valve)

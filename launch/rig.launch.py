@@ -52,9 +52,9 @@ PACKAGE = 'pam_actuation'
 RECORDER, NO_EXPERIMENT = 'experiment_recorder', 'none'
 # Noted from the arguments; not in their place, since the next rig included would take it for its
 # own.
-VALVE, EXPERIMENT, HARDWARE_FILE, CONTROLLER, CONTROLLER_NAME, RAW, RECORDED_SEED = (
-    'valve_of_rig', 'experiment_of_rig', 'hardware_file', 'controller_node', 'controller_name',
-    'raw_valve_signals', 'recorded_seed')
+(VALVE, SEED, EXPERIMENT, HARDWARE_FILE, CONTROLLER, CONTROLLER_NAME, RAW, RECORDED_SEED) = (
+    'valve_of_rig', 'seed_of_sensors', 'experiment_of_rig', 'hardware_file', 'controller_node',
+    'controller_name', 'raw_valve_signals', 'recorded_seed')
 
 
 def _arguments():
@@ -94,7 +94,8 @@ def _arguments():
         DeclareLaunchArgument(
             'output', default_value=f'bags/rig_{started}', description='Folder of the bag.'),
         DeclareLaunchArgument(
-            'seed', default_value='0', description='Seed of the simulated sensors.'),
+            'seed', default_value='',
+            description='Seed of the simulated sensors; empty: by the namespace.'),
         DeclareLaunchArgument(
             'realtime_priority', default_value='0',
             description='Real-time priority of the nodes, 1 to 96; 0: none.'),
@@ -106,6 +107,8 @@ def _arguments():
             description='Whether the end of the rig ends the launch; false: its nodes alone.'),
         DeclareLaunchArgument(
             'namespace', default_value='muscle', description='Namespace of the rig.'),
+        DeclareLaunchArgument(
+            'name', default_value='muscle', description='Name of the muscle in messages.'),
     ]
 
 
@@ -121,7 +124,7 @@ def _node(executable, *parameters, condition=None):
     common = {
         'autostart': True, 'end_with_parent': True,
         'await_subscriber': ParameterValue(recorder, value_type=str),
-        'await_timeout_s': AWAITED_S,
+        'await_timeout_s': AWAITED_S, 'muscle': _text('name'),
         'realtime_priority': ParameterValue(priority, value_type=int),
         'use_sim_time': ParameterValue(LaunchConfiguration('use_sim_time'), value_type=bool)}
     return LifecycleNode(
@@ -134,7 +137,7 @@ def generate_launch_description():
     """Return nodes, arguments and the ways to end."""
     end = RigEnd()
     valve = {'valve_type': _text(VALVE)}
-    seed = {'seed': ParameterValue(LaunchConfiguration('seed'), value_type=int)}
+    seed = {'seed': ParameterValue(LaunchConfiguration(SEED), value_type=int)}
     control = {
         'rig': _text('rig'), 'controller': _text(CONTROLLER_NAME), 'accept_other_rig':
         ParameterValue(LaunchConfiguration('accept_other_rig'), value_type=bool)}
@@ -193,15 +196,18 @@ def _note_what_is_needed(context, end):
         file = NO_CONTROLLER
     valve = given('valve') or load_rig(given('rig')).valve
     namespace = launch_namespace(given('namespace'))
+    place = full_namespace(context, namespace)
+    seed = given('seed') or str(layouts.seed_in(place))
     check_hardware(layouts.rig(
-        full_namespace(context, namespace), given('rig'), valve, given('hardware'),
+        place, given('rig'), valve, given('hardware'),
         layouts.NO_CONTROLLER))
     name, raw = played(
         experiment, given('rig'), valve, file,
         PidNode.DEFAULT_CONTROLLERS if kind == 'pid' else None)
-    noted = {VALVE: valve, EXPERIMENT: experiment, HARDWARE_FILE: hardware_file(given('hardware')),
+    noted = {VALVE: valve, SEED: seed, EXPERIMENT: experiment,
+             HARDWARE_FILE: hardware_file(given('hardware')),
              CONTROLLER: controller_node(name) if name else NO_CONTROLLER, CONTROLLER_NAME: name,
              RAW: str(raw).lower(), 'namespace': namespace,
              # Real sensors have no seed.
-             RECORDED_SEED: given('seed') if given('hardware') == SIMULATED else '-1'}
+             RECORDED_SEED: seed if given('hardware') == SIMULATED else '-1'}
     return [SetLaunchConfiguration(key, text) for key, text in noted.items()]

@@ -51,6 +51,27 @@ def namespace_of(text: str, where: str = 'namespace') -> str:
     return namespace
 
 
+def name_in(namespace: str) -> str:
+    """Return the name of a joint by its namespace, so of one alone: left_knee in /left/knee."""
+    return namespace.strip('/').replace('/', '_') or JOINT.strip('/')
+
+
+def namespace_part(text: str, where: str = 'name') -> str:
+    """
+    Return a name that may be a part of a namespace.
+
+    Raises
+    ------
+    InputError
+        It may not.
+
+    """
+    if not _PART.fullmatch(text):
+        raise InputError(f'{text!r} is not allowed, it must be letters, digits and single _, and '
+                         'begin with a letter or _', where)
+    return text
+
+
 def lies_in(namespace: str, other: str) -> bool:
     """Return whether a namespace is another one or lies below it; all lie in the root, ''."""
     return f'{namespace}/'.startswith(f'{other}/')

@@ -34,6 +34,9 @@ UNITS = (
 
 # Text that says which topics of the rig the file has under other names; see ``names_text``.
 TOPIC_NAMES = 'topic_names'
+# Text that gives the name of a joint in messages, where that is not the end of its namespace.
+OWN_NAME = 'name_in_messages'
+_ANY_MUSCLE = 'muscle'
 
 
 def names_text(names: Mapping[str, str]) -> str:
@@ -51,6 +54,16 @@ def names_of(metadata: Mapping[str, str]) -> dict[str, str]:
             isinstance(name, str) and name.startswith('/') for name in names.values()):
         return {}
     return names
+
+
+def own_name(name: str, namespace: str) -> dict[str, str]:
+    """Return the text that tells the name of a joint in messages, {} for the usual one."""
+    return {} if name in (namespace.rpartition('/')[2], _ANY_MUSCLE) else {OWN_NAME: name}
+
+
+def name_of(metadata: Mapping[str, str], namespace: str) -> str:
+    """Return the name of a joint in messages: what its recorder told, else of its namespace."""
+    return metadata.get(OWN_NAME, '') or namespace.rpartition('/')[2]
 
 
 def software_version() -> str:

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 from pam_actuation.cli.common import (
     add_other_rig_option, add_overwrite_option, emit, EXIT_DONE, EXIT_FINDING, tell_remarks)
 from pam_actuation.cli.lasting import lasting_output
-from pam_actuation.cli.options import count, number, out_path, Parser, source
+from pam_actuation.cli.options import count, HIGHEST_SEED, number, out_path, Parser, source
 from pam_actuation.cli.viewed import add_view_option, viewed
 from pam_sim.errors import InputError
 from pam_sim.files import check_file
@@ -61,6 +61,11 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument('--record', type=out_path, default=None, metavar='DIR',
                         help='folder of a bag; of exo, of a bag for each knee')
     parser.add_argument('--namespace', default=None, help='default: /muscle, /knee, none')
+    parser.add_argument('--name', type=source, default=None, metavar='NAME',
+                        help='of the muscle or joint in its messages (default: muscle; of a joint '
+                             'by the namespace, left_knee in /left/knee)')
+    parser.add_argument('--seed', type=count(0, HIGHEST_SEED - 3), default=None, metavar='N',
+                        help='seed of the simulated sensors (default: by the namespace)')
     parser.add_argument('--domain-id', type=count(0, 232), default=None, metavar='N',
                         help='ROS domain (default: ROS_DOMAIN_ID, else 0; this machine only)')
     parser.add_argument('--realtime-priority', type=count(0, 96), default=0,
@@ -182,7 +187,7 @@ def _write_policy(args: argparse.Namespace, nodes: 'list[NodeSpec]') -> int:
 
 def _nodes(args: argparse.Namespace) -> 'list[NodeSpec]':
     """Return the nodes that are asked for."""
-    from pam_actuation.namespaces import namespace_of
+    from pam_actuation.namespaces import namespace_of, namespace_part
     from pam_actuation.rigging import layouts
     options = {'valve': args.valve, 'controller': args.controller or '',
                'experiment': args.experiment or '', 'accept_other_rig': args.accept_other_rig,
@@ -192,6 +197,15 @@ def _nodes(args: argparse.Namespace) -> 'list[NodeSpec]':
     if args.model:
         options['rig' if args.what == 'rig' else 'joint'] = args.model
     options['hardware'] = args.hardware
+    if args.name is not None:
+        if args.what == 'exo':
+            raise InputError('is for one muscle or joint; those of exo are left_knee and '
+                             'right_knee', '--name')
+        options['name'] = namespace_part(args.name, '--name')
+    if args.seed is not None:
+        if args.hardware != layouts.SIMULATED:
+            raise InputError('is of simulated sensors only', '--seed')
+        options['seed'] = args.seed
     of_joint = args.what != 'rig' and args.hardware != layouts.SIMULATED
     if args.angle == layouts.BY_TOPIC and not of_joint:
         raise InputError('is for a joint on hardware only', '--angle')

@@ -26,7 +26,8 @@ from pam_actuation.bags.ending import Ending
 from pam_actuation.bags.ending import ending_of
 from pam_actuation.bags.ending import EndWatch
 from pam_actuation.bags.ending import RECORDED_FILE
-from pam_actuation.bags.metadata import experiment_metadata, names_text, TOPIC_NAMES
+from pam_actuation.bags.metadata import (
+    experiment_metadata, names_text, own_name, TOPIC_NAMES)
 from pam_actuation.bags.recorder import RecorderCore, RecordingSummary
 from pam_actuation.bags.writer import BagWriter, check_limits
 from pam_actuation.drivers.parameter import node_parameter
@@ -134,7 +135,8 @@ class ExperimentRecorder(ManagedNode):
     def setup(self) -> None:
         """Read the metadata, subscribe."""
         self.topics: tuple[str, ...] = tuple(RECORDED)      # unless told otherwise
-        self.metadata = self._metadata()
+        self.metadata = {**self._metadata(),
+                         **own_name(self.value('muscle'), self.get_namespace())}
         self.sources: dict[str, PolledSubscription] = {}
         self.types: dict[str, str] = {}
         recorded = list(filter(None, self.value('topics'))) or self.topics

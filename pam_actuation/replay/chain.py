@@ -31,6 +31,7 @@ from typing import Any, TYPE_CHECKING
 
 import numpy as np
 from pam_actuation.bags.load_joint import MEASURED
+from pam_actuation.bags.metadata import name_of
 from pam_actuation.control.config import load_controller
 from pam_actuation.control.loop import ControllerLoop
 from pam_actuation.drivers.for_rig import driver_loops
@@ -323,7 +324,7 @@ def replay_chain(run: Run,
         recorded = recorded_topics_of_joint(run)
     if law is not None:
         _check_wanted(recorded, WANTED if of_muscle else WANTED_OF_JOINT, run)
-    chain = RepeatedLoops(rig, law, recorded_seed(run), run.namespace.rpartition('/')[2],
+    chain = RepeatedLoops(rig, law, recorded_seed(run), name_of(run.metadata, run.namespace),
                           changes=as_recorded(run.metadata, run.path))
     chain.run(recorded)
     signals = chain.signals()

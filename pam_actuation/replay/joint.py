@@ -30,6 +30,7 @@ from typing import Any, TYPE_CHECKING
 
 import numpy as np
 from pam_actuation.bags.ending import early_sentences
+from pam_actuation.bags.metadata import name_of
 from pam_actuation.control.config import load_controller
 from pam_actuation.control.modes.joint import JointController
 from pam_actuation.drivers.recorded import as_recorded
@@ -179,7 +180,7 @@ def replay_joint(run: Run, controller: 'Controller | str | os.PathLike[str] | No
             parts[name], internals = alone.commands, alone.differing
             remarks += preview_remark(run, controller)
             continue
-        loops = RepeatedLoops(joint, law, recorded_seed(run), run.namespace.rpartition('/')[2],
+        loops = RepeatedLoops(joint, law, recorded_seed(run), name_of(run.metadata, run.namespace),
                               (name,), as_recorded(run.metadata, run.path))
         loops.run(recorded_topics_of_joint(run))
         parts[name] = ChainReplay(joint.name, *loops.signals(), run.start_ns)

@@ -22,9 +22,10 @@ What the launch files of the same names describe, for those who start nodes with
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
+import zlib
 
 from pam_actuation.hardware.files import hardware_file
-from pam_actuation.namespaces import namespace_of
+from pam_actuation.namespaces import JOINT, MUSCLE, name_in, namespace_of
 from pam_actuation.resources import find_config
 from pam_actuation.rigging.node_spec import NodeSpec
 from pam_sim.joint.parameters import SIDES
@@ -37,11 +38,20 @@ BY_SIGNAL = (SIMULATED, TOPICS)     # what follows valve_signal, on which a watc
 BY_SENSORS, BY_TOPIC = 'sensors', 'topic'       # who publishes the angle of a real joint
 AWAITED_S = 150.0           # for the first measurement: others may compile for two minutes
 KNEES = ('left_knee', 'right_knee')
+_SEEDS = 1_000_000
+
+
+def seed_in(namespace: str) -> int:
+    """Return the seed of the simulated sensors in a namespace, 0 in that of the defaults."""
+    if namespace in ('', MUSCLE, JOINT):
+        return 0
+    return 2 * (zlib.crc32(namespace.encode()) % _SEEDS)        # a joint takes two
 
 
 def rig(namespace: str = '/muscle', rig: str = 'dmsp_5_300_realistic', valve: str = 'ppr',
         hardware: str = 'sim', controller: str = '', experiment: str = '', record: str = '',
-        accept_other_rig: bool = False, overwrite: bool = False) -> list[NodeSpec]:
+        accept_other_rig: bool = False, overwrite: bool = False, name: str = '',
+        seed: int | None = None) -> list[NodeSpec]:
     """
     Return the nodes of one muscle.
 
@@ -69,6 +79,10 @@ def rig(namespace: str = '/muscle', rig: str = 'dmsp_5_300_realistic', valve: st
         Take a controller file that was made for another rig.
     overwrite : bool
         Let the recorder replace the bag that is there.
+    name : str
+        Of the muscle, in its messages; '': the one of the nodes.
+    seed : int, optional
+        Of the simulated sensors; default: by the namespace.
 
     Raises
     ------
@@ -77,16 +91,17 @@ def rig(namespace: str = '/muscle', rig: str = 'dmsp_5_300_realistic', valve: st
 
     """
     namespace = namespace_of(namespace)
-    kind = {'valve_type': valve}
+    kind = {'valve_type': valve, **({'muscle': name} if name else {})}
     described = {**kind, 'rig': rig}
-    name, raw = played(experiment, rig, valve, controller)
-    driver = {**described, 'controller': name, **({'accept_valve_command': True} if raw else {})}
+    seed = seed_in(namespace) if seed is None else seed
+    law, raw = played(experiment, rig, valve, controller)
+    driver = {**described, 'controller': law, **({'accept_valve_command': True} if raw else {})}
     accept = {'accept_other_rig': True} if accept_other_rig else {}
-    nodes = [NodeSpec(controller_node(name), namespace, {
-        **described, **accept, 'controller': name})] if name else []
+    nodes = [NodeSpec(controller_node(law), namespace, {
+        **described, **accept, 'controller': law})] if law else []
     if hardware in BY_SIGNAL:
         if hardware == SIMULATED:
-            nodes.append(NodeSpec('plant_simulator', namespace, described))
+            nodes.append(NodeSpec('plant_simulator', namespace, {**described, 'seed': seed}))
         nodes += [NodeSpec('valve_watchdog', namespace, kind),
                   NodeSpec('valve_driver', namespace, driver)]
     else:
@@ -97,8 +112,8 @@ def rig(namespace: str = '/muscle', rig: str = 'dmsp_5_300_realistic', valve: st
     if not record:
         return nodes
     return _recorded(nodes, namespace, {
-        **described, **({'seed': 0} if hardware == SIMULATED else {}),
-        'output': record, 'experiment': experiment, 'controller': name}, overwrite)
+        **described, **({'seed': seed} if hardware == SIMULATED else {}),
+        'output': record, 'experiment': experiment, 'controller': law}, overwrite)
 
 
 def controller_node(controller: str) -> str:
@@ -159,11 +174,14 @@ def played(experiment: str, rig: str, valve: str, controller: str = '',
 
 
 def knee(namespace: str = '/knee', joint: str = 'joint_dmsp_5_300_realistic', valve: str = 'ppr',
-         controller: str = '', experiment: str = '', seed: int = 0,
+         controller: str = '', experiment: str = '', seed: int | None = None,
          accept_other_rig: bool = False, record: str = '', hardware: str = SIMULATED,
-         angle: str = BY_SENSORS, overwrite: bool = False) -> list[NodeSpec]:
+         angle: str = BY_SENSORS, overwrite: bool = False, name: str = '') -> list[NodeSpec]:
     """
-    Return the nodes of one joint; its name is the last part of the namespace.
+    Return the nodes of one joint.
+
+    ``name`` is that in its messages and its URDF; '': by the namespace, as is the ``seed`` of
+    the simulated sensors where none is given.
 
     ``controller`` is a preset or file, '' for the preset of valve and joint, 'none' for no node.
     ``record`` is the folder of the bag; '': no recorder. With ``overwrite`` it replaces the bag
@@ -173,7 +191,8 @@ def knee(namespace: str = '/knee', joint: str = 'joint_dmsp_5_300_realistic', va
     published by a program of your own ('topic').
     """
     namespace = namespace_of(namespace)
-    common = {'valve_type': valve, 'muscle': namespace.rsplit('/', 1)[-1] or 'knee'}
+    seed = seed_in(namespace) if seed is None else seed
+    common = {'valve_type': valve, 'muscle': name or name_in(namespace)}
     of_joint = {**common, 'joint': joint}
     by_signal = hardware in BY_SIGNAL
     file = '' if by_signal else hardware_file(hardware)
@@ -207,14 +226,16 @@ def knee(namespace: str = '/knee', joint: str = 'joint_dmsp_5_300_realistic', va
         'controller': '' if controller == NO_CONTROLLER else controller}, overwrite)
 
 
-def exo(namespace: str = '', record: str = '', **options: Any) -> list[NodeSpec]:
+def exo(namespace: str = '', record: str = '', seed: int | None = None,
+        **options: Any) -> list[NodeSpec]:
     """
     Return the nodes of two knees below a namespace, ``left_knee`` and ``right_knee``.
 
-    ``record`` is a folder that gets a bag of each; '': no recorder.
+    ``record`` is a folder that gets a bag of each; '': no recorder. ``seed`` is that of the left
+    knee, 0 by default; the right one has it and two.
     """
     return [node for k, name in enumerate(KNEES)
-            for node in knee(f'{namespace_of(namespace)}/{name}', seed=2 * k,
+            for node in knee(f'{namespace_of(namespace)}/{name}', seed=(seed or 0) + 2 * k,
                              record=record and f'{record}/{name}', **options)]
 
 

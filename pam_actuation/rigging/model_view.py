@@ -23,7 +23,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from pam_actuation.namespaces import JOINT, MUSCLE, namespace_of
+from pam_actuation.namespaces import JOINT, MUSCLE, name_in, namespace_of
 from pam_actuation.resources import config_dir
 from pam_sim.errors import InputError
 
@@ -58,7 +58,7 @@ def model_view(rig: str, namespace: str = '', muscle: str = '', rviz: bool = Tru
         Of the rig; '' for ``/muscle`` or ``/knee``.
     muscle : str
         Name in the messages of the rig; '' for that which ``pam up`` and the launch files give:
-        ``muscle``, or of a joint the last part of the namespace.
+        ``muscle``, or of a joint the one by the namespace.
     rviz : bool
         Whether to start RViz.
     use_sim_time : bool
@@ -75,7 +75,7 @@ def model_view(rig: str, namespace: str = '', muscle: str = '', rviz: bool = Tru
     model = load_rig_or_joint(rig)
     joint = isinstance(model, JointRig)
     namespace = namespace_of(namespace or (JOINT if joint else MUSCLE))
-    frames = namespace.rsplit('/', 1)[-1] or NAME_OF_MUSCLE
+    frames = name_in(namespace)
     if isinstance(model, JointRig):
         from pam_sim.joint.urdf import joint_urdf
         frames = muscle or frames

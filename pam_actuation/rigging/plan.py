@@ -24,7 +24,7 @@ from typing import Any, TYPE_CHECKING
 
 from pam_actuation.bags.metadata import experiment_metadata
 from pam_actuation.bags.place import check_bag_target
-from pam_actuation.namespaces import namespace_of, node_name_of
+from pam_actuation.namespaces import name_in, namespace_of, node_name_of
 from pam_actuation.rigging.layouts import node_of_law
 from pam_actuation.topics.table import RECORDED_OF_JOINT
 from pam_sim.errors import InputError
@@ -204,7 +204,7 @@ def _parameters(plan: RigPlan, bag: StrPath | None, learning: bool, seed: int, n
     for parameters in nodes.values():
         parameters['autostart'] = False
         if isinstance(rig, JointRig):
-            parameters['muscle'] = namespace_of(namespace).rpartition('/')[2]
+            parameters['muscle'] = name_in(namespace_of(namespace))
         if bag is not None:
             parameters['await_subscriber'] = node_name_of(RECORDER, namespace_of(namespace))
     return nodes

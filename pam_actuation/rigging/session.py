@@ -330,8 +330,8 @@ def run_experiment(experiment: 'StrPath | Experiment',
     with_recorder : bool
         False: run without recording.
     namespace : str, optional
-        Namespace of the rig; by default ``/muscle``, of a joint ``/knee``. The last part of
-        it is the name of the joint.
+        Namespace of the rig; by default ``/muscle``, of a joint ``/knee``. It tells
+        the name of the joint, ``left_knee`` in ``/left/knee``.
     overwrite : bool
         Replace an existing bag.
     realtime : bool

@@ -36,7 +36,7 @@ NUMBERS = {
     ('run', '--seed'): '0 to 4294967295', ('run', '--domain-id'): '0 to 232',
     ('simulate', '--seed'): '0 to 4294967295', ('simulate', '--preview'): '0 to 10 s',
     ('up', '--domain-id'): '0 to 232', ('up', '--realtime-priority'): '0 to 96',
-    ('up', '--seconds'): '0 s or more',
+    ('up', '--seconds'): '0 s or more', ('up', '--seed'): '0 to 4294967292',
     **{(verb, option): allowed for verb in ('status', 'estop', 'reset', 'param')
        for option, allowed in (('--domain-id', '0 to 232'), ('--wait', '0.1 to 60 s'))},
     ('import', '--rate'): '0.1 to 1000000 Hz', ('import', '--every'): '1 to 1000000',

@@ -55,7 +55,8 @@ def test_the_joint_is_the_one_whose_state_the_rig_publishes(rig, namespace, node
     assert topics == ['/robot_description']
     robot = ElementTree.fromstring(
         publisher.parameters['robot_description'].partition('?>')[2])
-    assert robot.find('link').get('name') == fixed == f'{plant.namespace.rsplit("/", 1)[1]}_base'
+    frames = namespace.strip('/').replace('/', '_') or plant.namespace.strip('/')
+    assert robot.find('link').get('name') == fixed == f'{frames}_base'
 
 
 def test_two_rigs_have_frames_of_their_own():

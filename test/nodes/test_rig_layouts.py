@@ -79,7 +79,8 @@ def test_both_knees_have_all_nodes_their_names_and_seeds():
         '/me/left_knee/extensor/valve_driver', '/me/left_knee/extensor/valve_watchdog',
         '/me/left_knee/flexor/valve_driver', '/me/left_knee/flexor/valve_watchdog',
         '/me/left_knee/joint_controller', '/me/left_knee/joint_simulator']
-    assert {node.parameters['muscle'] for node in nodes} == {'left_knee', 'right_knee'}
+    assert {node.parameters['muscle'] for node in nodes} == {
+        'me_left_knee', 'me_right_knee'}
     assert {node.parameters['valve_type'] for node in nodes} == {'hsv'}
     seeds = [node.parameters['seed'] for node in nodes if node.name == 'joint_simulator']
     assert seeds == [0, 2]          # a joint takes two
@@ -143,3 +144,42 @@ def test_without_a_controller_the_rest_stays_as_it_is(tmp_path):
     for joints in (layouts.knee, layouts.exo):
         assert names(joints(controller='none')) == [
             name for name in names(joints()) if not name.endswith('/joint_controller')]
+
+
+def test_joints_in_namespaces_of_their_own_differ_in_name_and_noise():
+    """Before, /left/knee and /right/knee had one name in the URDF, and the same noise."""
+    names_, seeds = set(), set()
+    for namespace in ('/knee', '/left/knee', '/right/knee'):
+        nodes = layouts.knee(namespace)
+        names_ |= {node.parameters['muscle'] for node in nodes}
+        seeds |= {node.parameters['seed'] for node in nodes if node.name == 'joint_simulator'}
+    assert names_ == {'knee', 'left_knee', 'right_knee'}
+    assert len(seeds) == 3 and 0 in seeds and all(seed % 2 == 0 for seed in seeds)
+    muscles = [node.parameters['seed'] for namespace in ('/muscle', '/left', '/right')
+               for node in layouts.rig(namespace) if node.name == 'plant_simulator']
+    assert muscles[0] == 0 and len({*muscles}) == 3
+
+
+def test_name_and_seed_can_be_given():
+    def nodes(*options):
+        return up._nodes(build_parser().parse_args(['up', *options, '--record', 'bag']))
+
+    given = nodes('knee', '--valve', 'ppr', '--namespace', '/left', '--name', 'hip',
+                  '--seed', '7')
+    assert {node.parameters['muscle'] for node in given} == {'hip'}
+    assert {node.parameters['seed'] for node in given if 'seed' in node.parameters} == {7}
+    given = nodes('rig', '--valve', 'ppr', '--name', 'calf', '--seed', '7')
+    assert {node.parameters['muscle'] for node in given} == {'calf'}
+    assert {node.parameters['seed'] for node in given if 'seed' in node.parameters} == {7}
+    given = nodes('exo', '--valve', 'ppr', '--seed', '8')
+    assert [node.parameters['seed'] for node in given if node.name == 'joint_simulator'] == [8, 10]
+
+
+@pytest.mark.parametrize('options, said', [
+    (['exo', '--name', 'hip'], 'is for one muscle or joint'),
+    (['knee', '--name', 'left knee'], "'left knee' is not allowed"),
+    (['knee', '--seed', '3', '--hardware', 'dummy'], 'is of simulated sensors only')])
+def test_a_name_or_seed_for_nobody_is_refused(options, said, capsys):
+    assert main(['up', *options]) == 2
+    told = capsys.readouterr().err
+    assert said in told and told.count('\n') == 1

@@ -21,6 +21,7 @@ import re
 import numpy as np
 from pam_actuation.bags.load import load_run
 from pam_actuation.bags.load_joint import load_recording
+from pam_actuation.bags.metadata import own_name
 from pam_actuation.cli.main import main
 from pam_actuation.control import tick as codes
 from pam_actuation.control.config import load_controller
@@ -114,6 +115,13 @@ def test_each_part_and_the_chain_are_reproduced_to_the_bit(run):
     for name in wanted:
         topic, _, field = name.rpartition('.')
         assert np.array_equal(np.sort(chain.recorded[name]), np.sort(run[topic][field]))
+
+
+def test_a_joint_is_repeated_under_the_name_that_its_recorder_told(run):
+    metadata = {**run.metadata, **own_name('left_knee', run.namespace)}
+    assert metadata['name_in_messages'] == 'left_knee' and own_name('knee', '/left/knee') == {}
+    renamed = replay_joint(replace(run, metadata=metadata), chain=True).parts['chain']
+    assert renamed.recorded and not renamed.identical       # its trajectories name the knee
 
 
 def test_another_law_gives_another_experiment_and_is_no_mistake(run):
