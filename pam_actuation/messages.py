@@ -124,6 +124,14 @@ class JointAngle:
 
 
 @dataclass(frozen=True, slots=True)
+class Torque:
+    """Torque on the limb of a joint [N m], flexion positive: topic external_torque."""
+
+    stamp_ns: int
+    torque_n_m: float
+
+
+@dataclass(frozen=True, slots=True)
 class AngleReference:
     """Wanted angle of a joint [rad] and its rate [rad/s]: topic joint_reference."""
 

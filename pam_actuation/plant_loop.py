@@ -27,7 +27,7 @@ from operator import attrgetter
 from typing import Any, Generic, TYPE_CHECKING, TypeVar
 
 from pam_actuation.messages import (
-    Contraction, Force, JointAngle, Pressure, SAFE_EFFORTS, VALVE_NAMES, ValveSignal)
+    Contraction, Force, JointAngle, Pressure, SAFE_EFFORTS, Torque, VALVE_NAMES, ValveSignal)
 from pam_sim.sensors import SensorChain
 from pam_sim.sensors.encoder import Encoder
 
@@ -286,7 +286,9 @@ class PlantLoop(PlantClock):
         takes: dict[str, Callable[[Any], None]] = {
             f'{place}valve_signal': partial(self.set_signal, place=place)
             for place in self.muscles}
-        return takes if self._encoder else {**takes, 'external_force': self.set_external_force}
+        if self._encoder:
+            return {**takes, 'external_torque': self.set_external_torque}
+        return {**takes, 'external_force': self.set_external_force}
 
     def set_signal(self, message: ValveSignal, writer: Hashable = None, place: str = '') -> None:
         """Take a valve signal: efforts by name, anything not finite or unknown is ignored."""
@@ -296,6 +298,11 @@ class PlantLoop(PlantClock):
         """Take the disturbance force on the load [N]; not finite is ignored."""
         if math.isfinite(message.force_n):
             self._external = float(message.force_n)
+
+    def set_external_torque(self, message: Torque) -> None:
+        """Take the disturbance torque on the limb [N m]; not finite is ignored."""
+        if math.isfinite(message.torque_n_m):
+            self._external = float(message.torque_n_m)
 
     def step(self, count: int) -> None:
         """Advance the plant by some steps with the signals held."""

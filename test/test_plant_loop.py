@@ -16,9 +16,10 @@
 
 import math
 
-from pam_actuation.messages import Force, ValveSignal
+from pam_actuation.messages import Force, Torque, ValveSignal
 from pam_actuation.plant_loop import Backlog, PlantLoop
 import pam_sim
+from pam_sim.joint import load_joint
 from pam_sim.units import P_ATM_PA
 import pytest
 
@@ -116,6 +117,20 @@ def test_external_force():
             plant.advance_to(START + k * 100 * MS)
         held.append(plant.sample(0)['contraction'].contraction_m)
     assert held[1] < held[0] - 1e-3
+
+
+def test_external_torque_turns_the_limb():
+    """0.3 N m in flexion bend a limb without air; NaN is ignored."""
+    held = []
+    for torque_n_m in (0.0, 0.3):
+        plant = PlantLoop(load_joint('joint_dmsp_5_300_realistic', valve='ppr'))
+        plant.advance_to(START)
+        take = plant.takes()['external_torque']
+        take(Torque(0, torque_n_m))
+        take(Torque(0, math.nan))
+        plant.advance_to(START + 250 * MS)
+        held.append(plant.plant.angle_rad)
+    assert held[1] > held[0] + 0.1
 
 
 def test_late_call_is_bounded_and_counted():

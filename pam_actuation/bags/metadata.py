@@ -27,7 +27,7 @@ from pam_sim.valve import VALVES
 UNITS = (
     'pressure, pressure_command, followed_pressure, supply_pressure: Pa absolute; '
     'contraction, reference, reference_trajectory: m, m/s; '
-    'force, external_force: N; '
+    'force, external_force: N; external_torque: N m; '
     'valve_signal, valve_command: ppr_voltage V, fill_duty and vent_duty 1; '
     'time: header.stamp, ns'
 )

@@ -138,6 +138,9 @@ _PRESSURE = Numbers(
     'sensor_msgs/msg/FluidPressure', messages.Pressure, (Value('pressure_pa', 'fluid_pressure'),))
 _FORCE = Numbers(
     'geometry_msgs/msg/WrenchStamped', messages.Force, (Value('force_n', 'wrench.force.x'),))
+_TORQUE = Numbers(
+    'geometry_msgs/msg/WrenchStamped', messages.Torque,
+    (Value('torque_n_m', 'wrench.torque.y'),))
 _MOTION = (Value('contraction_m', 'position'), Value('velocity_m_per_s', 'velocity'))
 _SIGNAL = NamedNumbers(messages.ValveSignal, 'efforts', 'effort')
 
@@ -183,6 +186,8 @@ TOPICS = (
           ('joint_simulator', 'hardware_sensors'),
           ('joint_controller', 'joint_trajectory_server', *REFERENCE), place=JOINT,
           steady=True),
+    Topic('external_torque', _TORQUE, 'disturbance on the simulated limb', (),
+          ('joint_simulator',), place=JOINT),
     Topic('joint_reference', Numbers(JOINT_STATE, messages.AngleReference, (
         Value('angle_rad', 'position'), Value('rate_rad_per_s', 'velocity'))),
           'wanted angle, now', REFERENCE, ('joint_controller',), place=JOINT, held=True,

@@ -102,6 +102,7 @@ SIGNALS = (
     Signal('force', 'external_force', 'force_n', 'disturbance'),
     Signal('force_error', DERIVED, 'force_error_n', 'error'),
     Signal('torque', 'joint_state', 'torque_n_m', 'torque'),
+    Signal('torque', 'external_torque', 'torque_n_m', 'disturbance'),
     Signal('rules', 'controller_state', 'feedback_rules_pa', 'feedback', _KPA),
     Signal('rules', 'controller_state', 'feedforward_rules_pa', 'feed-forward', _KPA),
     Signal('rules', 'controller_state', 'motion_rules_pa', 'motion', _KPA),

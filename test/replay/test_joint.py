@@ -31,7 +31,7 @@ from pam_actuation.experiments import load_experiment, offline
 from pam_actuation.experiments.joint_offline import JointLoops
 from pam_actuation.experiments.offline import simulate_experiment
 from pam_actuation.messages import (
-    AngleReference, AngleTrajectory, ControllerState, NamedEfforts, Pressure)
+    AngleReference, AngleTrajectory, ControllerState, NamedEfforts, Pressure, Torque)
 from pam_actuation.replay.joint import PARTS, replay_joint
 from pam_actuation.replay.joint_controller import COMMANDS
 from pam_actuation.replay.model import is_joint, model_of
@@ -225,7 +225,8 @@ TRAJECTORY = AngleTrajectory(0, (100_000_000, 300_000_000), (0.1, 0.2), (0.0, 0.
 
 @pytest.mark.parametrize('messages', [
     [('joint_trajectory', TRAJECTORY), ('co_contraction', Pressure(0, 351325.0))],
-    [('joint_effort', NamedEfforts(offline.START_NS, ('knee',), (0.1,)))]])
+    [('joint_effort', NamedEfforts(offline.START_NS, ('knee',), (0.1,)))],
+    [('joint_trajectory', TRAJECTORY), ('external_torque', Torque(offline.START_NS, -0.4))]])
 def test_a_joint_moved_without_references_is_repeated(messages, tmp_path, monkeypatch):
     joint = load_joint('joint_dmsp_5_300_realistic', valve='ppr')
     monkeypatch.setattr(offline, 'reference_tick', sent_instead(messages))
@@ -235,7 +236,9 @@ def test_a_joint_moved_without_references_is_repeated(messages, tmp_path, monkey
     run = load_recording(tmp_path / 'bag')
     assert 'joint_reference' not in run and run.remarks == ()
     assert np.ptp(run['flexor/pressure_command']['pressure_pa']) > 1e4
+    assert all(topic in run for topic, _ in messages if topic != 'joint_trajectory')
     assert replay_joint(run, chain=True).parts['chain'].identical
+    assert replay_joint(run, only='plant').parts['plant'].identical
 
 
 def test_the_chain_tells_of_references_that_are_refused(tmp_path, monkeypatch, capsys):
