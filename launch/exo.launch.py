@@ -35,6 +35,7 @@ HANDED_ON = {
     'valve': ('', 'Regulators (ppr) or high-speed valves (hsv); empty: those of the joint.'),
     'joint': ('joint_dmsp_5_300_realistic', 'Joint of both knees: preset or path.'),
     'hardware': ('sim', 'sim, topics, another name in config/hardware, or a parameter file.'),
+    'params_file': ('', 'ROS parameter file for all nodes, beside the arguments; empty: none.'),
     'angle': ('sensors', 'Who publishes the angles of real joints: sensors, or topic: you.'),
     'controller': ('sofc', 'Controllers of both knees: sofc; none: you start your own.'),
     'controller_file': ('', 'Controller preset or file; empty: the one that fits the valve.'),

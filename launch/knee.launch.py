@@ -38,11 +38,12 @@ from launch.substitutions import NotEqualsSubstitution
 from launch.substitutions import NotSubstitution
 from launch.substitutions import OrSubstitution
 from launch_ros.actions import LifecycleNode
+from launch_ros.actions import SetParametersFromFile
 from launch_ros.parameter_descriptions import ParameterValue
 from pam_actuation.control.modes.files import joint_preset_for
 from pam_actuation.hardware.files import hardware_file
 from pam_actuation.namespaces import launch_namespace, name_in
-from pam_actuation.nodes.hardware_check import check_hardware
+from pam_actuation.nodes.hardware_check import check_hardware, check_users_file
 from pam_actuation.nodes.launched import full_namespace, RigEnd
 from pam_actuation.rigging import layouts
 from pam_actuation.rigging.layouts import AWAITED_S, BY_SENSORS, BY_TOPIC, SIMULATED, TOPICS
@@ -73,6 +74,9 @@ def _arguments():
             'hardware', default_value='sim',
             description='sim, topics (a program of your own), another name in config/hardware, '
                         'or a parameter file of your own.'),
+        DeclareLaunchArgument(
+            'params_file', default_value='',
+            description='ROS parameter file for all nodes, beside the arguments; empty: none.'),
         DeclareLaunchArgument(
             'angle', default_value=BY_SENSORS, choices=[BY_SENSORS, BY_TOPIC],
             description='Who publishes the angle of a real joint: hardware_sensors, or you.'),
@@ -206,9 +210,13 @@ def _note_names(context, end):
     valve = given('valve') or load_joint(given('joint')).valve
     place = full_namespace(context, namespace)
     seed = given('seed') or str(layouts.seed_in(place))
-    check_hardware(layouts.knee(
-        place, given('joint'), valve, layouts.NO_CONTROLLER,
-        hardware=given('hardware'), angle=given('angle')))
+    nodes = layouts.knee(
+        place, given('joint'), valve,
+        layouts.NO_CONTROLLER if given('controller') == 'none' else given('controller_file'),
+        '' if given('experiment') == 'none' else given('experiment'), int(seed),
+        given('accept_other_rig') == 'true', given('output') if given('record') == 'true' else '',
+        given('hardware'), given('angle'), name=given('name'))
+    check_hardware(nodes)
     noted = {'namespace': namespace, VALVE: valve, SEED: seed,
              NAME: given('name') or name_in(place),
              HARDWARE_FILE: hardware_file(given('hardware')),
@@ -222,4 +230,11 @@ def _note_names(context, end):
                 load_joint(given('joint')), valve)
         if given('experiment') != 'none':
             noted[RECORDED_EXPERIMENT] = given('experiment')
-    return [SetLaunchConfiguration(name, value) for name, value in noted.items()]
+    actions = [SetLaunchConfiguration(name, value) for name, value in noted.items()]
+    if given('params_file'):
+        check_users_file(given('params_file'), nodes, {
+            'learning': given('learning') == 'true',
+            'use_sim_time': given('use_sim_time') == 'true',
+            'realtime_priority': int(given('realtime_priority'))})
+        actions.append(SetParametersFromFile(given('params_file')))
+    return actions

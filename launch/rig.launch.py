@@ -36,10 +36,11 @@ from launch.substitutions import LaunchConfiguration
 from launch.substitutions import NotEqualsSubstitution
 from launch.substitutions import OrSubstitution
 from launch_ros.actions import LifecycleNode
+from launch_ros.actions import SetParametersFromFile
 from launch_ros.parameter_descriptions import ParameterValue
 from pam_actuation.hardware.files import hardware_file
 from pam_actuation.namespaces import launch_namespace
-from pam_actuation.nodes.hardware_check import check_hardware
+from pam_actuation.nodes.hardware_check import check_hardware, check_users_file
 from pam_actuation.nodes.launched import full_namespace, RigEnd
 from pam_actuation.nodes.pid_controller import PidNode
 from pam_actuation.rigging import layouts
@@ -72,6 +73,9 @@ def _arguments():
             'hardware', default_value='sim',
             description='sim, topics (a program of your own), another name in config/hardware, '
                         'or a parameter file of your own.'),
+        DeclareLaunchArgument(
+            'params_file', default_value='',
+            description='ROS parameter file for all nodes, beside the arguments; empty: none.'),
         DeclareLaunchArgument(
             'controller', default_value='sofc', choices=['sofc', 'pid', NO_CONTROLLER],
             description='Self-organizing fuzzy controller or PID, where controller_file is empty; '
@@ -198,16 +202,25 @@ def _note_what_is_needed(context, end):
     namespace = launch_namespace(given('namespace'))
     place = full_namespace(context, namespace)
     seed = given('seed') or str(layouts.seed_in(place))
-    check_hardware(layouts.rig(
-        place, given('rig'), valve, given('hardware'),
-        layouts.NO_CONTROLLER))
     name, raw = played(
         experiment, given('rig'), valve, file,
         PidNode.DEFAULT_CONTROLLERS if kind == 'pid' else None)
+    nodes = layouts.rig(
+        place, given('rig'), valve, given('hardware'), name or NO_CONTROLLER, experiment,
+        given('output') if given('record') == 'true' else '',
+        given('accept_other_rig') == 'true', name=given('name'), seed=int(seed))
+    check_hardware(nodes)
     noted = {VALVE: valve, SEED: seed, EXPERIMENT: experiment,
              HARDWARE_FILE: hardware_file(given('hardware')),
              CONTROLLER: controller_node(name) if name else NO_CONTROLLER, CONTROLLER_NAME: name,
              RAW: str(raw).lower(), 'namespace': namespace,
              # Real sensors have no seed.
              RECORDED_SEED: seed if given('hardware') == SIMULATED else '-1'}
-    return [SetLaunchConfiguration(key, text) for key, text in noted.items()]
+    actions = [SetLaunchConfiguration(key, text) for key, text in noted.items()]
+    if given('params_file'):
+        check_users_file(given('params_file'), nodes, {
+            'learning': given('learning') == 'true',
+            'use_sim_time': given('use_sim_time') == 'true',
+            'realtime_priority': int(given('realtime_priority'))})
+        actions.append(SetParametersFromFile(given('params_file')))
+    return actions

@@ -15,6 +15,7 @@
 """``pam up``: bring a whole rig up in order and keep it up, without ``ros2 launch``."""
 
 import argparse
+from dataclasses import replace
 import sys
 from typing import TYPE_CHECKING
 
@@ -55,6 +56,9 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument('--hardware', type=source, default='sim', metavar='NAME',
                         help='sim; topics: sensors and valve are a program of your own; another '
                              'name in config/hardware, or a file')
+    parser.add_argument('--params-file', type=source, default=None, metavar='FILE',
+                        help='ROS parameter file for all nodes, by name or wildcard: what the '
+                             'options leave open, such as max_pressure_gauge_pa')
     parser.add_argument('--angle', choices=('sensors', 'topic'), default='sensors',
                         help='who publishes the angle of a real joint: hardware_sensors, or a '
                              'program of your own (default: %(default)s)')
@@ -93,7 +97,7 @@ def run(args: argparse.Namespace) -> int:
         prepare_template()
     from pam_actuation.bags.place import check_bag_target
     from pam_actuation.interrupts import undisturbed
-    from pam_actuation.nodes.hardware_check import check_hardware
+    from pam_actuation.nodes.hardware_check import check_hardware, check_users_file
     from pam_actuation.rigging.plan import RECORDER
     from pam_actuation.rigging.supervisor import Supervisor
     from pam_actuation.rigging.transitions import SessionFailed, termination_as_interrupt
@@ -102,6 +106,8 @@ def run(args: argparse.Namespace) -> int:
     args.valve = args.valve or _model(args).valve
     nodes = _nodes(args)
     check_hardware(nodes)
+    if args.params_file is not None:
+        check_users_file(args.params_file, nodes)
     if args.policy is None:
         for node in nodes:
             if node.name == RECORDER:
@@ -210,5 +216,7 @@ def _nodes(args: argparse.Namespace) -> 'list[NodeSpec]':
     if args.angle == layouts.BY_TOPIC and not of_joint:
         raise InputError('is for a joint on hardware only', '--angle')
     if args.what == 'rig':
-        return layouts.rig(**options)
-    return getattr(layouts, args.what)(**options, angle=args.angle)
+        nodes = layouts.rig(**options)
+    else:
+        nodes = getattr(layouts, args.what)(**options, angle=args.angle)
+    return [replace(node, users_file=args.params_file or '') for node in nodes]

@@ -43,7 +43,7 @@ def hardware_file(name: str) -> str:
     """
     path = find_config('hardware', name)
     tree = load_yaml(path)
-    if not _holds_parameters(tree, _DEPTH):
+    if not holds_parameters(tree):
         kind = next((f'is {what}, not hardware; give it with {option}'
                      for key, what, option in _OTHERS if key in tree),
                     'is no file of hardware')
@@ -53,8 +53,8 @@ def hardware_file(name: str) -> str:
     return str(path)
 
 
-def _holds_parameters(tree: Located, depth: int) -> bool:
+def holds_parameters(tree: Located, depth: int = _DEPTH) -> bool:
     """Return whether every branch of a tree leads to parameters of a node."""
     return bool(tree) and depth > 0 and all(
-        isinstance(value, Located) and (key == PARAMETERS or _holds_parameters(value, depth - 1))
+        isinstance(value, Located) and (key == PARAMETERS or holds_parameters(value, depth - 1))
         for key, value in tree.items())

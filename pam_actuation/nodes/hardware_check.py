@@ -13,16 +13,16 @@
 # limitations under the License.
 
 """
-What a file of hardware says to nobody: nodes and parameters that are not there.
+What a file of parameters says to nobody: nodes and parameters that are not there.
 
 A node only warns of a parameter that it does not know, and ROS is silent on a node that does not
 run. With a wrong name a pressure limit would not be the one that is stated.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 import re
 
-from pam_actuation.hardware.files import PARAMETERS
+from pam_actuation.hardware.files import holds_parameters, PARAMETERS
 from pam_actuation.namespaces import node_name_of
 from pam_actuation.rigging.node_spec import NodeSpec, ORDER
 from pam_actuation.rigging.plan import DRIVER
@@ -33,6 +33,7 @@ from pam_sim.located_yaml import load_yaml, Located
 BACK_END = 'backend'
 WILDCARDS = {'**': '(/[^/]+)*', '*': '/[^/]+'}
 OF_ROS = ('use_sim_time', 'qos_overrides.')
+BRINGING_UP = ('autostart', 'notes_folder')     # set by what starts the nodes
 
 
 def check_hardware(nodes: Iterable[NodeSpec]) -> None:
@@ -51,6 +52,68 @@ def check_hardware(nodes: Iterable[NodeSpec]) -> None:
             told.setdefault(node.parameter_file, []).append(node)
     for file, readers in told.items():
         _check_file(load_yaml(file), readers)
+
+
+def check_users_file(file: str, nodes: Iterable[NodeSpec],
+                     more: Mapping[str, object] | None = None) -> None:
+    """
+    Check a file with parameters for any of the nodes, before one of them starts.
+
+    It may hold those of other nodes too, of a larger stack. ``more``: what every node that has
+    such a parameter is started with besides those of its own.
+
+    Raises
+    ------
+    InputError
+        No such file, or one of another kind. It names a parameter that there is not, or a value
+        that is not allowed or not what the nodes are started with. It reaches no node.
+
+    """
+    tree = load_yaml(file)
+    if not holds_parameters(tree):
+        raise tree.error(f'is no parameter file: one holds parameters of nodes below '
+                         f'`{PARAMETERS}`')
+    named = {node_name_of(node.name, node.namespace): node for node in nodes}
+    kinds = sorted({node.name for node in named.values()})
+    none = True
+    for words, holder, key in _entries(tree):
+        reached = {name: node for name, node in named.items() if _matches(words, name)}
+        if reached:
+            none, given = False, holder[key][PARAMETERS]
+            _check_names(given, sorted({node.name for node in reached.values()}))
+            _check_values(given, reached, more or {})
+        elif words[-1] not in (*ORDER, *WILDCARDS) and (near := did_you_mean(words[-1], kinds)):
+            raise holder.error(f'unknown node `{words[-1]}`{near}', key)
+    if none:
+        raise tree.error(f'is for none of the nodes that are started: {", ".join(named)}')
+
+
+def _check_values(given: Located, reached: Mapping[str, NodeSpec],
+                  more: Mapping[str, object]) -> None:
+    """Raise InputError on the first value that is not allowed, or not the one that is given."""
+    from pam_actuation.nodes.interfaces import node_class
+    from pam_actuation.nodes.managed import COMMON_PARAMETERS
+    from pam_actuation.nodes.parameters import problem
+    for name, holder, key in _flat(given):
+        value = holder[key]
+        if name in BRINGING_UP:
+            raise holder.error(f'`{name}` is set by what starts the nodes', key)
+        for full_name, node in reached.items():
+            known = {one.name: one for one in (
+                *COMMON_PARAMETERS, *node_class(node.name).PARAMETERS)}
+            if name not in (*known, *more) or not isinstance(value, (bool, int, float, str)):
+                continue
+            wrong = ''
+            if name in known:
+                if type(value) is int and isinstance(known[name].default, float):
+                    value = float(value)
+                wrong = problem(known[name], value)
+            own = {**more, **node.parameters}.get(name, value)
+            if not wrong and own != value:
+                wrong = (f'{value!r} is not what {full_name} is started with, {own!r}; choose it '
+                         'with the option or argument that is there for it')
+            if wrong:
+                raise holder.error(f'`{name}`: {wrong}', key)
 
 
 def _check_file(tree: Located, readers: list[NodeSpec]) -> None:

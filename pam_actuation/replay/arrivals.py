@@ -46,7 +46,8 @@ ORDER = tuple(OF_A_RUN)
 # Of a joint as well; the angle comes first, it tells of a sample.
 ORDER_OF_JOINT = ('joint_state', 'pressure', 'contraction', 'force', 'supply_pressure',
                   'external_torque', 'joint_reference', 'joint_trajectory', 'joint_effort',
-                  'co_contraction', 'controller_state', 'pressure_command', 'valve_signal', 'followed_pressure')
+                  'co_contraction', 'controller_state', 'pressure_command', 'valve_signal',
+                  'followed_pressure')
 # Stamped by a tick that used what had arrived before the stamp.
 TICKED = ('controller_state', 'pressure_command', 'valve_signal')
 CLOCKS_AGREE_NS = 500_000_000

@@ -176,8 +176,8 @@ class NodeGroup:
             with held() as interrupted:
                 self.processes[name] = NodeProcess(
                     node.name, node.namespace, node.parameters, environment, log_dir,
-                    parameter_file=node.parameter_file, label=node.label, program=node.program,
-                    template=template)
+                    parameter_file=node.parameter_file, users_file=node.users_file,
+                    label=node.label, program=node.program, template=template)
             if interrupted():
                 raise KeyboardInterrupt
         if self.client is None:

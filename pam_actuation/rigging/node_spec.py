@@ -27,7 +27,10 @@ ORDER = ('experiment_recorder', 'plant_simulator', 'hardware_sensors', 'joint_si
 @dataclass(frozen=True)
 class NodeSpec:
     """
-    One node: executable, namespace, parameters, and a file with further ones or ''.
+    One node: executable, namespace, parameters, and files with further ones or ''.
+
+    ``parameter_file`` is that of its hardware. ``users_file`` is one for all nodes, for what
+    ``parameters`` leave open.
 
     ``label`` is what sentences call it; '': its name. ``program`` starts a node of somebody else
     in its place; (): the one of this package.
@@ -37,5 +40,6 @@ class NodeSpec:
     namespace: str
     parameters: Mapping[str, Any] = field(default_factory=dict)
     parameter_file: str = ''
+    users_file: str = ''
     label: str = ''
     program: tuple[str, ...] = ()

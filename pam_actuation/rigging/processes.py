@@ -97,6 +97,8 @@ class NodeProcess:
         Topic of the node to the name it has instead.
     parameter_file : str
         ROS parameter file with further parameters; '' for none.
+    users_file : str
+        One whose parameters count where ``parameters`` and ``parameter_file`` say nothing.
     label : str
         What sentences call it, such as ``flexor/valve_driver``; '': its name.
     program : sequence of str
@@ -111,14 +113,16 @@ class NodeProcess:
     def __init__(self, name: str, namespace: str, parameters: Mapping[str, Any],
                  environment: Mapping[str, str], log_dir: str | os.PathLike[str],
                  remap: Mapping[str, str] | None = None, parameter_file: str = '',
-                 label: str = '', program: Sequence[str] = (),
+                 users_file: str = '', label: str = '', program: Sequence[str] = (),
                  template: 'NodeTemplate | None' = None) -> None:
         self.name = name
         self.label = label or name
         self.full_name = f'{namespace.rstrip("/")}/{name}'
         self.log_file = Path(log_dir) / f'{name}.log'
         arguments = [
-            '--ros-args', '-r', f'__ns:={namespace or "/"}', *parameter_arguments(parameters)]
+            '--ros-args', '-r', f'__ns:={namespace or "/"}',
+            *(['--params-file', users_file] if users_file else []),
+            *parameter_arguments(parameters)]
         if parameter_file:
             arguments += ['--params-file', parameter_file]
         if environment.get('ROS_SECURITY_ENABLE') == 'true':

@@ -59,7 +59,7 @@ class Supervisor:
         self._notes = tempfile.TemporaryDirectory(prefix='pam_notes_')
         self._group = NodeGroup({
             node_name_of(node.name, node.namespace): replace(node, parameters={
-                'realtime_priority': realtime_priority,
+                **({'realtime_priority': realtime_priority} if realtime_priority else {}),
                 **({'notes_folder': self._notes.name} if node.name == RECORDER else {}),
                 **node.parameters, 'autostart': False})
             for node in nodes}, domain_id=domain_id)

@@ -18,8 +18,9 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from pam_actuation.cli.main import main                                     # noqa: E402, I100
-from pam_actuation.nodes.hardware_check import check_hardware               # noqa: E402
+from pam_actuation.cli import up                                            # noqa: E402, I100
+from pam_actuation.cli.main import build_parser, main                       # noqa: E402
+from pam_actuation.nodes.hardware_check import check_hardware, check_users_file  # noqa: E402
 from pam_actuation.rigging import layouts                                   # noqa: E402
 from pam_sim.errors import InputError                                       # noqa: E402
 
@@ -89,3 +90,54 @@ def test_each_muscle_of_a_joint_needs_a_back_end(tmp_path):
 @pytest.mark.parametrize('name', ['dummy', 'ppr_iio', 'hsv_pwm'])
 def test_the_shipped_files_are_right(name):
     check_hardware(layouts.rig(hardware=name))
+
+
+STACK = """
+/**:
+  ros__parameters: {use_sim_time: false, valve_type: ppr}
+/**/valve_driver:
+  ros__parameters: {max_pressure_gauge_pa: 300000}
+/*/flexor/valve_driver:
+  ros__parameters: {rig: joint_dmsp_5_300_realistic/flexor}
+/right/knee/joint_controller:
+  ros__parameters: {learning: false}
+/planner:
+  ros__parameters: {stride_s: 1.1}
+"""
+WRONG = {
+    'a misspelt parameter': (
+        STACK.replace('max_pressure', 'max_presure'), 'did you mean `max_pressure_gauge_pa`'),
+    'out of range': (STACK.replace('300000', '3.0e7'), 'must lie in 1000 to 1e+06'),
+    'another type': (STACK.replace('300000', '300 kPa'), 'must be of type float'),
+    'a misspelt node': (STACK.replace('**/valve_driver', '**/valve_drivr'), 'did you mean `valve'),
+    'of an option': (STACK.replace('valve_type: ppr', 'valve_type: hsv'), "started with, 'ppr'"),
+    'of bringing up': (
+        STACK.replace('use_sim_time: false', 'autostart: true'), 'set by what starts the nodes'),
+    'for nobody': ('/planner:\n  ros__parameters: {x: 1.0}\n', 'is for none of the nodes'),
+    'no parameter file': ('name: x\nsegments: []\n', 'is no parameter file'),
+    'no YAML': ('/**: [', '')}
+
+
+@pytest.mark.parametrize('case', WRONG)
+def test_a_mistake_in_a_file_of_the_users_is_one_sentence(tmp_path, capsys, case):
+    text, words = WRONG[case]
+    file = tmp_path / 'stack.yaml'
+    file.write_text(text)
+    assert main(['up', 'knee', '--valve', 'ppr', '--params-file', str(file)]) == 2
+    told = capsys.readouterr().err
+    assert f'{file}' in told and words in told and told.count('\n') == 1
+    assert main(['up', 'knee', '--params-file', str(tmp_path / 'none.yaml')]) == 2
+    assert capsys.readouterr().err.count('\n') == 1
+
+
+def test_a_file_of_the_users_is_for_all_nodes_and_may_be_that_of_a_stack(tmp_path):
+    file = tmp_path / 'stack.yaml'
+    file.write_text(STACK)
+    args = build_parser().parse_args(
+        ['up', 'knee', '--valve', 'ppr', '--params-file', str(file)])
+    nodes = up._nodes(args)
+    assert {node.users_file for node in nodes} == {str(file)}
+    check_users_file(str(file), nodes)
+    nodes = layouts.knee('/right/knee')
+    with pytest.raises(InputError, match='False is not what .*joint_controller is started with'):
+        check_users_file(str(file), nodes, {'learning': True})
