@@ -21,8 +21,8 @@ import sys
 from typing import TYPE_CHECKING
 
 from pam_actuation.cli.common import (
-    add_overwrite_option, add_recover_option, add_rig_options, check_outputs, emit, EXIT_DONE,
-    progress)
+    add_overwrite_option, add_recover_option, add_rig_options, add_topic_option, check_outputs,
+    emit, EXIT_DONE, progress)
 from pam_actuation.cli.options import count, out_path, Parser, source
 
 if TYPE_CHECKING:
@@ -49,6 +49,7 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument('--save', type=out_path, metavar='FILE', default=None,
                         help='write the rules to a rule file, for --rules of other verbs')
     parser.add_argument('--namespace', default=None, help='namespace of the muscle in a bag')
+    add_topic_option(parser)
     add_rig_options(parser)
     add_overwrite_option(parser)
     add_recover_option(parser)
@@ -90,7 +91,7 @@ def _find(args: argparse.Namespace, name: str) -> 'FoundRules':
         def done(share: float) -> None:
             bar.update(round(100 * share) - bar.n)
         return find_rules(
-            name, lambda: _rig(args), args.namespace, args.recover, done)
+            name, lambda: _rig(args), args.namespace, args.recover, done, args.renamed)
 
 
 def _rig(args: argparse.Namespace) -> 'JointRig | Rig':

@@ -14,7 +14,7 @@
 
 """Rules from what a user names: a rule file, a controller, a preset, or a recording."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 import os
 from pathlib import Path
@@ -57,7 +57,8 @@ class FoundRules:
 def find_rules(name: Path | str, rig: 'Callable[[], Rig | JointRig] | None' = None,
                namespace: str | None = None,
                recover: bool = False,
-               progress: Callable[[float], object] | None = None) -> FoundRules:
+               progress: Callable[[float], object] | None = None,
+               topics: Mapping[str, object] | None = None) -> FoundRules:
     """
     Return the rules a user names.
 
@@ -74,6 +75,8 @@ def find_rules(name: Path | str, rig: 'Callable[[], Rig | JointRig] | None' = No
         Also read a recording that broke off.
     progress : callable, optional
         Called with the share done, 0 to 1, while a recording is stepped through.
+    topics : dict of str to str, optional
+        Topics of a bag with other names than ours, as of ``load_run``.
 
     Raises
     ------
@@ -85,7 +88,7 @@ def find_rules(name: Path | str, rig: 'Callable[[], Rig | JointRig] | None' = No
     if path.suffix == '.json':
         return FoundRules(path.name, 'rule file', load_rules(path))
     if path.is_dir() or path.suffix in _BAG_ENDINGS or path.name == 'metadata.yaml':
-        return _of_recording(path, namespace, recover, progress)
+        return _of_recording(path, namespace, recover, progress, topics)
     controller = load_controller(
         name, None if rig is None else rig(), accept_other_rig=True)     # it is read, not run
     if controller.rules is None:
@@ -102,10 +105,11 @@ def saved_beside(path: Path) -> Path:
 
 
 def _of_recording(path: Path, namespace: str | None, recover: bool,
-                  progress: Callable[[float], object] | None) -> FoundRules:
+                  progress: Callable[[float], object] | None,
+                  topics: Mapping[str, object] | None) -> FoundRules:
     """Return the rules of a recording, with what cannot be right in its values."""
     from pam_actuation.bags.load import load_run
-    run = load_run(path, namespace=namespace, recover=recover)
+    run = load_run(path, namespace=namespace, recover=recover, topics=topics)
     found = _of_run(run, path, progress)
     return replace(found, remarks=(*run.implausible, *found.remarks),
                    implausible=run.implausible)

@@ -190,7 +190,8 @@ def test_every_verb_that_reads_bags_takes_the_names(silent, tmp_path, capsys):
             'gap': ['--model', 'dmsp_5_300_hanging_mass', '--out', str(tmp_path / 'gap')],
             'characterise': ['--out', str(tmp_path / 'characterise')],
             'export': ['--out', str(tmp_path / 'table.csv')]}
-    for verb in ('info', 'replay', 'report', 'gap', 'tune', 'identify', 'export', 'characterise'):
+    for verb in ('info', 'replay', 'report', 'gap', 'tune', 'identify', 'export', 'characterise',
+                 'rules'):
         assert main([verb, bag, *more.get(verb, []), '--topic', 'pressure=/daq/p2']) == 2
         said = capsys.readouterr().err
         assert 'has no topic /daq/p2 (did you mean `/daq/p1`?)' in said, (verb, said)
