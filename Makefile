@@ -4,7 +4,7 @@
 #   make test    run every test
 #   make docs    build the documentation: build/docs/index.html
 #
-# All create the environment first (.venv, once, and again when setup.py changes).
+# All create the environment first (.venv, once) and install anew into it when setup.py changes.
 #   PYTHON=/path/to/python3.12    use this interpreter
 #   VENV=folder                   put the environment elsewhere
 #   ARGS="..."                    further arguments of `pam demo` or pytest
@@ -13,6 +13,7 @@ VENV ?= .venv
 ARGS ?=
 BIN := $(VENV)/bin
 STAMP := $(VENV)/installed
+BEFORE := $(VENV).before
 EXTRAS := $(VENV)/extras
 COMPILED := $(VENV)/compiled
 RARELY := plotly|sqlalchemy|debugpy|pip|setuptools|matplotlib|fontTools|mypy|mypyc
@@ -26,7 +27,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: help demo test docs env all_of_it clean
 
-# PYTHON names another version than the environment has: it is made anew.
+# PYTHON names another version than the environment has: another one takes its place.
 VERSION_OF = $(shell "$(1)" -c 'import sys; print(sys.version_info[:2])' 2>/dev/null)
 ifneq ($(PYTHON),)
 ifneq ($(call VERSION_OF,$(PYTHON)),$(call VERSION_OF,$(BIN)/python))
@@ -70,9 +71,15 @@ BYTE_CODE = '$(BIN)/python' -m compileall -q -j 0 -x 'site-packages/(.*/tests|$(
 # pip compiles one file after the other, tests of all packages as well; here all cores compile.
 # Large packages of which little is imported are left to the first import.
 # A name on the PATH proves nothing (version managers put stubs there), so each candidate is run.
-# One within the environment would be deleted with it, so the interpreter behind it is used.
+# One within the environment would be moved with it, so the interpreter behind it is used.
+# An environment that fits is kept. Another one is moved aside, and is back if its heir fails.
+FITS = '$(BIN)/python' -c 'import pip, sys; sys.exit(str(sys.version_info[:2]) not in sys.argv)' \
+	$(if $(PYTHON),"$(call VERSION_OF,$(PYTHON))","(3, 11)" "(3, 12)") >/dev/null 2>&1
+
 $(STAMP): setup.py pyproject.toml
-	@found=''; \
+	@aside=''; \
+	$(FITS) || { \
+	found=''; \
 	for python in $(if $(PYTHON),'$(PYTHON)',python3.12 python3.11 python3 python); do \
 	  if "$$python" -c 'import sys, venv, ensurepip; \
 	  sys.exit(sys.version_info[:2] not in ((3, 11), (3, 12)))' >/dev/null 2>&1; then \
@@ -85,11 +92,21 @@ $(STAMP): setup.py pyproject.toml
 	  exit 1; \
 	fi; \
 	found="$$("$$found" -c 'import sys; print(sys._base_executable)')"; \
+	rmdir '$(VENV)' 2>/dev/null; \
+	if [ -e '$(BEFORE)' ] || { [ -e '$(VENV)' ] && [ ! -e '$(STAMP)' ]; }; then \
+	  echo 'Nothing is replaced: $(VENV) was not finished by make, or $(BEFORE) is in the way.' >&2; \
+	  echo 'Remove it, or name another folder with: make VENV=folder' >&2; \
+	  exit 1; \
+	fi; \
 	echo "Creating the environment $(VENV) with $$("$$found" --version) (once; needs a network or a pip cache)"; \
-	rm -rf '$(VENV)' && "$$found" -m venv '$(VENV)' \
-	&& { '$(BIN)/python' -m pip install --quiet --no-compile --retries 0 --upgrade pip >/dev/null 2>&1 || true; } \
-	&& $(INSTALL) --editable . \
-	|| { $(FAILED); }; \
+	trap '[ ! -e "$$aside" ] || { rm -rf "$(VENV)"; mv "$$aside" "$(VENV)"; }' EXIT; \
+	trap 'exit 1' INT TERM; \
+	if [ -e '$(VENV)' ]; then aside='$(BEFORE)'; mv '$(VENV)' "$$aside"; fi \
+	&& "$$found" -m venv '$(VENV)' || exit 1; \
+	'$(BIN)/python' -m pip install --quiet --no-compile --retries 0 --upgrade pip >/dev/null 2>&1; \
+	}; \
+	$(INSTALL) --editable . || { $(FAILED); }; \
+	rm -rf "$$aside"; \
 	$(BYTE_CODE); \
 	touch '$@'
 
