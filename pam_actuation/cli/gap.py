@@ -36,6 +36,12 @@ HELP = 'Find what a model misses in recorded runs, name it, add it and prove tha
 EXAMPLE = 'pam gap runs/first --model dmsp_5_300_hanging_mass --certify runs/second --out gap'
 SECONDS = 120.0
 MODEL = 'dmsp_5_300_hanging_mass'
+# Options that a question of the other kind needs: here they would change nothing.
+UNUSED = {
+    '--explain': ('plan', 'valve', 'no_force', 'certify', 'effects', 'seconds', 'materiality',
+                  'out'),
+    '--plan': ('namespace', 'renamed', 'certify', 'seconds'),
+    'a recording': ('valve', 'no_force')}
 
 
 def add_arguments(parser: Parser) -> None:
@@ -80,6 +86,7 @@ def run(args: argparse.Namespace) -> int | None:
     from pam_actuation.report.joint_gap import questions
     from pam_actuation.report.model_held import recorded_model
     from pam_sim.errors import InputError
+    _refuse_unused(args)
     if args.explain is not None:
         return _explain(args)
     if args.plan:
@@ -103,6 +110,19 @@ def run(args: argparse.Namespace) -> int | None:
         '\n'.join(lines))
     refused = any(result.verdict == 'refused' for result in found.values())
     return EXIT_FINDING if refused else EXIT_DONE
+
+
+def _refuse_unused(args: argparse.Namespace) -> None:
+    """Refuse an option that the answer would not regard; InputError."""
+    from pam_sim.errors import InputError
+    asked = '--explain' if args.explain is not None else '--plan' if args.plan else 'a recording'
+    declared = Parser()
+    add_arguments(declared)
+    for action in declared._actions:
+        if action.dest in UNUSED[asked] and getattr(args, action.dest) != action.default:
+            raise InputError(f'does not go with {asked}', action.option_strings[0])
+    if args.explain is not None and len(args.run) > 1:
+        raise InputError(f'takes one bag, {len(args.run)} were given', '--explain')
 
 
 def _joint_model(question: 'Question', model: str) -> str:

@@ -115,6 +115,19 @@ def test_a_name_that_cannot_be_tried_is_told_and_alone_refused(tmp_path, capsys)
     assert capsys.readouterr().err.endswith(f'{nominal().name}: {told}\n')
 
 
+@pytest.mark.parametrize('words, told', [
+    (['--valve', 'hsv', '--out', 'g'], '--valve: does not go with a recording'),
+    (['--no-force', '--out', 'g'], '--no-force: does not go with a recording'),
+    (['--plan', '--certify', 'other'], '--certify: does not go with --plan'),
+    (['--plan', '--topic', 'pressure=/p'], '--topic: does not go with --plan'),
+    (['--plan', '--explain', 'creep'], '--plan: does not go with --explain'),
+    (['--explain', 'creep', '--out', 'g'], '--out: does not go with --explain'),
+    (['second', '--explain', 'creep'], '--explain: takes one bag, 2 were given')])
+def test_an_option_of_another_question_is_refused(words, told, capsys):
+    assert main(['gap', 'bag', *words]) == 2
+    assert capsys.readouterr().err == f'pam gap: {told}\n'
+
+
 def test_the_verb_writes_an_experiment_that_runs(monkeypatch, tmp_path, capsys):
     short, whole = short_experiment(tmp_path), protocols.pieces('ppr')
     monkeypatch.setattr(protocols, 'pieces', lambda *of: {'slow': whole['slow']})
