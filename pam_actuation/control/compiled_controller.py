@@ -173,10 +173,11 @@ class CompiledController:
         Raises
         ------
         InputError
-            Settings that make no controller.
+            Settings that make no controller, or a law without this method.
 
         """
-        raise NotImplementedError
+        raise InputError(f'a {self.kind} controller takes no other settings; `with_settings` of '
+                         f'{type(self).__name__} is to be written', 'controller')
 
     def learning_reason(self) -> str:
         """Return in words whether the last tick learned, or why not."""

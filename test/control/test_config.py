@@ -20,7 +20,7 @@ import numpy as np
 from pam_actuation import warm_up
 from pam_actuation.control.config import load_controller
 from pam_actuation.control.laws import LAWS
-from pam_actuation.control.pid import SETTINGS as PID_SETTINGS
+from pam_actuation.control.pid import PidController, SETTINGS as PID_SETTINGS
 from pam_actuation.control.sofc.settings import SETTINGS as SOFC_SETTINGS
 from pam_actuation.tuning.closed_loop import _rollout_of, ROLLOUTS
 from pam_actuation.tuning.problem import rebuild
@@ -121,9 +121,11 @@ def test_every_law_may_be_tuned_and_is_compiled_ahead(kind):
     assert any(preset.partition('_')[0] == kind for preset in warm_up.LAWS)
 
 
-@pytest.mark.parametrize('name', ['sofc_ppr', 'pid', 'lqi', 'ilc_ppr', 'mpc_ppr'])
-def test_a_law_with_the_settings_it_has_is_the_same_to_the_bit(name):
-    first = load_controller(name, load_rig('dmsp_5_300_hanging_mass'))
+@pytest.mark.parametrize('kind', LAWS)
+def test_a_law_with_the_settings_it_has_is_the_same_to_the_bit(kind):
+    preset = next(one for one in warm_up.LAWS if one.partition('_')[0] == kind)
+    first = load_controller(preset, load_rig('dmsp_5_300_hanging_mass'))
+    assert first.kind == kind
     first.step(0.0, 0.01, 0.0, 0.01, 0.0)
     second = rebuild(first, {})
     assert type(second) is type(first) and second.to_yaml() == first.to_yaml()
@@ -139,6 +141,12 @@ def test_a_law_without_axes_or_loop_is_refused_in_a_sentence():
         default_axes(controller)
     with pytest.raises(InputError, match='no compiled loop of a relay controller'):
         _rollout_of('relay')
+
+
+def test_a_law_without_with_settings_is_refused_in_a_sentence(monkeypatch):
+    monkeypatch.delattr(PidController, 'with_settings')
+    with pytest.raises(InputError, match='^controller: a pid controller takes no other settings'):
+        rebuild(load_controller('pid', StraightRig()), {})
 
 
 def test_unknown_preset_lists_the_known_ones():

@@ -15,7 +15,7 @@
 """Numbers of the compiled laws belong to their names, wherever they lie in memory."""
 
 import numpy as np
-from pam_actuation.control import ilc, lqi, mpc, pid
+from pam_actuation.control import ilc, laws, lqi, mpc, pid
 from pam_actuation.control.compiled_controller import CompiledController
 from pam_actuation.control.inputs import INPUT, write_inputs
 from pam_actuation.control.settings import parameter_record, setting
@@ -59,6 +59,10 @@ OUTPUTS = {
         'motion_rule_change_norm_pa', 'start_offset_m', 'jump_to_go_m', 'window_rms_error_m',
         'best_window_rms_error_m', 'learning_rate_factor', 'times_rolled_back', 'path_rules_pa',
         'disturbance_pa', 'predicted_feedback_pa', 'path_rule_change_norm_pa')}
+
+
+def test_every_law_of_controller_files_is_here():
+    assert set(LAWS) == set(OUTPUTS) == set(laws.LAWS), 'add the law to LAWS and OUTPUTS above'
 
 
 @pytest.mark.parametrize('law', LAWS)

@@ -19,12 +19,14 @@ import re
 import sys
 
 from pam_actuation.control.config import load_controller
+from pam_actuation.control.laws import LAWS
 from pam_actuation.control.sofc.settings import SETTINGS
 from pam_actuation.experiments import load_experiment
 from pam_actuation.experiments.primitives import PRIMITIVES
 from pam_sim import load_joint, load_rig
 from pam_sim.effects.registry import effects
 from pam_sim.errors import InputError
+from pam_sim.muscle.registry import laws
 import pytest
 import yaml
 
@@ -82,14 +84,14 @@ BLOCKS = [
     ('rig', load_rig, RIG + f'law: {{{WRONG}: 1}}\n'),
     ('rig', load_rig, RIG + f'law: {{name: lookup, table: {{{WRONG}: 1}}}}\n'),
     *(('rig', load_rig, RIG + f'law: {{name: {law}, parameters: {{{WRONG}: 1}}}}\n')
-      for law in ('sarosi', 'chou_hannaford', 'repperger', 'tondu_lopez', 'situm_herceg')),
+      for law in laws() if law != 'lookup'),        # which has a table, see above
     *(('rig', load_rig, RIG + f'effects: [{{name: {name}, parameters: {{{WRONG}: 1}}}}]\n')
       for name in effects()),
     ('joint', joint, f'{WRONG}: 1\n'),
     ('joint', joint, f'parameters: {{{WRONG}: 1}}\n'),
     ('controller', controller, SOFC + f'{WRONG}: 1\n'),
     *(('controller', controller, f'controller: {kind}\nsettings: {{{WRONG}: 1}}\n')
-      for kind in ('sofc', 'pid', 'lqi', 'ilc', 'mpc')),
+      for kind in LAWS),
     ('controller', controller, f'controller: sofc\nmade_for: {{{WRONG}: 1}}\n'),
     ('controller', controller, SOFC + f'static_inverse: {{{WRONG}: 1}}\n'),
     ('controller', controller, f'controller: lqi\nmodel: {{{WRONG}: 1}}\n'),
