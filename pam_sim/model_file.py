@@ -23,12 +23,14 @@ from pam_sim.errors import did_you_mean, InputError
 from pam_sim.files import shown, StrPath
 from pam_sim.keys import Key, names_of
 from pam_sim.load import LOADS
+from pam_sim.load.registry import VARIABLE as LOADS_VARIABLE
 from pam_sim.located_yaml import Located, LocatedList
 from pam_sim.muscle.coefficients import ALL, coefficients, PREFIX, stated_names
 from pam_sim.muscle.muscle import (
     get_muscle, LawChoice, muscle_names, read_law, read_muscle, with_volume_of)
 from pam_sim.named_files import file_stem, NamedFiles
 from pam_sim.parameters import check_parameters, Parameter
+from pam_sim.plugins import pick
 from pam_sim.rig import Rig
 from pam_sim.rig_parameters import rig_parameters
 from pam_sim.sensors import SENSOR_PARAMETERS
@@ -137,7 +139,9 @@ def _from_mapping(data: Located, name: str | None, seen: tuple[str, ...]) -> Rig
             muscle = read_muscle(data['muscle'])
         else:
             muscle = get_muscle(data.require('muscle', str, choices=muscle_names()))
-        base = Rig(name or 'rig', data.require('load', str, choices=tuple(LOADS)), muscle=muscle)
+        load = data.require('load', str)
+        pick(LOADS, load, 'load', data.where('load'), LOADS_VARIABLE)
+        base = Rig(name or 'rig', load, muscle=muscle)
     muscle = base.muscle
     if 'law' in data:
         muscle = muscle.with_law(read_law(data, muscle.law, muscle.bore_m))

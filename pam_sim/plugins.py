@@ -289,9 +289,22 @@ def formula(module: ModuleType, name: str, arguments: tuple[str, ...],
     return function
 
 
-def pick(known: Mapping[str, T], name: str, what: str, where: str = '') -> T:
+def pick(known: Mapping[str, T], name: str, what: str, where: str = '', variable: str = '') -> T:
     """
     Return ``known[name]``.
+
+    Parameters
+    ----------
+    known : mapping
+        What there is, by name.
+    name : str
+        What is wanted.
+    what : str
+        Noun used in the message.
+    where : str
+        Place of the name.
+    variable : str
+        Environment variable whose folders are searched for plug-ins of this kind, if there is one.
 
     Raises
     ------
@@ -300,7 +313,8 @@ def pick(known: Mapping[str, T], name: str, what: str, where: str = '') -> T:
 
     """
     if name not in known:
+        own = f'; if it is your own, set {variable} to its folder' if variable else ''
         raise InputError(
             f'unknown {what} `{name}`{did_you_mean(name, known)}; allowed: '
-            f'{", ".join(sorted(known))}', where)
+            f'{", ".join(sorted(known))}{own}', where)
     return known[name]

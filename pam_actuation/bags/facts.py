@@ -14,15 +14,18 @@
 
 """What a bag says of rig, valve and seed, for people; what it does not say is not invented."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 
 from pam_sim import load_rig
 from pam_sim.errors import InputError
+from pam_sim.files import StrPath
 from pam_sim.joint import load_joint, load_rig_or_joint
 from pam_sim.rig import Rig
 from pam_sim.rig_text import rig_title
 
 NOT_RECORDED = 'not recorded'
+_HELD = {'<text>': 'rig', 'controller text': 'controller', 'recorded controller': 'controller'}
 
 
 def recorded_rig_title(metadata: Mapping[str, str] | None) -> str:
@@ -65,6 +68,27 @@ def _stated_name(content: str) -> str:
     """Return the name in the text of a rig that this version cannot read."""
     rows = dict(row.partition(':')[::2] for row in reversed(content.splitlines()))
     return (rows.get('name') or rows.get('rig') or NOT_RECORDED).strip()
+
+
+@contextmanager
+def mistakes_of(bag: StrPath) -> Iterator[None]:
+    """
+    Name the bag, where the text of a rig or controller that it holds cannot be read.
+
+    Raises
+    ------
+    InputError
+        With the place of the bag.
+
+    """
+    try:
+        yield
+    except InputError as mistake:
+        text, _, line = mistake.where.rpartition(':')
+        if text not in _HELD:
+            raise
+        raise InputError(f'the {_HELD[text]} that it holds cannot be read here: line {line}: '
+                         f'{mistake.problem}', bag) from None
 
 
 def recorded(metadata: Mapping[str, str] | None, key: str) -> str:

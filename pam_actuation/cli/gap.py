@@ -83,6 +83,7 @@ def add_arguments(parser: Parser) -> None:
 
 def run(args: argparse.Namespace) -> int | None:
     """Find the gap; exit code 1 only where the data cannot be used or cannot be right."""
+    from pam_actuation.bags.facts import mistakes_of
     from pam_actuation.report.joint_gap import questions
     from pam_actuation.report.model_held import recorded_model
     from pam_sim.errors import InputError
@@ -97,7 +98,9 @@ def run(args: argparse.Namespace) -> int | None:
     lines: list[str] = []
     effect_names(args)      # a mistake in them is told before the bag is read
     model = args.model or recorded_model(args.run[0])
-    for question in questions(model, args.run[0], args.namespace, args.renamed):
+    with mistakes_of(args.run[0]):
+        asked = questions(model, args.run[0], args.namespace, args.renamed)
+    for question in asked:
         out = os.path.join(args.out, question.side) if question.side else args.out
         found[question.side], runs = _ask(args, question, out, model)
         result = found[question.side]
@@ -206,7 +209,7 @@ def _plan(args: argparse.Namespace) -> int:
 
 def _explain(args: argparse.Namespace) -> int:
     """Say what an effect is, from which size on it shows, and what looks like it."""
-    from pam_actuation.bags.facts import recorded_muscle
+    from pam_actuation.bags.facts import mistakes_of, recorded_muscle
     from pam_actuation.bags.load import load_run
     from pam_actuation.experiments.separating import identification_run
     from pam_actuation.models.text import in_full
@@ -223,7 +226,8 @@ def _explain(args: argparse.Namespace) -> int:
         run = load_run(args.run[0], args.namespace, topics=args.renamed)
         note_implausible(args, [run], must_be_right=True)
         own = None if args.model else recorded_muscle(run.metadata, run.namespace)
-        rig = own or model_for(run, args.model or recorded_model(args.run[0]))
+        with mistakes_of(args.run[0]):
+            rig = own or model_for(run, args.model or recorded_model(args.run[0]))
     else:
         rig = load_rig(args.model or MODEL)
         run = identification_run(rig)

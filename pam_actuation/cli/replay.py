@@ -58,6 +58,7 @@ def add_arguments(parser: Parser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Replay; exit code 1 where the recorded controller is not reproduced to the bit."""
+    from pam_actuation.bags.facts import mistakes_of
     from pam_actuation.bags.load_joint import load_recording
     from pam_actuation.replay.compare import replay_run
     from pam_actuation.replay.joint import replay_joint
@@ -68,9 +69,10 @@ def run(args: argparse.Namespace) -> int:
     note_implausible(args, [recorded])
     replayed = replay_joint if is_joint(recorded) else replay_run
     model = model_of(recorded, args.model) if args.model else None
-    changed = changed_controller(
-        with_model(recorded, model), args.changes, args.accept_other_rig)
-    result = replayed(recorded, changed, args.only, args.chain, model)
+    with mistakes_of(args.bag):
+        changed = changed_controller(
+            with_model(recorded, model), args.changes, args.accept_other_rig)
+        result = replayed(recorded, changed, args.only, args.chain, model)
     if args.out:
         result.save(args.out)
     emit(args, result.to_dict(), result.text())

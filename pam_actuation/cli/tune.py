@@ -94,6 +94,7 @@ def add_arguments(parser: Parser) -> None:
 
 def run(args: argparse.Namespace) -> int | None:
     """Tune; exit code 1 where the held-out check did not improve or the model is wrong."""
+    from pam_actuation.bags.facts import mistakes_of
     from pam_actuation.bags.load_joint import load_recording
     from pam_actuation.experiments.limits import unknown_remarks
     from pam_actuation.replay.model import check_kind
@@ -107,9 +108,10 @@ def run(args: argparse.Namespace) -> int | None:
     written = _targets(args)
     runs = [load_recording(bag, args.namespace, topics=args.renamed) for bag in args.bag]
     note_implausible(args, runs, must_be_right=True)
-    rig = load_rig_or_joint(_rig_source(args, runs), args.valve)
-    check_kind(runs, rig)
-    controller = _controller(args, runs, rig)
+    with mistakes_of(next(iter(args.bag), '')):
+        rig = load_rig_or_joint(_rig_source(args, runs), args.valve)
+        check_kind(runs, rig)
+        controller = _controller(args, runs, rig)
     experiments, check = _experiments(args, runs, rig)
     controller, ranges = with_own_range(controller, rig, [*experiments, *check])
     say_remarks(args, [*unknown_remarks(rig), *ranges])

@@ -32,6 +32,8 @@ from pam_sim.errors import InputError
 from pam_sim.joint.rig import JointRig
 from pam_sim.keys import Key, names_of
 from pam_sim.load import LOADS
+from pam_sim.load.registry import VARIABLE
+from pam_sim.plugins import pick
 from pam_sim.valve import VALVES
 
 if TYPE_CHECKING:
@@ -109,6 +111,9 @@ def read_facts(tree: 'Located') -> dict[str, Any] | None:
     if 'made_for' in tree:
         table = tree.require('made_for', dict)
         table.check_keys(names_of(KEYS))
+        if 'load' in table:
+            pick(dict.fromkeys(_KINDS), table.require('load', str), 'load', table.where('load'),
+                 VARIABLE)
         by_name = {key.name: key for key in KEYS}
         return {name: by_name[name].read(table) for name in table}
     name, valve, _ = identity_parts(tree.get('rig', str, default=''))

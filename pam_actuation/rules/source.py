@@ -20,6 +20,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from pam_actuation.bags.facts import mistakes_of
 from pam_actuation.control.config import load_controller
 from pam_actuation.control.sofc.persistence import load_rules
 from pam_actuation.control.sofc.rule_table import RuleBase
@@ -122,7 +123,8 @@ def _of_run(run: 'RecordedRun', path: Path,
     text = run.metadata.get('controller')
     if not text:
         raise InputError('the recording does not say which controller ran', os.fspath(path))
-    controller = load_controller(text)
+    with mistakes_of(path):
+        controller = load_controller(text)
     if controller.rules is None:
         raise InputError(
             f'the recording was made with a {controller.kind} controller, which has no rules',

@@ -26,6 +26,7 @@ from pam_sim.errors import InputError
 from pam_sim.plugins import check_name, pick, plugin_files, plugin_module
 from pam_sim.rollout.hooks import check_hook, HOOKS
 
+VARIABLE = 'PAM_EFFECTS_PATH'       # folders with effects of others
 _OWN_FOLDER = Path(__file__).parent
 _NOT_EFFECTS = ('declaration', 'effect', 'fitting', 'registry', 'setting')
 # What several effects call.
@@ -37,7 +38,7 @@ _SLIP = 0.8             # how alike a misspelt hook is to the one that was meant
 
 def effect_files() -> list[Path]:
     """Return the source files of all effects and of what they share, sorted by name."""
-    return plugin_files(_OWN_FOLDER, 'PAM_EFFECTS_PATH', _NOT_EFFECTS)
+    return plugin_files(_OWN_FOLDER, VARIABLE, _NOT_EFFECTS)
 
 
 def _term_files() -> list[Path]:
@@ -133,4 +134,4 @@ def get_effect(name: str, where: str = '') -> Effect:
         Unknown name; the message lists the names there are.
 
     """
-    return all_effects().get(name) or pick(effects(), name, 'effect', where)
+    return all_effects().get(name) or pick(effects(), name, 'effect', where, VARIABLE)

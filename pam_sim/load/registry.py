@@ -32,6 +32,7 @@ from pam_sim.plugins import (
 from pam_sim.records import fields, record, values_of
 
 HANGING_MASS = 'hanging_mass'
+VARIABLE = 'PAM_LOADS_PATH'         # folders with loads of others
 _OWN_FOLDER = Path(__file__).parent
 _TEXT, _TRUTH = (str, "a text, '...'"), (bool, 'True or False')
 _STATED: dict[str, tuple[type, str]] = {
@@ -54,7 +55,7 @@ def find_loads() -> dict[str, ModuleType]:
 
     """
     found: dict[str, ModuleType] = {}
-    for path in plugin_files(_OWN_FOLDER, 'PAM_LOADS_PATH', ('registry',)):
+    for path in plugin_files(_OWN_FOLDER, VARIABLE, ('registry',)):
         module = plugin_module(path, _OWN_FOLDER, 'pam_sim.load', 'pam_load')
         missing = [name for name in _STATED if not hasattr(module, name)]
         if missing:

@@ -26,6 +26,7 @@ from pam_sim.muscle.law import MuscleLaw
 from pam_sim.muscle.rules import at, check_rules, formula_at, grid
 from pam_sim.plugins import check_name, formula, pick, plugin_files, plugin_module, told_with_place
 
+VARIABLE = 'PAM_MUSCLE_LAWS_PATH'       # folders with laws of others
 _OWN_FOLDER = Path(__file__).parent / 'laws'
 _POINT = 'gauge_pa', 'strain', 'par'
 _ALIKE = 1e-9               # of the largest force: what two ways to calculate differ by
@@ -34,7 +35,7 @@ _SIZE_IN_NAME = re.compile(r'dmsp_(\d+)(?:_|$)')
 
 def law_files() -> list[Path]:
     """Return the source files of all laws, sorted by name."""
-    return plugin_files(_OWN_FOLDER, 'PAM_MUSCLE_LAWS_PATH')
+    return plugin_files(_OWN_FOLDER, VARIABLE)
 
 
 @lru_cache(maxsize=None)
@@ -119,7 +120,7 @@ def get_law(name: str, where: str = '') -> type[MuscleLaw]:
         Unknown name; the message lists the names there are.
 
     """
-    return pick(laws(), name, 'muscle law', where)
+    return pick(laws(), name, 'muscle law', where, VARIABLE)
 
 
 def make_law(name: str, values: Any = None, muscle: str | None = None,

@@ -15,6 +15,8 @@
 """The model that is held against a recording is named, and by default the recorded one."""
 
 import json
+from pathlib import Path
+import sys
 
 from pam_actuation.bags.facts import recorded_muscle
 from pam_actuation.bags.writer import BagWriter
@@ -24,6 +26,9 @@ from pam_sim import load_rig
 from pam_sim.joint import load_joint
 from pam_sim.run import Run
 import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'bags'))
+from sample_bag import write_bag  # noqa: E402, I100
 
 NOMINAL = 'dmsp_5_300_hanging_mass'
 OWN = """name: own
@@ -79,6 +84,28 @@ def test_a_bag_without_a_rig_needs_a_model(tmp_path, capsys):
             assert 'holds no rig' in (said := capsys.readouterr().err)
             assert '--model NAME|FILE' in said and 'pam rig new' in said
     assert not (tmp_path / 'gap').exists()
+
+
+RIG = f'rig: {NOMINAL}\nlaw: straight\n'
+CONTROLLER = 'controller: sofc\nmade_for:\n  load: pendulum2\n'
+
+
+@pytest.mark.parametrize('verb, words', [
+    (['gap', '--out', '{out}'], ('rig', 2, 'muscle law `straight`', 'MUSCLE_LAWS')),
+    (['gap', '--explain', 'creep'], ('rig', 2, 'muscle law `straight`', 'MUSCLE_LAWS')),
+    (['tune', '--out', '{out}.yaml'], ('rig', 2, 'muscle law `straight`', 'MUSCLE_LAWS')),
+    (['replay'], ('controller', 3, 'load `pendulum2`', 'LOADS')),
+    (['replay', '--chain'], ('rig', 2, 'muscle law `straight`', 'MUSCLE_LAWS')),
+    (['rules'], ('controller', 3, 'load `pendulum2`', 'LOADS'))])
+def test_a_bag_of_a_plug_in_that_is_not_here_is_named(verb, words, tmp_path, capsys):
+    held = write_bag(tmp_path / 'held', metadata={'rig': RIG, 'controller': CONTROLLER})
+    text, line, missing, variable = words
+    name, *options = verb
+    assert main([name, str(held), *(one.format(out=tmp_path / 'x') for one in options)]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith(f'pam {name}: {held}: the {text} that it holds cannot be read here: '
+                           f'line {line}: unknown {missing}'), said
+    assert said.endswith(f'if it is your own, set PAM_{variable}_PATH to its folder\n'), said
 
 
 def test_the_model_of_an_explanation_is_named(bag, capsys):

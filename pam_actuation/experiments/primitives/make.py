@@ -27,6 +27,7 @@ from pam_sim.declared import shown
 from pam_sim.errors import InputError
 from pam_sim.plugins import check_name, pick, plugin_files, plugin_module
 
+VARIABLE = 'PAM_PRIMITIVES_PATH'    # folders with primitives of others
 _FOLDER = Path(__file__).parent
 _FILLED_IN = ('start', 'rest_value')
 
@@ -41,7 +42,7 @@ def _found() -> dict[str, type[Primitive]]:
     """Return name to class of all primitives there are; InputError for a file without one."""
     found: dict[str, type[Primitive]] = {}
     places: dict[str, Path] = {}
-    for path in plugin_files(_FOLDER, 'PAM_PRIMITIVES_PATH', not_plugins=('base', 'make')):
+    for path in plugin_files(_FOLDER, VARIABLE, not_plugins=('base', 'make')):
         module = plugin_module(path, _FOLDER, __package__, 'pam_primitive')
         cls = getattr(module, 'PRIMITIVE', None)
         if not (isinstance(cls, type) and issubclass(cls, Primitive)):
@@ -114,7 +115,7 @@ def make_primitive(name: str, arguments: Mapping[str, Any], start: float, rest_v
         Unknown primitive, unknown or missing key, a value out of its range.
 
     """
-    cls = pick(PRIMITIVES, name, 'primitive', where)
+    cls = pick(PRIMITIVES, name, 'primitive', where, VARIABLE)
     if domain and cls.DOMAINS and domain not in cls.DOMAINS:
         raise InputError(
             f'{name} makes no sense in the domain {domain}; it does in '
