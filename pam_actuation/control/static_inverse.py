@@ -46,7 +46,7 @@ def grid_of(table: FloatArray) -> np.record:
 
 @compiled
 def inverse_pressure_pa(table: FloatArray, contraction_m: float) -> float:
-    """Return the tabulated absolute pressure [Pa] at a contraction [m], linear between nodes."""
+    """Return the absolute pressure [Pa] at a contraction [m], linear between nodes; NaN of NaN."""
     grid = grid_of(table)
     pressure_pa = table[GRID_SIZE:]
     last = pressure_pa.shape[0] - 1
@@ -55,6 +55,8 @@ def inverse_pressure_pa(table: FloatArray, contraction_m: float) -> float:
         return pressure_pa[0]
     if place >= last:
         return pressure_pa[last]
+    if math.isnan(place):
+        return math.nan
     i = int(place)
     share = place - i
     return pressure_pa[i] * (1.0 - share) + pressure_pa[i + 1] * share

@@ -13,13 +13,16 @@
 # limitations under the License.
 """The table of pressures over contractions reaches as far as the muscle does."""
 
+import math
+
 import numpy as np
 from pam_actuation.control.config import load_controller
 from pam_actuation.control.static_inverse import (
-    GRID_SIZE, inverse_pressure_pa, tabulate_static_inverse)
+    GRID_SIZE, inverse_pressure_pa, static_inverse, tabulate_static_inverse)
 from pam_actuation.experiments import load_experiment
 from pam_actuation.tuning.closed_loop import ClosedLoop
 from pam_sim import load_rig
+from pam_sim.compiled import interpreted
 from pam_sim.units import P_ATM_PA
 import pytest
 
@@ -44,6 +47,13 @@ def test_the_first_35_mm_are_the_nodes_of_older_recordings():
     assert np.array_equal(table[GRID_SIZE:][:140], rig.static_pressure_pa(nodes_m[:140]))
     weak = tabulate_static_inverse(rig.with_(parameters={'mass_kg': 60.0}))
     assert weak.size == GRID_SIZE + 141 and np.isfinite(weak).all()
+
+
+def test_a_contraction_that_is_not_known_has_no_pressure():
+    table = static_inverse(0.0, 0.01, [1e5, 2e5, 3e5])
+    of = interpreted(inverse_pressure_pa)       # compiled, no place of a table is checked
+    assert of(table, 0.015) == inverse_pressure_pa(table, 0.015) == 2.5e5
+    assert math.isnan(of(table, math.nan)) and math.isnan(inverse_pressure_pa(table, math.nan))
 
 
 def test_a_long_muscle_is_held_at_40_mm():
