@@ -269,14 +269,18 @@ class SafetySupervisor:
         key = 'command_stamp'
         if not math.isfinite(value):
             problem, key = f'is not a number ({value})', 'command_not_finite'
+        elif is_duty:
+            value = min(max(value, -1.0), 1.0)
         if not problem and not self.order.offer(stamp_ns, value, sequence, now_ns):
-            if (stamp_ns, value) == (self.command_stamp_ns, self.command_pa):
+            before = self.command_duty if is_duty else self.command_pa
+            if (stamp_ns, value) == (self.command_stamp_ns, before):
                 return      # an exact duplicate harms nobody
             problem, key = 'is not newer than the one before', 'command_out_of_order'
         if problem:
             self.commands_ignored += 1
             self.command_problem = problem
-            self._warn(key, f'a pressure command was ignored: it {problem}', now_ns)
+            what = 'valve' if is_duty else 'pressure'
+            self._warn(key, f'a {what} command was ignored: it {problem}', now_ns)
             return
         self.command_stamp_ns, self.command_pa = stamp_ns, value
         self.command_problem = ''
@@ -284,7 +288,7 @@ class SafetySupervisor:
         self.command_duty = None
         if is_duty:
             self.ages.forget()
-            self.command_pa, self.command_duty = math.nan, min(max(value, -1.0), 1.0)
+            self.command_pa, self.command_duty = math.nan, value
             return
         self.ages.take(stamp_ns, value)
         highest = P_ATM_PA + lim.max_pressure_gauge_pa

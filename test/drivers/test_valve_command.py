@@ -14,6 +14,7 @@
 
 """The raw valve signal passes the same supervision as a pressure command."""
 
+from dataclasses import replace
 import math
 
 from pam_actuation.drivers.loop import DriverLoop
@@ -59,6 +60,22 @@ def test_duties_are_sent_as_commanded_and_never_both(wanted, sent):
     efforts, status = bench.run(100)
     assert efforts == sent
     assert status.level == 0 and status.message == 'following the valve command'
+
+
+@pytest.mark.parametrize('valve, efforts', [
+    ('hsv', (0.2, 0.0)), ('hsv', (3.0, 0.0)), ('ppr', (3.0,))])
+def test_an_exact_duplicate_is_no_fault_and_an_older_command_is_told(valve, efforts):
+    bench = Bench(valve)
+    bench.efforts = efforts
+    send = bench.loop.on_valve_command
+    bench.loop.on_valve_command = lambda message: (send(message), send(message))
+    _, status = bench.run(300)
+    assert bench.loop.safety.commands_ignored == 0 and status.level == 0
+    bench.loop.on_valve_command = lambda message: (
+        send(message), send(replace(message, stamp_ns=message.stamp_ns - MS)))
+    _, status = bench.run(10)
+    assert bench.loop.safety.commands_ignored == 1
+    assert valve == 'ppr' or 'a valve command was ignored: it is not newer' in status.message
 
 
 def test_voltage_is_sent_as_commanded_within_the_limit():
