@@ -483,8 +483,10 @@ class ManagedNode(LifecycleNode):
         """Take back what a configure that failed has built, as far as it came."""
         try:
             self.teardown()
-        except Exception as error:
+        except AttributeError as error:
             self.get_logger().debug(f'not built yet: {error}')
+        except Exception as error:
+            self.get_logger().warning(f'not all was taken back: {error}')
         self._drop_endpoints()
 
     def _drop_endpoints(self) -> None:

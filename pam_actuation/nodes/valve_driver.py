@@ -184,7 +184,10 @@ class ValveDriver(ManagedNode):
             self.destroy_service(service)
         self._safety_services = ()
         if self.output is not None:
-            self.output.close()
+            problem = self.output.close()
+            if problem:
+                self.result_code = 1
+                self.get_logger().error(f'the device was let go and is not vented: {problem}')
         if self.loop is not None:
             self._stopped = self.loop.safety
         self.loop = self.output = None

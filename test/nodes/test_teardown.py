@@ -1,0 +1,53 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What fails while a node takes down what it built is told. Nothing is started."""
+
+from types import SimpleNamespace
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from pam_actuation.nodes.managed import ManagedNode             # noqa: E402, I100
+from pam_actuation.nodes.valve_driver import ValveDriver        # noqa: E402
+
+
+def node_with(**parts):
+    """Return what stands for a node, and the list of (level, sentence) that it logs."""
+    said = []
+    logger = SimpleNamespace(**{level: lambda text, level=level: said.append((level, text))
+                                for level in ('debug', 'warning', 'error')})
+    return SimpleNamespace(get_logger=lambda: logger, _drop_endpoints=lambda: None, **parts), said
+
+
+@pytest.mark.parametrize('problem, told, code', [
+    ('', [], 0), ('no answer', [('error', 'the device was let go and is not vented: no answer')],
+                  1)])
+def test_a_valve_that_did_not_vent_at_cleanup_is_told(problem, told, code):
+    output = SimpleNamespace(close=lambda: problem)
+    node, said = node_with(_safety_services=(), output=output, loop=None, result_code=0)
+    ValveDriver.teardown(node)
+    assert said == told and node.result_code == code and node.output is None
+
+
+@pytest.mark.parametrize('error, level', [
+    (AttributeError('loop'), 'debug'), (OSError('busy'), 'warning')])
+def test_a_setup_that_cannot_be_undone_is_told(error, level):
+    def teardown():
+        raise error
+    node, said = node_with(teardown=teardown)
+    ManagedNode._undo_setup(node)
+    assert [one for one, _ in said] == [level] and str(error) in said[0][1]
