@@ -15,6 +15,7 @@
 """All back ends by name, and how one is opened."""
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from typing import Any, TYPE_CHECKING, TypeVar
 
 from pam_actuation.hardware.device_watchdog import DeviceWatchdog
@@ -92,6 +93,8 @@ def open_valve(name: str, valve_type: str, values: dict[str, Any], config: 'Driv
             writes = device.safe_writes() if watchdog_s else ()
             return GuardedOutput(device, DeviceWatchdog(writes, watchdog_s) if writes else None)
         except Exception:
+            with suppress(Exception):
+                device.close()
             device.release()
             raise
     return _tell(opened, back_end, values)

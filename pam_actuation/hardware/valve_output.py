@@ -20,6 +20,7 @@ through ``GuardedOutput`` only.
 """
 
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 import time
 from typing import Any, TYPE_CHECKING
@@ -46,8 +47,9 @@ class ValveOutput:
     One device, or pair of channels, that a valve hangs on.
 
     Derived classes set ``VALVE_TYPES``, which they can drive, and ``PARAMETERS``, and
-    override ``open`` and ``write``. Where files vent the device they override ``safe_writes``,
-    where another call does, ``vent``. Without either the safe signal is written by ``write``.
+    override ``open`` and ``write``, and ``close`` where they hold a port or a thread. Where files
+    vent the device they override ``safe_writes``, where another call does, ``vent``. Without
+    either the safe signal is written by ``write``.
 
     Parameters
     ----------
@@ -88,6 +90,9 @@ class ValveOutput:
         for claim in self._claims:
             claim.release()
         self._claims = ()
+
+    def close(self) -> None:
+        """Close what ``open`` opened, as far as it came; the safe signal was sent before."""
 
     def write(self, efforts: tuple[float, ...]) -> None:
         """
@@ -200,6 +205,7 @@ class GuardedOutput:
         if self._watchdog is not None:
             self._watchdog.close()
             self._watchdog = None
+        problem = problem or self._try(self._device.close)      # not vented: open for a last try
         self._device.release()
         return problem
 
@@ -213,8 +219,7 @@ class GuardedOutput:
 
 
 def _vent_quietly(device: ValveOutput) -> None:
-    """Vent at the very end, where nobody is left to be told of a failure."""
-    try:
-        device.vent()
-    except Exception:
-        pass
+    """Vent and close at the very end, where nobody is left to be told of a failure."""
+    for action in (device.vent, device.close):
+        with suppress(Exception):
+            action()

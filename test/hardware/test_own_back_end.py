@@ -101,6 +101,24 @@ def test_what_it_raises_is_told_with_its_parameters_and_vents(bench, opened):
     assert output.send((0.0,)) == '' and bench.signal() == (0.0,)
 
 
+def test_its_port_is_closed_after_the_last_signal(bench, opened, monkeypatch):
+    gc.collect()            # outputs of other tests
+    closed = []
+    monkeypatch.setattr(WriteOnly, 'close', lambda device: closed.append(bench.signal()))
+    output = opened()
+    output.send((3.0,))
+    assert output.close() == '' and closed == [(0.0,)]
+    output = opened()
+    bench.breaks(TIMED_OUT)
+    assert 'timed out' in output.close() and len(closed) == 1       # a last try needs the port
+    del output
+    gc.collect()
+    assert len(closed) == 2
+    with pytest.raises(InputError, match='timed out'):
+        opened()
+    assert len(closed) == 3
+
+
 def test_a_mistake_in_its_code_is_told_with_its_line(opened, monkeypatch):
     monkeypatch.setattr(WriteOnly, 'write', back_ends.ValveOutput.write)
     with pytest.raises(InputError, match=r'NotImplementedError \(valve_output.py:\d+\)'):
