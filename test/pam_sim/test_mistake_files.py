@@ -27,10 +27,11 @@ from pam_sim.muscle.registry import laws
 import pytest
 
 GUIDES = Path(__file__).parents[2] / 'docs/guides'
-FILES = dict(re.findall(
+# The files of the guides, with names that are free, should one of them stand in the package.
+FILES = {f'own_{name}': text.replace(f"'{name}'", f"'own_{name}'") for name, text in re.findall(
     r'`(\w+)\.py`:[^\n]*\n\n```python\n(.*?)```', ''.join(
         (GUIDES / f'{name}.md').read_text(encoding='utf-8') + '\n'
-        for name in ('own_models', 'experiments')), re.S))
+        for name in ('own_models', 'experiments')), re.S)}
 
 
 def _laws():
@@ -43,61 +44,68 @@ def _effects():
     return effects()
 
 
-READ = {'pendulum': ('PAM_LOADS_PATH', find_loads), 'straight': ('PAM_MUSCLE_LAWS_PATH', _laws),
-        'three_two_valve': ('PAM_EFFECTS_PATH', _effects),
-        'sawtooth': ('PAM_PRIMITIVES_PATH', make._found)}
+READ = {'own_pendulum': ('PAM_LOADS_PATH', find_loads),
+        'own_straight': ('PAM_MUSCLE_LAWS_PATH', _laws),
+        'own_three_two_valve': ('PAM_EFFECTS_PATH', _effects),
+        'own_sawtooth': ('PAM_PRIMITIVES_PATH', make._found)}
 RETURN = '    return fill, par.share * (1.0 - fill)'
 MISTAKES = (
-    ('three_two_valve', RETURN, '    found = fill, par.share',
+    ('own_three_two_valve', RETURN, '    found = fill, par.share',
      'hook `flow_opening` returns nothing; write `return fill, vent` on every way through it'),
-    ('three_two_valve', RETURN, f'    if fill > 0.5:\n    {RETURN}',
+    ('own_three_two_valve', RETURN, f'    if fill > 0.5:\n    {RETURN}',
      'hook `flow_opening` returns nothing; write `return fill, vent` on every way through it'),
-    ('three_two_valve', 'par.share *', 'par.shar *', 'hook `flow_opening` cannot be compiled: '
+    ('own_three_two_valve', 'par.share *', 'par.shar *', 'hook `flow_opening` cannot be compiled: '
      'there is no number `shar` (did you mean `share`?); allowed: share'),
-    ('three_two_valve', 'par.share *', 'math.sqrt(fill) *', 'hook `flow_opening` cannot be '
+    ('own_three_two_valve', 'par.share *', 'math.sqrt(fill) *', 'hook `flow_opening` cannot be '
      'compiled: NameError: name `math` is not defined; import it, or define it above'),
-    ('three_two_valve', 'vent: float, par', 'vent: float, state: np.record, par',
+    ('own_three_two_valve', 'vent: float, par', 'vent: float, state: np.record, par',
      "hook `flow_opening` names `state`, which this effect has not; write states=record('"),
-    ('three_two_valve', "amplitude=('share',)", "amplitude=('share')",
-     "effect `three_two_valve` has amplitude = 'share'; write a tuple, amplitude=('x',) or"),
-    ('three_two_valve', "valves=('hsv',)", "relative_of=('creep')",
-     "effect `three_two_valve` has relative_of = 'creep'; write a tuple, relative_of=('x',)"),
-    ('three_two_valve', "valves=('hsv',)", "relative_of=('three_two_valve',)",
-     'effect `three_two_valve` names itself in `relative_of`; leave it out'),
-    ('three_two_valve', '        Parameter(', '        (', 'effect `three_two_valve` has ('),
-    ('three_two_valve', '0.0, 1.0, 0.0,', '0.0, 1.0, 0.0, 0.1,',
+    ('own_three_two_valve', "amplitude=('share',)", "amplitude=('share')",
+     "effect `own_three_two_valve` has amplitude = 'share'; write a tuple, amplitude=('x',) or"),
+    ('own_three_two_valve', "valves=('hsv',)", "relative_of=('creep')",
+     "effect `own_three_two_valve` has relative_of = 'creep'; write a tuple, relative_of=('x',)"),
+    ('own_three_two_valve', "valves=('hsv',)", "relative_of=('own_three_two_valve',)",
+     'effect `own_three_two_valve` names itself in `relative_of`; leave it out'),
+    ('own_three_two_valve', '        Parameter(', '        (',
+     'effect `own_three_two_valve` has ('),
+    ('own_three_two_valve', '0.0, 1.0, 0.0,', '0.0, 1.0, 0.0, 0.1,',
      "parameter `share` has description = 0.1; write a text, '...'"),
-    ('three_two_valve', "'-', 1.0,", "1.0, '-',", 'parameter `share` has unit = 1.0; write a'),
-    ('three_two_valve', "'-', 1.0,", "'-', 1.5,", '`share` is 1.5 by default; allowed 0 to 1'),
-    ('three_two_valve', 'np.record', 'npy.record',
+    ('own_three_two_valve', "'-', 1.0,", "1.0, '-',", 'parameter `share` has unit = 1.0; write a'),
+    ('own_three_two_valve', "'-', 1.0,", "'-', 1.5,", '`share` is 1.5 by default; allowed 0 to 1'),
+    ('own_three_two_valve', 'np.record', 'npy.record',
      "cannot be loaded: NameError: name 'npy' is not defined"),
-    ('pendulum', 'import math\n', '', '`load_force_n` cannot be compiled: NameError: name `math` '
-     'is not defined; import it, or define it above'),
-    ('pendulum', '    return (', '    found = (',
+    ('own_pendulum', 'import math\n', '',
+     '`load_force_n` cannot be compiled: NameError: name `math` is not defined; import it, '
+     'or define it above'),
+    ('own_pendulum', '    return (', '    found = (',
      '`load_force_n` returns nothing; write `return force_n` on every way through it'),
-    ('pendulum', 'par.pulley_m', 'par.puly_m',
+    ('own_pendulum', 'par.pulley_m', 'par.puly_m',
      '`load_force_n` cannot be compiled: there is no number `puly_m` (did you mean `pulley_m`?)'),
-    ('pendulum', '\nPARAMETERS = (', "\nPARAMETERS = 'none'\n_OLD = (",
+    ('own_pendulum', '\nPARAMETERS = (', "\nPARAMETERS = 'none'\n_OLD = (",
      "states PARAMETERS = 'none'; write a tuple, (Parameter(...),)"),
-    ('pendulum', 'MOVES_FREELY = True', "MOVES_FREELY = 'yes'",
+    ('own_pendulum', 'MOVES_FREELY = True', "MOVES_FREELY = 'yes'",
      "states MOVES_FREELY = 'yes'; write True or False"),
-    ('pendulum', "'pulley_m', 'm'", "'mass_kg', 'm'",
+    ('own_pendulum', "'pulley_m', 'm'", "'mass_kg', 'm'",
      '`mass_kg` names two numbers; give one of them another name'),
-    ('straight', 'par.free_strain', 'par.free', '`tension_n` cannot be compiled: there is no '
+    ('own_straight', 'par.free_strain', 'par.free', '`tension_n` cannot be compiled: there is no '
      'number `free` (did you mean `free_strain`?); allowed: area_m2, free_strain'),
-    ('straight', '    return par', '    found = par',
+    ('own_straight', '    return par', '    found = par',
      '`tension_n` returns nothing; write `return force_n` on every way through it'),
-    ('straight', '(1.0 - strain', '(1.0 + strain', 'law `straight` (set `dmsp_5`) claims rule 3'),
-    ('straight', '2.3e-4, 1e-6', '2.3e-4, 1e-3', '`area_m2` is 0.00023 by default; allowed 0.001'),
-    ('straight', 'ParameterSet({}', "ParameterSet({'area': 1.0}",
+    ('own_straight', '(1.0 - strain', '(1.0 + strain',
+     'law `own_straight` (set `dmsp_5`) claims rule 3'),
+    ('own_straight', '2.3e-4, 1e-6', '2.3e-4, 1e-3',
+     '`area_m2` is 0.00023 by default; allowed 0.001'),
+    ('own_straight', 'ParameterSet({}', "ParameterSet({'area': 1.0}",
      'unknown parameter of set `dmsp_5` `area` (did you mean `area_m2`?); allowed'),
-    ('straight', 'LAW = Straight', 'LAW = Straight()', 'defines no LAW, a subclass of MuscleLaw'),
-    ('straight', '(1.0 - strain', '(int("one") - strain',
-     'law `straight` (set `dmsp_5`) cannot be used: ValueError: invalid literal for int()'),
-    ('sawtooth', '@dataclass\n', '', 'the primitive `Sawtooth` is no dataclass; write `@data'),
-    ('sawtooth', '    start: float ', '    begin: float ',
+    ('own_straight', 'LAW = Straight', 'LAW = Straight()',
+     'defines no LAW, a subclass of MuscleLaw'),
+    ('own_straight', '(1.0 - strain', '(int("one") - strain',
+     'law `own_straight` (set `dmsp_5`) cannot be used: ValueError: invalid literal for int()'),
+    ('own_sawtooth', '@dataclass\n', '', 'the primitive `Sawtooth` is no dataclass; write `@data'),
+    ('own_sawtooth', '    start: float ', '    begin: float ',
      'the primitive `Sawtooth` has no field `start`, where it begins; write `start: float`'),
-    ('sawtooth', 'def at(', 'def value(', 'the primitive `Sawtooth` has no method `at`; write'))
+    ('own_sawtooth', 'def at(', 'def value(',
+     'the primitive `Sawtooth` has no method `at`; write'))
 
 
 @pytest.fixture
@@ -137,11 +145,11 @@ def test_the_right_file_is_read(folder, monkeypatch, name):
 
 
 def test_a_line_is_told_where_there_is_one(folder, monkeypatch):
-    text = FILES['three_two_valve'].replace('par.share *', 'par.shar *')
+    text = FILES['own_three_two_valve'].replace('par.share *', 'par.shar *')
     with pytest.raises(InputError) as caught:
-        read(folder, monkeypatch, 'three_two_valve', text)
+        read(folder, monkeypatch, 'own_three_two_valve', text)
     line = text.splitlines().index('    return fill, par.shar * (1.0 - fill)') + 1
-    assert caught.value.where == f'{folder / "three_two_valve.py"}:{line}'
+    assert caught.value.where == f'{folder / "own_three_two_valve.py"}:{line}'
 
 
 @pytest.mark.parametrize('new, sentence', [
@@ -151,16 +159,16 @@ def test_a_line_is_told_where_there_is_one(folder, monkeypatch):
 def test_a_load_whose_force_cannot_be_calculated_is_told_with_its_file(
         folder, monkeypatch, new, sentence):
     force = 'par.pendulum_n * math.sin(contraction_m / par.pulley_m)'
-    text = FILES['pendulum'].replace(force, new)
-    load = read(folder, monkeypatch, 'pendulum', text)['pendulum']
+    text = FILES['own_pendulum'].replace(force, new)
+    load = read(folder, monkeypatch, 'own_pendulum', text)['own_pendulum']
     with pytest.raises(InputError) as caught:
         steepest(load, {p.name: p.default for p in load.PARAMETERS}, 0.075)
     assert caught.value.problem == sentence
-    assert caught.value.where.split(':')[0] == str(folder / 'pendulum.py')
+    assert caught.value.where.split(':')[0] == str(folder / 'own_pendulum.py')
 
 
 def test_a_hole_in_a_motion_is_no_mistake_of_the_load(folder, monkeypatch):
-    load = read(folder, monkeypatch, 'pendulum', FILES['pendulum'])['pendulum']
+    load = read(folder, monkeypatch, 'own_pendulum', FILES['own_pendulum'])['own_pendulum']
     values = {p.name: p.default for p in load.PARAMETERS}
     found = load_force_n(load, values, np.array([0.0, np.nan]), np.array([0.1, 0.1]))
     assert found[0] == 2.0 and np.isnan(found[1])
@@ -171,16 +179,17 @@ def test_a_hole_in_a_motion_is_no_mistake_of_the_load(folder, monkeypatch):
     ('return math.nan, 0.0', '`at(0)` returns (nan, 0.0); write `return value, rate`')])
 def test_a_primitive_without_value_and_rate_is_told_with_its_file(
         folder, monkeypatch, new, sentence):
-    head, name, tail = FILES['sawtooth'].partition('    def at(')
+    head, name, tail = FILES['own_sawtooth'].partition('    def at(')
     body = tail.index('"""\n') + 4
     text = f'import math\n{head}{name}{tail[:body]}        {new}\n{tail[body:]}'
-    found = read(folder, monkeypatch, 'sawtooth', text)
+    found = read(folder, monkeypatch, 'own_sawtooth', text)
     monkeypatch.setattr(make, 'PRIMITIVES', found)
     with pytest.raises(InputError) as caught:
-        make.make_primitive('sawtooth', {'height_m': 0.003, 'period_s': 1.0, 'duration_s': 3.0},
-                            0.0, 0.0, 'm')
+        make.make_primitive(
+            'own_sawtooth', {'height_m': 0.003, 'period_s': 1.0, 'duration_s': 3.0}, 0.0, 0.0,
+            'm')
     assert caught.value.problem.startswith(sentence)
-    assert caught.value.where.split(':')[0] == str(folder / 'sawtooth.py')
+    assert caught.value.where.split(':')[0] == str(folder / 'own_sawtooth.py')
 
 
 @pytest.mark.parametrize('listed', ['{end_taper: {}}', '[{end_taper: {}}]', 'end_taper'])
