@@ -57,6 +57,7 @@ def test_the_guide_names_the_tests_that_read_the_registries():
     text = (GUIDES / 'own_models.md').read_text(encoding='utf-8')
     named = re.search("make test ARGS='(.*)'", text)[1].split()
     assert all((ROOT / one).exists() for one in named)
+    assert {'test/test_style.py', 'test/test_types.py'} <= {*named}
     every = re.compile(
         r'(effects|laws)\(\)(\)|\.items|\.values)|in (effects|laws)\(\)|LOADS\.items')
     readers = [path.relative_to(ROOT) for path in sorted((ROOT / 'test').rglob('test_*.py'))

@@ -88,7 +88,7 @@ def test_every_effect_is_declared_and_shows(rig, name):
             np.max(np.abs(getattr(ours, key) - getattr(theirs, key)))
             > 1e-5 * np.ptp(getattr(theirs, key))
             for key in ('pressure_pa', 'contraction_m', 'force_n'))
-    assert seen
+    assert seen, 'its default size does not show here; add a size to `typical` above'
 
 
 @pytest.mark.parametrize('delay_s', [0.030, 0.0304])

@@ -113,7 +113,8 @@ def test_halving_the_step_changes_little_beside_the_realistic_effects(name, valv
     fine = rig.simulate(np.repeat(signal, 2, axis=0), dt_s=0.0005, **start)
     for key in ('pressure_pa', 'contraction_m', 'force_n'):
         theirs = getattr(fine, key)[::2]
-        assert np.max(np.abs(getattr(coarse, key) - theirs)) <= 1e-3 * np.ptp(theirs), key
+        assert np.max(np.abs(getattr(coarse, key) - theirs)) <= 1e-3 * np.ptp(theirs), (
+            f'{key} depends on the step; return means over it, see pam_sim/rollout/hooks.py')
 
 
 def test_all_effects_at_once_interpreted_and_compiled(tmp_path):
