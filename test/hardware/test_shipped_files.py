@@ -14,12 +14,16 @@
 
 """Test that every shipped hardware file speaks of parameters that exist, with allowed values."""
 
+from pathlib import Path
+import re
+
 import pytest
 
 pytest.importorskip('rclpy')
 
 from pam_actuation import resources                                         # noqa: E402, I100
-from pam_actuation.hardware.back_ends import VALVE_OUTPUTS                  # noqa: E402
+from pam_actuation.hardware.back_ends import (                       # noqa: E402
+    OWN_SENSOR_INPUTS, OWN_VALVE_OUTPUTS, VALVE_OUTPUTS)
 from pam_actuation.nodes.hardware_sensors import HardwareSensors            # noqa: E402
 from pam_actuation.nodes.parameters import problem                          # noqa: E402
 from pam_actuation.nodes.valve_driver import ValveDriver                    # noqa: E402
@@ -43,4 +47,10 @@ def test_there_is_a_file_for_every_back_end():
     used = {yaml.safe_load(resources.find_config('hardware', name).read_text())[
         '/**/valve_driver']['ros__parameters']['backend']
         for name in resources.list_config('hardware')}
-    assert used == set(VALVE_OUTPUTS)
+    assert used == set(VALVE_OUTPUTS), 'add config/hardware/NAME.yaml with its `backend`'
+
+
+def test_every_back_end_has_its_row_in_the_guide():
+    text = (Path(__file__).parents[2] / 'docs/guides/hardware.md').read_text(encoding='utf-8')
+    rows = set(re.findall(r'^\| `(\w+)`.*`hardware/\w+\.py` \|$', text, re.M))
+    assert rows == {*OWN_VALVE_OUTPUTS, *OWN_SENSOR_INPUTS}, 'add its row'
