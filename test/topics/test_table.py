@@ -90,7 +90,9 @@ def test_the_list_of_topics_is_current():
 
 @pytest.mark.parametrize('name', RECORDED)
 def test_a_page_says_who_speaks_and_listens_and_the_quality_of_service(name):
-    topic, text = RECORDED[name], (PAGES / f'{name}.md').read_text(encoding='utf-8')
+    topic, page = RECORDED[name], PAGES / f'{name}.md'
+    assert page.is_file(), 'run: pam nodes --topics msg_docs'
+    text = page.read_text(encoding='utf-8')
     assert service_text(topic.service) in text
     speaks, listens = (re.search(rf'^\| {word} by \| (.*) \|$', text, re.M)[1]
                        for word in ('published', 'consumed'))
