@@ -340,6 +340,10 @@ def test_the_architecture_page_names_what_exists():
         folders[depth:] = [name]
     for path in re.findall(r'`((?:pam_sim|pam_actuation)/[\w/.]+)`', text):
         assert (ROOT / path).exists(), path
+    beside = [f'{path.name}/' if path.is_dir() else path.name
+              for package in ('pam_sim', 'pam_actuation') for path in (ROOT / package).iterdir()
+              if not path.name.startswith('_') and (path.is_dir() or path.suffix == '.py')]
+    assert [name for name in beside if not re.search(rf'\b{re.escape(name)}', tree)] == []
 
 
 def test_the_workflow_runs_every_step_of_the_script_for_jazzy():
