@@ -38,9 +38,8 @@ from pam_actuation.nodes.senders import WriterNames
 from pam_actuation.rigging.client import RigClient
 from pam_actuation.rigging.domain import DomainLock
 from pam_actuation.rigging.processes import end_all, node_environment, NodeProcess
-from pam_actuation.topics.cdr import NS_PER_S
 from pam_actuation.topics.codec import Reader, Writer
-from pam_sim.units import P_ATM_PA
+from pam_sim.units import NS_PER_S, P_ATM_PA
 import rclpy
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions

@@ -30,13 +30,13 @@ from pam_actuation.messages import (
     Contraction, Force, JointAngle, Pressure, SAFE_EFFORTS, Torque, VALVE_NAMES, ValveSignal)
 from pam_sim.sensors import SensorChain
 from pam_sim.sensors.encoder import Encoder
+from pam_sim.units import NS_PER_S
 
 if TYPE_CHECKING:
     from pam_sim.joint.rig import JointRig
     from pam_sim.plant import Plant
     from pam_sim.rig import Rig
 
-_NS = 1_000_000_000
 _EFFORTS = attrgetter('efforts')
 SAFE_COUNTS_NS = 100_000_000     # a safe signal against the openings of others
 
@@ -159,8 +159,8 @@ class PlantClock:
     """
 
     def __init__(self, dt_s: float, longest_catch_up_s: float) -> None:
-        self.dt_ns = round(dt_s * _NS)
-        self.longest_catch_up_ns = round(longest_catch_up_s * _NS)
+        self.dt_ns = round(dt_s * NS_PER_S)
+        self.longest_catch_up_ns = round(longest_catch_up_s * NS_PER_S)
         self._start_ns: int | None = None
         self.steps = 0
         self.overruns = 0
@@ -190,7 +190,7 @@ class PlantClock:
             skipped_ns = (behind_ns - self.longest_catch_up_ns) // self.dt_ns * self.dt_ns
             self._start_ns += skipped_ns
             self.overruns += 1
-            self.skipped_s += skipped_ns / _NS
+            self.skipped_s += skipped_ns / NS_PER_S
             behind_ns -= skipped_ns
         count = max(behind_ns // self.dt_ns, 0)
         if count:
@@ -220,8 +220,8 @@ class Backlog(Generic[Arrived]):
     """
 
     def __init__(self, after_s: float = 0.05, patience_s: float = 0.02) -> None:
-        self._after_ns = round(after_s * _NS)
-        self._patience_ns = round(patience_s * _NS)
+        self._after_ns = round(after_s * NS_PER_S)
+        self._patience_ns = round(patience_s * NS_PER_S)
         self._last_ns: int | None = None
         self._until_ns = 0
         self._held: list[Arrived] = []

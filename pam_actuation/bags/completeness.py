@@ -17,10 +17,10 @@
 from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING
 
-from pam_actuation.bags.losses import (
-    count_of, DIAGNOSTICS, missing_messages, PublishedCounts)
+from pam_actuation.bags.losses import count_of, missing_messages, PublishedCounts
 from pam_actuation.bags.rig_topics import is_rig_topic
 from pam_actuation.bags.source import Bag, TopicData
+from pam_actuation.topics.table import DIAGNOSTICS
 
 if TYPE_CHECKING:
     from pam_actuation.bags.topic_info import TopicInfo

@@ -35,7 +35,6 @@ from pam_actuation.bags.ending import Ending, ending_of
 from pam_actuation.bags.facts import recorded_rig_title
 from pam_actuation.bags.info_text import render_text
 from pam_actuation.bags.load_joint import half_joints, MEASURED
-from pam_actuation.bags.losses import DIAGNOSTICS
 from pam_actuation.bags.markers import markers_of
 from pam_actuation.bags.recorder import RECORDING_RECORD
 from pam_actuation.bags.recover import RECOVERY_RECORD
@@ -44,7 +43,7 @@ from pam_actuation.bags.rig_topics import namespaces
 from pam_actuation.bags.source import Bag, read_bag
 from pam_actuation.bags.topic_info import topic_info, TopicInfo
 from pam_actuation.bags.writer import EXPERIMENT_RECORD
-from pam_actuation.topics.table import OF_A_RUN, short_name
+from pam_actuation.topics.table import DIAGNOSTICS, OF_A_RUN, short_name
 from pam_sim.errors import InputError
 from pam_sim.files import StrPath
 

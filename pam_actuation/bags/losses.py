@@ -25,9 +25,9 @@ from array import array
 from collections.abc import Collection, Mapping
 
 from pam_actuation.topics.codec import decode
+from pam_actuation.topics.table import DIAGNOSTICS
 from pam_sim.errors import InputError
 
-DIAGNOSTICS = '/diagnostics'
 PUBLISHED = 'published.'
 COUNT_DIGITS = 18
 _MOST_KEPT = 10_000           # send times of a topic no node reports on

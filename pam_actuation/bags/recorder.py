@@ -31,9 +31,9 @@ from typing import Any
 
 from pam_actuation.bags import disk
 from pam_actuation.bags.ending import Ending, ERROR
-from pam_actuation.bags.losses import (
-    DIAGNOSTICS, missing_messages, PublishedCounts, SentTimes)
+from pam_actuation.bags.losses import missing_messages, PublishedCounts, SentTimes
 from pam_actuation.bags.writer import BagWriter
+from pam_actuation.topics.table import DIAGNOSTICS
 from pam_sim.errors import InputError
 
 # Topic, bytes, receive and send time [ns] of messages that wait for the disk.
@@ -202,7 +202,7 @@ class RecorderCore:
         with self._wake:
             self._counts.setdefault(full_name, TopicCounts())
             self._sent.setdefault(full_name, SentTimes())
-            watch = full_name != '/diagnostics' if check_sequence is None else check_sequence
+            watch = full_name != DIAGNOSTICS if check_sequence is None else check_sequence
             if watch:
                 self._checks.setdefault(full_name, SequenceCheck())
 

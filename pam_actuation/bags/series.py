@@ -31,6 +31,7 @@ from pam_actuation.topics.contents import Numeric
 from pam_actuation.topics.definitions import little_endian
 from pam_actuation.topics.table import topic_of
 from pam_sim.annotations import BoolArray, ByteArray, FloatArray, IntArray
+from pam_sim.units import NS_PER_S
 
 Messages = Payloads | Sequence[bytes]
 # Layouts of equal length that are looked for together; what is left is read one by one.
@@ -151,7 +152,7 @@ def _alike(rows: ByteArray, fixed: Sequence[tuple[int, int]]) -> BoolArray:
 
 
 def _stamp_column(rows: ByteArray) -> IntArray:
-    return _column(rows, 4, '<i4').astype(np.int64) * cdr.NS_PER_S + _column(rows, 8, '<u4')
+    return _column(rows, 4, '<i4').astype(np.int64) * NS_PER_S + _column(rows, 8, '<u4')
 
 
 def _column(rows: ByteArray, offset: int, kind: str) -> Any:

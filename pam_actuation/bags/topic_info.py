@@ -22,7 +22,7 @@ from pam_actuation.bags.load_joint import is_joint_topic
 from pam_actuation.bags.source import TopicData
 from pam_actuation.topics.cdr import CdrError
 from pam_actuation.topics.definitions import typestore
-from pam_actuation.topics.table import BY_NAME, short_name, TOPICS
+from pam_actuation.topics.table import BY_NAME, DIAGNOSTICS, short_name, TOPICS
 from pam_sim.annotations import FloatArray, IntArray
 
 # An interval between stamps this many times the usual one counts as a gap.
@@ -70,7 +70,7 @@ def topic_info(topic: TopicData,
         steps = np.diff(stamp_ns)
         info.stamps_backward = int((steps < 0).sum())
         info.stamps_repeated = int((steps == 0).sum())
-    if len(stamp_ns) > 2 and topic.name != '/diagnostics':
+    if len(stamp_ns) > 2 and topic.name != DIAGNOSTICS:
         steps_s: FloatArray = np.multiply(np.diff(np.sort(stamp_ns)), 1e-9)
         usual_s = float(np.median(steps_s))
         gaps = steps_s > GAP_FACTOR * usual_s if usual_s > 0 else np.zeros(steps_s.size, bool)

@@ -32,7 +32,7 @@ from pam_actuation.control.reference_buffer import MAX_AHEAD_NS
 from pam_actuation.control.slack_muscle import PROOF_PA
 from pam_actuation.slow_rise import NEARLY_PA, SlowRise
 from pam_sim.joint.parameters import SIDES
-from pam_sim.units import P_ATM_PA
+from pam_sim.units import NS_PER_S, P_ATM_PA
 
 (OK, NO_CONTRACTION, CONTRACTION_OLD, CONTRACTION_AHEAD, CONTRACTION_NOT_FINITE,
  CONTRACTION_IMPLAUSIBLE, NO_REFERENCE, REFERENCE_LOST, REFERENCE_HELD, NO_FORCE, FORCE_OLD,
@@ -73,7 +73,6 @@ REASONS = (
     'the driver vented or fell silent, so what was wanted before is dropped; send a new reference')
 RUNNING = (OK, REFERENCE_HELD)      # reasons with which the controller runs
 
-_NS = 1_000_000_000
 HELD_BACK = 'held_back'     # not 0 while the driver does not follow the command
 # From the stamps of what a law tracks and of the pressure to the tick; of two pressures the mean.
 AGES = ('measurement_age_s', 'pressure_age_s')
@@ -150,12 +149,12 @@ class TickInputs:
 def split_stamps(stamps_ns: Iterable[int]) -> list[float]:
     """Return two numbers a stamp that a float holds exactly: seconds, nanoseconds."""
     return [float(part) for stamp_ns in stamps_ns
-            for part in (divmod(stamp_ns, _NS) if stamp_ns >= 0 else (-1, 0))]
+            for part in (divmod(stamp_ns, NS_PER_S) if stamp_ns >= 0 else (-1, 0))]
 
 
 def join_stamp(seconds: float, nanoseconds: float) -> int:
     """Return the stamp [ns] of ``split_stamps``, -1 for none."""
-    return -1 if seconds < 0 else int(seconds) * _NS + int(nanoseconds)
+    return -1 if seconds < 0 else int(seconds) * NS_PER_S + int(nanoseconds)
 
 
 class Law(Protocol):

@@ -27,11 +27,11 @@ from pam_actuation.control.course import Course
 from pam_actuation.control.joint_trajectory import TOLERANCE_RAD
 from pam_actuation.control.modes.tracked import JOINT
 from pam_actuation.messages import AngleTrajectory, NamedTrajectory
+from pam_sim.units import NS_PER_S
 
 # As in control_msgs/action/FollowJointTrajectory.
 SUCCESSFUL, INVALID_GOAL, INVALID_JOINTS, OLD_HEADER_TIMESTAMP = 0, -1, -2, -3
 PATH_TOLERANCE_VIOLATED, GOAL_TOLERANCE_VIOLATED = -4, -5
-NS = 1_000_000_000
 STEP_NS, AHEAD_NS = 20_000_000, 600_000_000     # of what is sent; the joint moves alone so long
 SILENT_NS = 500_000_000         # an angle that is older says nothing of the present one
 MOST_S = 3600.0                 # of a goal, waiting included
@@ -132,7 +132,7 @@ class JointGoal:
         if time_ns >= times[-1]:
             return angles[-1], 0.0
         k = next(k for k, end_ns in enumerate(times) if time_ns < end_ns) - 1
-        span_s, share = (times[k + 1] - times[k]) / NS, (
+        span_s, share = (times[k + 1] - times[k]) / NS_PER_S, (
             (time_ns - times[k]) / (times[k + 1] - times[k]))
         change, (first, second) = angles[k + 1] - angles[k], self.rates_rad_per_s[k:k + 2]
         if math.isnan(first) or math.isnan(second):
@@ -166,7 +166,7 @@ class JointGoal:
         error = angle_rad - wanted
         if now_ns - measured_ns > SILENT_NS or not math.isfinite(angle_rad):
             return Outcome(PATH_TOLERANCE_VIOLATED, 'no measured angle for '
-                           f'{(now_ns - measured_ns) / NS:.1f} s')
+                           f'{(now_ns - measured_ns) / NS_PER_S:.1f} s')
         if measured_ns < self.end_ns:
             return None if abs(error) <= self.path_rad else Outcome(
                 PATH_TOLERANCE_VIOLATED, f'{abs(error):.3f} rad from the wanted '
@@ -177,7 +177,7 @@ class JointGoal:
             return None
         return Outcome(
             GOAL_TOLERANCE_VIOLATED, f'{abs(error):.3f} rad from {wanted:.3f} rad, '
-            f'{(now_ns - self.end_ns) / NS:.1f} s after the last point; allowed are '
+            f'{(now_ns - self.end_ns) / NS_PER_S:.1f} s after the last point; allowed are '
             f'{self.goal_rad:g} rad')
 
     def stopped(self, now_ns: int) -> 'JointGoal':
@@ -223,10 +223,10 @@ def goal_of(trajectory: NamedTrajectory, limits: Limits, now_ns: int, from_rad: 
     times = [begin_ns + after_ns for after_ns, _, _ in trajectory.points]
     if trajectory.stamp_ns and times[-1] <= now_ns:
         raise GoalRefused(OLD_HEADER_TIMESTAMP, 'the last point was '
-                          f'{(now_ns - times[-1]) / NS:.3f} s ago')
-    if times[-1] - now_ns > MOST_S * NS:
-        raise GoalRefused(INVALID_GOAL, f'ends in {(times[-1] - now_ns) / NS:.0f} s; allowed '
-                          f'are {MOST_S:g} s')
+                          f'{(now_ns - times[-1]) / NS_PER_S:.3f} s ago')
+    if times[-1] - now_ns > MOST_S * NS_PER_S:
+        raise GoalRefused(INVALID_GOAL, f'ends in {(times[-1] - now_ns) / NS_PER_S:.0f} s; '
+                          f'allowed are {MOST_S:g} s')
     if not math.isfinite(from_rad):
         raise GoalRefused(INVALID_GOAL, 'the angle of the joint is not known')
     coming = next(k for k, time_ns in enumerate(times) if time_ns > now_ns or k == len(times) - 1)
@@ -241,13 +241,13 @@ def goal_of(trajectory: NamedTrajectory, limits: Limits, now_ns: int, from_rad: 
     beyond = course.beyond(lower - TOLERANCE_RAD, upper + TOLERANCE_RAD, math.inf)
     if beyond is not None:
         raise GoalRefused(INVALID_GOAL, f'the velocities lead to {beyond[1]:g} rad at '
-                          f'time_from_start {(beyond[0] - begin_ns) / NS:.3f} s; the stops allow '
-                          f'{lower:g} to {upper:g} rad')
+                          f'time_from_start {(beyond[0] - begin_ns) / NS_PER_S:.3f} s; the stops '
+                          f'allow {lower:g} to {upper:g} rad')
     return JointGoal(
         course.times_ns, course.values, course.rates,
         _tolerance(path, limits.joint, limits.path_rad, 'path'),
         _tolerance(goal, limits.joint, limits.goal_rad, 'goal'),
-        max(times[-1], now_ns) + round(arrive_s * NS))
+        max(times[-1], now_ns) + round(arrive_s * NS_PER_S))
 
 
 def _checked_points(trajectory: NamedTrajectory,
@@ -263,8 +263,8 @@ def _checked_points(trajectory: NamedTrajectory,
             raise GoalRefused(INVALID_GOAL, f'{place} has {len(positions)} positions and '
                               f'{len(velocities)} velocities; one joint has one position')
         if after_ns <= before_ns:
-            raise GoalRefused(INVALID_GOAL, f'{place}.time_from_start is {after_ns / NS:g} s; '
-                              'times must rise from 0 s on')
+            raise GoalRefused(INVALID_GOAL, f'{place}.time_from_start is '
+                              f'{after_ns / NS_PER_S:g} s; times must rise from 0 s on')
         angle, rate = positions[0], velocities[0] if velocities else math.nan
         if not lower - SLACK_RAD <= angle <= upper + SLACK_RAD:     # NaN neither
             raise GoalRefused(INVALID_GOAL, f'{place} is at {angle:g} rad; the stops allow '

@@ -30,9 +30,8 @@ from pam_actuation.drivers.ppr import PprLaw
 from pam_actuation.drivers.safety import SafetySupervisor
 from pam_actuation.messages import (
     Contraction, Pressure, SAFE_EFFORTS, Status, VALVE_NAMES, ValveSignal)
-from pam_sim.units import gauge_kpa, P_ATM_PA
+from pam_sim.units import gauge_kpa, NS_PER_S, P_ATM_PA
 
-_NS = 1_000_000_000
 _MOST_MISSED = 20        # periods the model catches up after a late tick
 _READING_AGE_S = 0.01    # of a pressure, when it is used
 _PPR_MOVE_PA = 20_000.0  # a regulator this far from its command should move
@@ -203,7 +202,7 @@ class DriverLoop:
         if decision.pressure_pa is not None and self.law.saturated:
             self.saturated_ticks += 1
             if self._last_ns is not None:
-                self.saturated_s += max(now_ns - self._last_ns, 0) / _NS
+                self.saturated_s += max(now_ns - self._last_ns, 0) / NS_PER_S
         self._last_ns = now_ns
         return self._signal(now_ns, efforts)
 
@@ -221,7 +220,7 @@ class DriverLoop:
 
     def _ppr(self, law: PprLaw, decision: Decision, now_ns: int) -> tuple[float, ...]:
         target_pa = decision.pressure_pa
-        dt_s = None if self._last_ns is None else max(now_ns - self._last_ns, 0) / _NS
+        dt_s = None if self._last_ns is None else max(now_ns - self._last_ns, 0) / NS_PER_S
         if target_pa is None:
             volts, = self._safe_efforts()
             law.force(volts)
@@ -235,12 +234,12 @@ class DriverLoop:
 
     def _hsv(self, law: HsvLaw, decision: Decision, now_ns: int) -> tuple[float, ...]:
         measured = self._new_measurement()
-        age_s = max((now_ns - (self.safety.pressure.stamp_ns or now_ns)) / _NS, 0.0)
+        age_s = max((now_ns - (self.safety.pressure.stamp_ns or now_ns)) / NS_PER_S, 0.0)
         supply_pa = self.safety.supply_pa(now_ns)
         motion = self._motion(now_ns)
         elapsed, late = 1, 0.0
         if self._law_ns is not None:
-            periods = (now_ns - self._law_ns) / (self.period_s * _NS)
+            periods = (now_ns - self._law_ns) / (self.period_s * NS_PER_S)
             elapsed = round(periods)
             late = periods - elapsed
         followed = decision.pressure_pa is not None or decision.duty is not None
@@ -280,7 +279,7 @@ class DriverLoop:
         reading, self._contraction = self._contraction, None
         if reading is None or not self.uses_contraction:
             return math.nan, 0.0
-        age_s = (now_ns - reading.stamp_ns) / _NS
+        age_s = (now_ns - reading.stamp_ns) / NS_PER_S
         limits = self.config.safety
         if not -limits.stamp_ahead_s <= age_s <= limits.measurement_timeout_s:
             return math.nan, 0.0
@@ -296,12 +295,12 @@ class DriverLoop:
 
     def _count(self, now_ns: int) -> None:
         self.ticks += 1
-        if self._last_ns is not None and now_ns - self._last_ns > 1.5 * self.period_s * _NS:
+        if self._last_ns is not None and now_ns - self._last_ns > 1.5 * self.period_s * NS_PER_S:
             self.late_ticks += 1
         if self._rate_start is None or now_ns < self._rate_start[0]:
             self._rate_start = (now_ns, self.ticks)
-        elif now_ns - self._rate_start[0] >= _NS:
-            span_s = (now_ns - self._rate_start[0]) / _NS
+        elif now_ns - self._rate_start[0] >= NS_PER_S:
+            span_s = (now_ns - self._rate_start[0]) / NS_PER_S
             self._rate_measured_hz = (self.ticks - self._rate_start[1]) / span_s
             self._rate_start = (now_ns, self.ticks)
 

@@ -22,9 +22,8 @@ passed in, so that live nodes, simulation and replay give the same answers.
 from collections import deque
 import math
 
-from pam_sim.units import gauge_kpa, P_ATM_PA
+from pam_sim.units import gauge_kpa, NS_PER_S, P_ATM_PA
 
-NS_PER_S = 1_000_000_000
 _NO_SEQUENCE = 2 ** 63     # middleware without sequence numbers gives 0 or all bits set
 # A frozen reading near the pressure limit: full times and changes count with 1.5 times the change
 # of room or more, and never less than these parts of them.

@@ -36,12 +36,12 @@ from pam_actuation.drivers.monitors import (
 from pam_actuation.drivers.steady_age import SteadyAge
 from pam_actuation.messages import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN
 from pam_actuation.slow_rise import SlowRise, WAITS_LONG_S
-from pam_sim.units import gauge_kpa, P_ATM_PA
+from pam_sim.units import gauge_kpa, NS_PER_S, P_ATM_PA
 
-_NS = 1_000_000_000
-_WARNING_HOLD_NS = WARNING_HOLD_S * _NS
+_WARNING_HOLD_NS = WARNING_HOLD_S * NS_PER_S
 _LATE_TICK_NS = 50_000_000   # after a tick this late, queued messages get one chance to arrive
 _GRACE_NS = 20_000_000
+_HIGHEST_SUPPLY_PA = 5e6     # that is believed
 _QUEUE = 256
 _TO_GO_ON = '; call the service reset to go on'      # said of what is latched
 
@@ -85,14 +85,16 @@ class SafetySupervisor:
         lowest = P_ATM_PA + lim.lowest_plausible_gauge_pa
         self.pressure = Channel(lim.measurement_timeout_s, lim.stamp_ahead_s, lowest,
                                 lim.highest_plausible_pa)
-        self.supply = Channel(lim.supply_timeout_s, lim.stamp_ahead_s, lowest, 5e6)
+        self.supply = Channel(lim.supply_timeout_s, lim.stamp_ahead_s, lowest,
+                              _HIGHEST_SUPPLY_PA)
         self.frozen = FrozenMonitor(lim.frozen_after_s, lim.frozen_change_pa)
         self.air = AirMonitor(lag_s, dead_time_s)
         self.clock = ClockMonitor(lim.pause_s)
         self.order = CommandOrder(lim.two_publishers_window_s, lim.two_publishers_clear_s)
         # A regulator is told of each command as it comes: nothing waits there.
         self.ages = SteadyAge(
-            round(lim.command_wait_s * _NS) if needs_pressure else 0, round(period_s * _NS))
+            round(lim.command_wait_s * NS_PER_S) if needs_pressure else 0,
+            round(period_s * NS_PER_S))
         self.publishers = 1
         self.publisher_names = ''
         self.sender_fault: Fault | None = None      # of a second sender, as senders.py tells
@@ -215,7 +217,7 @@ class SafetySupervisor:
 
     def _clock(self, now_ns: int) -> Fault | None:
         last, self._now_ns = self._now_ns, now_ns
-        self._dt_s = 0.0 if last is None else max(now_ns - last, 0) / _NS
+        self._dt_s = 0.0 if last is None else max(now_ns - last, 0) / NS_PER_S
         if last is None:
             self._first_tick_ns = now_ns
             return None
@@ -306,7 +308,7 @@ class SafetySupervisor:
     # -- faults ---------------------------------------------------------------------
 
     def _standing_fault(self, now_ns: int) -> Fault | None:
-        grace_s = self._grace_ns / _NS if now_ns <= self._grace_until_ns else 0.0
+        grace_s = self._grace_ns / NS_PER_S if now_ns <= self._grace_until_ns else 0.0
         fault = (self.sender_fault or self._pressure_fault(now_ns, grace_s)
                  or self._command_fault(now_ns, grace_s))
         if self._standing is not None:
@@ -324,7 +326,7 @@ class SafetySupervisor:
         if not self._seen_pressure:
             # A sensor that has not been discovered yet is not the same as none.
             if self.needs_pressure or (
-                    0 <= now_ns - self._first_tick_ns < lim.first_pressure_wait_s * _NS):
+                    0 <= now_ns - self._first_tick_ns < lim.first_pressure_wait_s * NS_PER_S):
                 why = f'; the last one {channel.problem}' if channel.problem else ''
                 return 'no_pressure', 'waiting for the first measured pressure' + why
             self._warn('no_pressure_ppr',
@@ -355,7 +357,7 @@ class SafetySupervisor:
             why = f'; the last one {self.command_problem}' if self.command_problem else ''
             return 'no_command', 'waiting for the first pressure command' + why
         age_s = math.inf if self.command_stamp_ns is None else (
-            (now_ns - self.command_stamp_ns) / _NS)
+            (now_ns - self.command_stamp_ns) / NS_PER_S)
         if age_s > lim.command_timeout_s + grace_s:
             why = f'; the last one {self.command_problem}' if self.command_problem else ''
             return 'command_timeout', (

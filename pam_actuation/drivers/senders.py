@@ -23,11 +23,11 @@ dictionary, None where it is not known, which is not judged.
 from collections.abc import Callable, Hashable
 
 from pam_actuation.messages import SAFE_EFFORTS, VALVE_NAMES, valve_of, ValveSignal
+from pam_sim.units import NS_PER_S
 
 CLEAR_S = 1.0           # without a second sender, until the fault ends
 UNNAMED_S = 0.2         # how long the graph may take to tell the name of a new node
-_NS = 1_000_000_000
-_REMEMBERED_NS = 60 * _NS       # longer than a dead node stays on the graph
+_REMEMBERED_NS = 60 * NS_PER_S       # longer than a dead node stays on the graph
 _MOST_UNNAMED = 32
 
 
@@ -68,7 +68,7 @@ class Senders:
     """
 
     def __init__(self, clear_s: float = CLEAR_S) -> None:
-        self._clear_ns = round(clear_s * _NS)
+        self._clear_ns = round(clear_s * NS_PER_S)
         self._forget()
 
     def _forget(self) -> None:
@@ -147,7 +147,7 @@ class SignalSenders:
             if len(self._first_ns) >= _MOST_UNNAMED:
                 self._first_ns.clear()
             first_ns = self._first_ns.setdefault(writer, now_ns)
-            if 0 <= now_ns - first_ns < UNNAMED_S * _NS:
+            if 0 <= now_ns - first_ns < UNNAMED_S * NS_PER_S:
                 return False
         self._senders.heard(writer, now_ns)
         return True

@@ -25,12 +25,13 @@ import os
 
 from pam_actuation.drivers.senders import CLEAR_S, is_safe, told, UNNAMED_S
 from pam_actuation.messages import SAFE_EFFORTS, VALVE_NAMES, valve_of, ValveSignal
+from pam_sim.units import NS_PER_S
 
 WAITING, HEARS, RESTS, VENTS, CONTESTED = (
     'waiting for the first valve signal', 'hears the driver',
     'the driver ended with the signal that vents',
     'vented because the valve signal fell silent', 'vented because two send the valve signal')
-_MS, _NS = 1_000_000, 1_000_000_000
+_MS = 1_000_000
 _LATE_NS = 20_000_000           # between two of its own ticks: it was kept waiting itself
 
 
@@ -44,8 +45,8 @@ class _Other:
 
     def counts(self, now_ns: int) -> bool:
         """Tell whether it was heard lately, and is not just a node whose name is on its way."""
-        lately = 0 <= now_ns - self.last_ns <= CLEAR_S * _NS
-        return lately and (self.spoke or now_ns - self.first_ns >= UNNAMED_S * _NS)
+        lately = 0 <= now_ns - self.last_ns <= CLEAR_S * NS_PER_S
+        return lately and (self.spoke or now_ns - self.first_ns >= UNNAMED_S * NS_PER_S)
 
 
 class SignalWatchdog:
@@ -133,12 +134,12 @@ class SignalWatchdog:
             self._driver, self._driver_name = writer, name
             return True
         self._others = {one: other for one, other in self._others.items()
-                        if 0 <= now_ns - other.last_ns <= CLEAR_S * _NS}
+                        if 0 <= now_ns - other.last_ns <= CLEAR_S * NS_PER_S}
         first_ns = self._others.setdefault(writer, _Other(now_ns)).first_ns
         silent_ns = now_ns - self._heard_ns
         began_after = writer not in self._former and self._heard_ns < first_ns
         same = name and name in (self._driver_name, self._expected)
-        if same and (began_after or silent_ns > CLEAR_S * _NS) or (
+        if same and (began_after or silent_ns > CLEAR_S * NS_PER_S) or (
                 began_after and silent_ns > self._timeout_ns and self.state in (HEARS, RESTS)
                 and self._ended_in_order()):
             self._former.add(self._driver)
@@ -173,8 +174,9 @@ class SignalWatchdog:
             self.vents += 1
         silent_ns = now_ns - self._heard_ns
         # A figure that changes with every tick would be a flood of messages.
-        if self.state != state or silent_ns >= _NS:
-            self._silent_ms = silent_ns // _MS if silent_ns < _NS else silent_ns // _NS * 1000
+        if self.state != state or silent_ns >= NS_PER_S:
+            self._silent_ms = (
+                silent_ns // _MS if silent_ns < NS_PER_S else silent_ns // NS_PER_S * 1000)
         self.state = state
         return self.safe_signal(now_ns)
 
@@ -195,7 +197,7 @@ class SignalWatchdog:
     def _note_delay(self, now_ns: int) -> None:
         before_ns, self._ticked_ns = self._ticked_ns, now_ns
         longest_ns, since_ns = self._late_ns
-        if not 0 <= now_ns - since_ns <= _NS:
+        if not 0 <= now_ns - since_ns <= NS_PER_S:
             longest_ns = 0
         if before_ns is not None and now_ns - before_ns >= max(longest_ns, _LATE_NS):
             self._late_ns = now_ns - before_ns, now_ns

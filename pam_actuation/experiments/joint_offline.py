@@ -27,13 +27,11 @@ from pam_actuation.loops.wiring import attach, attach_plant, driver_tick
 from pam_actuation.messages import ControllerState, Message, Pressure, START_NS
 from pam_actuation.plant_loop import PlantLoop
 from pam_sim.joint.parameters import SIDES
-from pam_sim.units import P_ATM_PA
+from pam_sim.units import NS_PER_S, P_ATM_PA
 
 if TYPE_CHECKING:
     from pam_actuation.control.loop import ControllerLoop
     from pam_sim.joint.rig import JointRig
-
-_NS = 1_000_000_000
 
 
 class JointLoops:
@@ -58,7 +56,7 @@ class JointLoops:
         self.plant = PlantLoop(joint, seed)
         drivers = driver_loops(joint, control.controller.driver)
         self.drivers = list(drivers.values())
-        self.period_ns = round(_NS / control.rate_hz)
+        self.period_ns = round(NS_PER_S / control.rate_hz)
         self.now_ns = START_NS
         self.state: ControllerState | None = None       # the newest
         self.ticks = 0

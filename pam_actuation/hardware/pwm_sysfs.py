@@ -23,9 +23,9 @@ from pam_actuation.hardware.iio import SYSFS_ROOT
 from pam_actuation.hardware.sysfs import DeviceError
 from pam_actuation.hardware.valve_output import check_pair, ValveOutput
 from pam_sim.parameters import Parameter
+from pam_sim.units import NS_PER_S
 
 EXPORT_WAIT_S = 1.0     # until the kernel shows a channel and udev hands it over
-NS_PER_S = 1e9
 
 
 class PwmChannel:

@@ -32,12 +32,12 @@ from pam_actuation.nodes.console import Console
 from pam_actuation.nodes.endpoints import CountedPublisher
 from pam_actuation.nodes.ros_messages import class_of
 from pam_actuation.topics.codec import encode
+from pam_actuation.topics.table import DIAGNOSTICS
 
 if TYPE_CHECKING:
     from pam_actuation.nodes.managed import ManagedNode
 
 Values = tuple[tuple[str, Any], ...]       # of a status: keys, and what becomes a text
-TOPIC = '/diagnostics'
 OK, WARN, ERROR, STALE = LEVEL_OK, LEVEL_WARN, LEVEL_ERROR, LEVEL_STALE
 WORDS = {OK: 'INFO', WARN: 'WARN', ERROR: 'ERROR', STALE: 'WARN'}     # of the logger of ROS
 DIGITS = re.compile('[0-9]+')
@@ -57,7 +57,7 @@ class DiagnosticsReporter:
 
     def __init__(self, node: 'ManagedNode') -> None:
         self._node = node
-        self.publisher = CountedPublisher(node, class_of(TOPIC), TOPIC)
+        self.publisher = CountedPublisher(node, class_of(DIAGNOSTICS), DIAGNOSTICS)
         self.level = OK
         self.message = 'starting'
         self.values_of: Callable[[], Values] = tuple
@@ -92,7 +92,7 @@ class DiagnosticsReporter:
         level, message = self.level, self.message
         if self.remark:
             level, message = max(level, WARN), f'{message}; {self.remark}'
-        self.publisher.publish(encode(TOPIC, Status(
+        self.publisher.publish(encode(DIAGNOSTICS, Status(
             now_ns, level, self._node.get_fully_qualified_name(), message,
             (*self._values(), *self._counts()), HARDWARE_ID)))
         self._say(now_ns, level, message)

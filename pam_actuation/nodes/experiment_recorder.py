@@ -41,7 +41,7 @@ from pam_actuation.nodes.runner import run
 from pam_actuation.topics.codec import decode
 from pam_actuation.topics.definitions import schema_text, type_hash
 from pam_actuation.topics.quality import Quality, USUAL
-from pam_actuation.topics.table import RECORDED, RECORDED_OF_JOINT, ROOT, Topic
+from pam_actuation.topics.table import DIAGNOSTICS, RECORDED, RECORDED_OF_JOINT, ROOT, Topic
 from pam_sim.errors import InputError
 from pam_sim.files import write_text
 
@@ -331,7 +331,7 @@ class ExperimentRecorder(ManagedNode):
             time.sleep(0.01)
 
     def _others_publish(self) -> bool:
-        own = {'/diagnostics': 1}
+        own = {DIAGNOSTICS: 1}
         return any(source.publishers > own.get(source.topic, 0)
                    for source in self.sources.values())
 

@@ -22,9 +22,9 @@ oldest messages. Nothing can be sent to the rig this way.
 import time
 from typing import Any, Final
 
-from pam_actuation.nodes.onlooker import DIAGNOSTICS, Onlooker
+from pam_actuation.nodes.onlooker import Onlooker
 from pam_actuation.topics.definitions import schema_text
-from pam_actuation.topics.table import BY_NAME, short_name
+from pam_actuation.topics.table import BY_NAME, DIAGNOSTICS, short_name
 from pam_sim.errors import InputError
 
 HOST: Final = '127.0.0.1'           # the protocol knows no password

@@ -28,14 +28,14 @@ from typing import Any, Self
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.rigging.client import local_context
 from pam_actuation.rigging.domain import DomainLock
-from pam_actuation.topics.table import topic_of
+from pam_actuation.topics.table import DIAGNOSTICS, topic_of
 from pam_sim.parameters import Parameter
 import rclpy
 from rclpy import parameter as ros
 
 NAMESPACE = '/ns'       # any: what lies below it is relative
 KINDS = ('publishes', 'subscribes', 'serves')
-OF_EVERY_NODE = ('/diagnostics', '/parameter_events', '/rosout')
+OF_EVERY_NODE = (DIAGNOSTICS, '/parameter_events', '/rosout')
 # Node to the sets of parameters that, beside the defaults, bring other topics or services.
 VARIANTS: dict[str, tuple[dict[str, Any], ...]] = {
     'plant_simulator': ({'valve_type': 'hsv'}, {'use_sim_time': True}),

@@ -30,13 +30,12 @@ from pam_actuation.nodes.operator import is_below
 from pam_actuation.nodes.ros_messages import message_class
 from pam_actuation.rigging.client import context_by_environment
 from pam_actuation.topics.quality import ONLOOKER
-from pam_actuation.topics.table import BY_NAME, short_name
+from pam_actuation.topics.table import BY_NAME, DIAGNOSTICS, short_name
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 NAME: Final = 'pam_view'            # beginning of the name of the node, and its enclave
-DIAGNOSTICS: Final = '/diagnostics'
 
 
 class Onlooker:

@@ -16,7 +16,7 @@
 
 from collections.abc import Sequence
 import sys
-from typing import Any, TYPE_CHECKING
+from typing import Any
 
 from pam_actuation.drivers.parameter import node_parameter
 from pam_actuation.nodes import lockstep
@@ -31,9 +31,6 @@ from pam_actuation.nodes.simulated_time import PlantTime
 from pam_sim.errors import InputError
 from std_srvs.srv import SetBool
 from std_srvs.srv import Trigger
-
-if TYPE_CHECKING:
-    from pam_sim.rig import Rig
 
 
 class PlantSimulator(PhysicsNode):
@@ -68,16 +65,12 @@ class PlantSimulator(PhysicsNode):
 
     def setup(self) -> None:
         """Load the rig, create the topics and what steers the clock."""
-        self.set_up(self.loaded_rig())
+        from pam_sim import load_rig
+        self.set_up(load_rig(self.value('rig'), valve=self.value('valve_type') or None))
         if self.uses_simulated_time:
             self._clock_services = [
                 self.create_service(SetBool, '~/pause', self._on_pause),
                 self.create_service(Trigger, '~/step', self._on_step)]
-
-    def loaded_rig(self) -> 'Rig':
-        """Return the rig to be simulated; what moves is its ``plant``."""
-        from pam_sim import load_rig
-        return load_rig(self.value('rig'), valve=self.value('valve_type') or None)
 
     def teardown(self) -> None:
         """Take the services back."""

@@ -29,7 +29,7 @@ from pam_actuation.namespaces import outermost
 from pam_actuation.nodes.interfaces import Inspector, OF_EVERY_NODE
 from pam_actuation.rigging.client import NAME
 from pam_actuation.rigging.node_spec import NodeSpec
-from pam_actuation.topics.table import MARKER, short_name
+from pam_actuation.topics.table import DIAGNOSTICS, MARKER, short_name
 from pam_actuation.view.plots import KEPT
 from pam_actuation.view.requests import ACTIONS
 
@@ -79,17 +79,17 @@ def policy(nodes: Iterable[NodeSpec]) -> str:
                 *interface.serves, *(f'~/{one}' for one in PARAMETER_SERVICES),
                 *(f'~/{one}' for one in LIFECYCLE_SERVICES)))
     session = _profile(enclaves, '/', NAME)
-    _allow(session, 'topic', 'subscribe', ('/diagnostics',))
+    _allow(session, 'topic', 'subscribe', (DIAGNOSTICS,))
     _allow(session, 'service', 'request', [
         f'{node.namespace}/{node.name}/change_state' for node in nodes])
     operator = _profile(enclaves, '/', OPERATOR)
-    _allow(operator, 'topic', 'subscribe', ('/diagnostics',))
+    _allow(operator, 'topic', 'subscribe', (DIAGNOSTICS,))
     _allow(operator, 'service', 'request', offered)
     page = _profile(enclaves, '/', PAGE)
     marked = [f'{place}/{MARKER}'
               for place in outermost(sorted({node.namespace for node in nodes}))]
     _allow(page, 'topic', 'publish', marked)
-    _allow(page, 'topic', 'subscribe', ('/diagnostics', *drawn, *marked))
+    _allow(page, 'topic', 'subscribe', (DIAGNOSTICS, *drawn, *marked))
     _allow(page, 'service', 'request', [
         one for one in offered if short_name(one) in ACTIONS])
     ElementTree.indent(root)

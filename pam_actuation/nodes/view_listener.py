@@ -21,12 +21,12 @@ from typing import Any, Final
 
 from pam_actuation.bags.series import table
 from pam_actuation.nodes.endpoints import PolledSubscription
-from pam_actuation.nodes.onlooker import DIAGNOSTICS, Onlooker
+from pam_actuation.nodes.onlooker import Onlooker
 from pam_actuation.nodes.operator import is_below, serving
 from pam_actuation.nodes.view_marking import Marking
 from pam_actuation.nodes.view_player import experiments, PLAYER, Playing
 from pam_actuation.topics.codec import Reader
-from pam_actuation.topics.table import MARKER, RECORDER, short_name
+from pam_actuation.topics.table import DIAGNOSTICS, MARKER, RECORDER, short_name
 from pam_actuation.view.plots import KEPT
 from pam_actuation.view.requests import ACTIONS, EMERGENCY_STOP, MARK, PLAY, Request
 from pam_actuation.view.source import Answer

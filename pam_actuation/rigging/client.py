@@ -29,6 +29,7 @@ from pam_actuation.interrupts import closing
 from pam_actuation.messages import is_fault
 from pam_actuation.topics.codec import Reader
 from pam_actuation.topics.quality import USUAL
+from pam_actuation.topics.table import DIAGNOSTICS
 from pam_actuation.transport import prepare_middleware, RANGE
 from pam_sim.errors import InputError
 import rclpy
@@ -184,7 +185,7 @@ class RigClient:
         self._read = Reader('diagnostics')
         # A bare depth is a reliable, volatile subscription to rclpy, as of all topics of the rig.
         self.node.create_subscription(
-            DiagnosticArray, '/diagnostics', self._on_diagnostics, USUAL.consumer.depth, raw=True)
+            DiagnosticArray, DIAGNOSTICS, self._on_diagnostics, USUAL.consumer.depth, raw=True)
 
     def open_context(self, domain_id: int, arguments: Sequence[str]) -> rclpy.Context:
         """Return an open context for the node."""

@@ -27,8 +27,9 @@ import functools
 import struct
 from typing import NamedTuple
 
+from pam_sim.units import NS_PER_S
+
 ENCAPSULATION = b'\x00\x01\x00\x00'
-NS_PER_S = 1_000_000_000
 START = len(ENCAPSULATION)           # where the stamp begins
 _STAMP = struct.Struct('<iI')
 _COUNT = struct.Struct('<I')

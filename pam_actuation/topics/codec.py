@@ -33,6 +33,7 @@ from pam_actuation.topics.definitions import little_endian
 from pam_actuation.topics.table import topic_of
 from pam_sim.annotations import ByteArray, FloatArray, IntArray
 from pam_sim.errors import InputError
+from pam_sim.units import NS_PER_S
 
 # What bytes raise that are not the message they are said to be.
 UNREADABLE = (struct.error, ValueError, IndexError)
@@ -93,7 +94,7 @@ def encode_series(topic: str, stamp_ns: IntArray, values: FloatArray) -> ByteArr
     sample = encode(topic, content.maker(content.always[:1])(0, [0.0]))
     begin, = [place for place in content.places(sample).offsets[:1] if place is not None]
     found = np.tile(np.frombuffer(sample, np.uint8), (len(values), 1))
-    stamps = np.column_stack(np.divmod(np.asarray(stamp_ns, np.int64), cdr.NS_PER_S))
+    stamps = np.column_stack(np.divmod(np.asarray(stamp_ns, np.int64), NS_PER_S))
     found[:, cdr.START:cdr.START + 8] = stamps.astype('<u4').view(np.uint8)
     found[:, begin:begin + 8] = np.asarray(values, '<f8').reshape(-1, 1).view(np.uint8)
     return found
@@ -201,7 +202,7 @@ class _Layout:
     def message(self, raw: bytes) -> Any:
         """Return the plain message in bytes of this layout."""
         seconds, nanoseconds, *values = self._unpack_from(raw, cdr.START)
-        return self._make(seconds * cdr.NS_PER_S + nanoseconds, values)
+        return self._make(seconds * NS_PER_S + nanoseconds, values)
 
 
 def _learned(content: Numeric, raw: bytes) -> _Layout | None:

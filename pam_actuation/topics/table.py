@@ -48,6 +48,7 @@ RECORDER = 'experiment_recorder'
 EVERY_NODE = 'every node'
 ONLOOKER = 'pam_view'           # the live page
 MARKER = 'marker'
+DIAGNOSTICS = '/diagnostics'    # in full
 
 
 @dataclass(frozen=True)

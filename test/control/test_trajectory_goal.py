@@ -18,8 +18,9 @@ import math
 
 from pam_actuation.control.trajectory_goal import (
     AHEAD_NS, goal_of, GOAL_TOLERANCE_VIOLATED, GoalRefused, INVALID_GOAL, INVALID_JOINTS, Limits,
-    NS, OLD_HEADER_TIMESTAMP, PATH_TOLERANCE_VIOLATED, SUCCESSFUL, Tolerance)
+    OLD_HEADER_TIMESTAMP, PATH_TOLERANCE_VIOLATED, SUCCESSFUL, Tolerance)
 from pam_actuation.messages import NamedTrajectory
+from pam_sim.units import NS_PER_S as NS
 import pytest
 
 NOW_NS = 1_700_000_000 * NS
