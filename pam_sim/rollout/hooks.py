@@ -25,8 +25,8 @@ changed or not. Further arguments it may name:
 
 Pressures are absolute Pa unless called gauge; ``dx_m`` is the travel since the start of the
 physics step and ``elapsed_s`` the time since then. A memory can thus be evaluated inside a step
-and advanced once, in ``commit``. What is advanced in a hook that is called once a step returns its
-mean over that step, so that half the step gives the same motion within 1e-3 of its range.
+and advanced once, in ``commit``. A hook that advances something, and is called once a step,
+returns its mean over that step. Half the step then gives the same motion within 1e-3 of its range.
 """
 
 from collections.abc import Callable
