@@ -17,7 +17,6 @@
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
-from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.parameters import check_parameters, Parameter
 
 if TYPE_CHECKING:
@@ -103,26 +102,3 @@ class SensorChain:
                 round(value / step) * step if step > 0.0 else value
                 for value, step in zip((pressure_pa, contraction_m, force_n), self._step))
         return pressure_pa, contraction_m, force_n, jitter_ns
-
-    def read_all(self, time_s: FloatArray, pressure_pa: FloatArray, contraction_m: FloatArray,
-                 force_n: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, IntArray]:
-        """
-        Return readings of whole arrays, the same numbers as sample by sample.
-
-        Parameters
-        ----------
-        time_s, pressure_pa, contraction_m, force_n : ndarray, shape (N,)
-            Signals, s, Pa absolute, m, N.
-
-        Returns
-        -------
-        tuple of ndarray
-            As :meth:`read`; the jitter is int64 nanoseconds.
-
-        """
-        rows = [self.read(*sample) for sample in zip(
-            np.asarray(time_s, float).tolist(), np.asarray(pressure_pa, float).tolist(),
-            np.asarray(contraction_m, float).tolist(), np.asarray(force_n, float).tolist())]
-        columns = list(zip(*rows)) if rows else [(), (), (), ()]
-        pressure, contraction, force = (np.array(column, dtype=float) for column in columns[:3])
-        return pressure, contraction, force, np.array(columns[3], dtype=np.int64)

@@ -69,8 +69,8 @@ def test_nominal_sensors_add_nothing():
 def test_realistic_sensors_have_the_stated_noise_and_repeat_with_the_seed():
     rig = load_rig('dmsp_5_300_realistic')
     count = 4000
-    zeros = np.zeros(count)
-    p, x, f, jitter_ns = SensorChain(rig, seed=5).read_all(zeros, zeros + 4e5, zeros, zeros)
+    chain = SensorChain(rig, seed=5)
+    p, x, f, jitter_ns = np.transpose([chain.read(0.0, 4e5, 0.0, 0.0) for _ in range(count)])
     for samples, sigma in ((p, 300.0), (x, 1e-5), (f, 0.1), (jitter_ns, 5e4)):
         assert np.std(samples) == pytest.approx(sigma, rel=0.06)
     again = SensorChain(rig.sensors, seed=5)

@@ -122,10 +122,5 @@ class ChouHannaford(MuscleLaw):
         """Return force per pressure [m^2], a, b and the length [m]."""
         return pack_cylinder(self.values)
 
-    def strain_limit(self) -> float:
-        """Return the contraction of zero force and largest volume, at any pressure."""
-        _, a, b = shape(self.values)
-        return 1.0 - np.sqrt(b / a)
-
 
 LAW = ChouHannaford
