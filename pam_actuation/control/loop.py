@@ -106,8 +106,8 @@ class ControllerLoop:
 
     Parameters
     ----------
-    controller : SelfOrganizingFuzzyController, PidController, ForceController, JointController
-        As ``load_controller`` gives it.
+    controller : CompiledController, ForceController or JointController
+        A law, or one in a mode, as ``load_controller`` gives it.
     rig : pam_sim.rig.Rig or pam_sim.joint.JointRig, optional
         What the controller is of: a joint, or one muscle as without it.
     name : str

@@ -134,7 +134,7 @@ def observe(force: float, a: float, beyond: int, state: np.record, par: np.recor
 @inlined
 def step_body(beyond: int, state: np.record, par: np.record, given: np.record,
               seen: np.record) -> None:
-    """Advance ``state`` by one step of ``par.dt_s`` with ``inp[i…]`` and fill ``out[o…]``."""
+    """Advance ``state`` by one step of ``par.dt_s`` with ``given``, and fill ``seen``."""
     dt = par.dt_s
     signal_0, signal_1 = hooks.command(
         given.signal_0, given.signal_1, dt, beyond, state, par)
