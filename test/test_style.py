@@ -334,3 +334,9 @@ def test_files_stay_readable():
     assert {name: length for name, length in lengths.items() if length > 500} == {}, (
         'a file has at most 500 lines; split it')
     assert statistics.median(lengths.values()) < 250
+
+
+def test_no_two_test_files_have_the_same_name():
+    """Pytest imports a test file by its name alone, and refuses the second one."""
+    names = [path.name for path in SOURCES if path.name.startswith('test_')]
+    assert sorted({name for name in names if names.count(name) > 1}) == []
