@@ -21,6 +21,7 @@ from pam_actuation.nodes.interfaces import Inspector, NEEDED, NodeInterface, VAR
 from pam_actuation.nodes.managed import COMMON_PARAMETERS
 from pam_actuation.nodes.parameters import allowed
 from pam_actuation.rigging import layouts
+from pam_actuation.rigging.node_spec import NodeSpec
 from pam_actuation.rigging.processes import parameter_arguments
 from pam_sim.parameters import Parameter
 
@@ -29,6 +30,7 @@ _MADE = 'Made from the code by `pam nodes --markdown docs/reference/nodes`; do n
 # Where the nodes of the examples come from, which the tests start.
 _EXAMPLES = (
     *layouts.rig(experiment='sine_quarter_hz'), *layouts.knee(),
+    NodeSpec('joint_trajectory_server', '/knee', {'muscle': 'knee'}),
     *layouts.rig(hardware='dummy', experiment='sine_quarter_hz', record='runs/first'))
 
 

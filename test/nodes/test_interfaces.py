@@ -64,6 +64,14 @@ def test_the_page_of_a_node_is_current(made, name):
     assert committed == made[f'{name}.md'], 'run: pam nodes --markdown docs/reference/nodes'
 
 
+def test_an_example_of_a_node_of_a_joint_stands_in_its_namespace(made):
+    of_joint = [name for name in VARIANTS if name.startswith('joint_')]
+    assert len(of_joint) == 3
+    for name in of_joint:
+        assert '__ns:=/knee ' in made[f'{name}.md'] and '/muscle/' not in made[f'{name}.md']
+        assert "-p muscle:='knee'" in made[f'{name}.md']
+
+
 def test_the_page_of_all_nodes_says_what_may_change_while_they_run():
     text = (ROOT / 'docs' / 'reference' / 'nodes.md').read_text(encoding='utf-8')
     said, = re.findall(r'can be set while a node runs: (.*?) The others', ' '.join(text.split()))
