@@ -239,7 +239,8 @@ def default_controller(args: argparse.Namespace, valve: str) -> Any:
 def add_seed_option(parser: Parser, text: str) -> None:
     """Add the option of the seed, said to be that of ``text``."""
     parser.add_argument(
-        '--seed', type=count(0, HIGHEST_SEED), default=0, metavar='N', help=text)
+        '--seed', type=count(0, HIGHEST_SEED), default=0, metavar='N',
+        help=f'{text} (default: %(default)s)')
 
 
 def add_overwrite_option(parser: 'argparse._ActionsContainer',

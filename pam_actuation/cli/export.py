@@ -25,7 +25,8 @@ from pam_actuation.cli.options import number, out_path, Parser, source
 if TYPE_CHECKING:
     from pam_sim.run import Run
 
-HELP = 'Write a bag as a table: CSV, Excel, MAT, Parquet or NumPy. All in SI, pressures absolute.'
+HELP = ('Write a bag as a table: CSV, Excel, MAT, Parquet, HDF5 or NumPy. All in SI, pressures '
+        'absolute.')
 EXAMPLE = 'pam export runs/first --out first.csv --rate 500'
 SHORT_S = 0.1          # topics begin and end that far apart in every recording
 

@@ -73,7 +73,8 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument('--namespace', default=None,
                         help='namespace of the muscle in the bags that are there')
     parser.add_argument('--domain-id', type=count(0, 232), default=None, metavar='N',
-                        help='ROS domain of live nodes (default: as of pam run and pam up)')
+                        help='ROS domain of live nodes (default: a free one for a simulated rig, '
+                        'for a real one ROS_DOMAIN_ID, else 0)')
     add_seed_option(parser, 'seed of the simulated sensors in the first round')
     add_overwrite_option(parser, 'the investigation of another question in this folder')
 

@@ -78,7 +78,8 @@ def add_arguments(parser: Parser) -> None:
                         '(default: %(default)s)')
     parser.add_argument('--population', type=count(5, 10000, {0: 'after the budget'}), default=0,
                         metavar='N', help='points of a generation, 5 or more; on a cluster as '
-                        'many as it has workers or more (default: 0, 24 or a tenth of the budget)')
+                        'many as it has workers or more (default: 0, which is 24, fewer with a '
+                        'small budget)')
     parser.add_argument('--jobs', type=count(1, 1024, {-1: 'one a core'}), default=-1,
                         metavar='N',
                         help='threads; -1 = one a core (default)')
