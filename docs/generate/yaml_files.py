@@ -215,7 +215,7 @@ def hardware_page():
     parts = [
         '# File of hardware', _MADE,
         'Parameters of the nodes `valve_driver` and `hardware_sensors`, in the form of ROS 2. '
-        'Any other parameter of a node may stand here too: '
+        'Any other parameter of these two nodes may stand here too: '
         '[`valve_driver`](../nodes/valve_driver.md), '
         '[`hardware_sensors`](../nodes/hardware_sensors.md). Bring-up: '
         '[Hardware](../../guides/hardware.md).',
