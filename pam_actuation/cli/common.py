@@ -150,7 +150,7 @@ def add_rig_options(parser: Parser) -> None:
 def add_controller_options(
         parser: Parser,
         default: str = 'sofc_ppr or sofc_hsv, after the valve; sofc_force_… for an experiment '
-                       'in force') -> None:
+                       'in force; of a joint sofc_joint_… or sofc_knee_…, by its size') -> None:
     """Add the options that choose the controller, as used by several verbs."""
     parser.add_argument(
         '--controller', type=source, default=None, metavar='NAME|FILE',
