@@ -190,7 +190,8 @@ def _check_joint(experiment: 'Experiment', joint: 'JointRig | Rig', place: str) 
     if not isinstance(joint, JointRig) or experiment.domain != 'joint_angle':
         raise InputError(
             f'is in {experiment.domain}; {joint.name} is '
-            + ('a joint' if is_joint else 'a single muscle'), place)
+            + ('a joint' if is_joint else
+               'a single muscle; name a joint, such as joint_dmsp_5_300_realistic'), place)
     lower, upper = joint.range_rad
     worst = experiment.chain.extremes()
     if worst[0] < lower or worst[1] > upper:

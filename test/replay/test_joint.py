@@ -299,7 +299,8 @@ def test_the_verbs_take_a_joint(bag, tmp_path, capsys):
 
 def test_what_does_not_fit_is_one_sentence(tmp_path, capsys):
     for options, words in (
-            (['joint_sine'], 'is a single muscle'),
+            (['joint_sine'],
+             'is a single muscle; name a joint, such as joint_dmsp_5_300_realistic'),
             (['sine_quarter_hz', '--rig', 'joint_dmsp_5_300'], 'is a joint')):
         assert main(['simulate', *options, '--out', str(tmp_path / 'bag')]) == 2
         assert words in capsys.readouterr().err
