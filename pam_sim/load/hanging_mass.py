@@ -32,7 +32,7 @@ MOVES_FREELY = True
 NEEDS_CONTRACTION = False
 
 PARAMETERS = (
-    Parameter('mass_kg', 'kg', 5.0, 0.1, 500.0, 0.02, 'Hanging mass.', 'rig of the seed chapter'),
+    Parameter('mass_kg', 'kg', 5.0, 0.1, 500.0, 0.02, 'Hanging mass.', 'rig of the chapter'),
     Parameter('spring_n_per_m', 'N/m', 0.0, 0.0, 1e6, 0.0,
               'Stiffness k of a spring beside the mass, relaxed at zero contraction.',
               'the rig of the chapter has none'),

@@ -53,7 +53,7 @@ DIMENSIONS = (
 # Numbers of the muscle a model file may change under `parameters`.
 MUSCLE_PARAMETERS = (
     Parameter('force_map_gain', '-', 1.0, 0.2, 5.0, 0.02,
-              'Factor on the force law.', 'scaled map of a measured DMSP-10-250'),
+              'Factor on the force law.', 'force map of the muscle'),
     Parameter('damping_n_s_per_m', 'N s/m', 25.0, 0.0, 1e4, 0.02,
               'Viscous damping of the muscle; the nominal one is of a 5 mm muscle.',
               'design value'),
