@@ -55,7 +55,7 @@ SOURCE = """#
 # {rig}, {valve}, {experiments},
 # {rollouts} rollouts from the defaults, seed {seed}; held-out cost {before:.3f} -> {after:.3f} mm.
 {suits}"""
-SUITS = '# Gains suit the dry friction of that rig: without any, on PPR, pid and lqi swing up.\n'
+SUITS = '# Gains suit the friction of that rig: without it, pid and lqi oscillate behind a PPR.\n'
 FREQUENCIES_HZ = (0.1, 0.25, 0.5, 1.0)
 ROLLOUTS, SEED = 3000, 1
 CYCLES = 20
