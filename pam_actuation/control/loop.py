@@ -93,7 +93,8 @@ if TYPE_CHECKING:
 
 STALL_NS = 250_000_000
 PATIENCE_NS = 20_000_000    # how long a measurement may take to arrive after a stall
-_CONTRACTIONS_M = -0.01, 0.1    # outside the sensor is wrong, not the muscle
+_CONTRACTIONS_M = -0.01, 0.1    # outside the sensor is wrong, not the muscle: at least,
+_BEYOND_STROKE_M = 0.02         # and of a long one so far beyond its stroke
 _RESTING_M, _RESTING_N = 0.002, 5.0     # up to there a muscle may lie on a stop
 _FORCE_MARGIN = 1.5         # of the largest force in the table: above, the load cell is wrong
 _MARGIN_RAD = 0.05          # of an encoder's zero and noise, where the joint lies on a stop
@@ -145,7 +146,7 @@ class ControllerLoop:
         self.controller: Any = controller       # of a muscle or a joint, as found below
         self._newest: dict[str, Message] = {}       # by topic
         law, self.measurement, self.setpoint = (
-            self._of_joint(rig, name) if isinstance(rig, JointRig) else self._of_muscle())
+            self._of_joint(rig, name) if isinstance(rig, JointRig) else self._of_muscle(rig))
         self._core = TickCore(law, nearly_pa=nearly_pa)
         self._law_check = LawCheck(self._core.names)
         self.muscles = tuple(
@@ -168,12 +169,15 @@ class ControllerLoop:
         self._used_ns: int | None = None
         self._commands_pa: tuple[float, ...] | None = None    # of the last tick, if it ran
 
-    def _of_muscle(self) -> tuple[Law, Measurement, Setpoint]:
+    def _of_muscle(self, rig: 'Rig | None') -> tuple[Law, Measurement, Setpoint]:
         controller, tracked = self.controller, tracked_by(self.controller)
         if tracked == JOINT:
             raise InputError('the controller tracks a joint; this is the loop of one muscle',
                              controller.rig_name)
-        plausible, resting = _CONTRACTIONS_M, _RESTING_M
+        (lower_m, upper_m), resting = _CONTRACTIONS_M, _RESTING_M
+        if rig is not None:
+            upper_m = max(upper_m, rig.muscle.stroke_m + _BEYOND_STROKE_M)
+        plausible = lower_m, upper_m
         if tracked == FORCE:
             upper_n = controller.upper_force_n
             plausible, resting = (-0.5 * upper_n, _FORCE_MARGIN * upper_n), _RESTING_N

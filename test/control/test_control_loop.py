@@ -20,6 +20,7 @@ from pam_actuation.control.loop import ControllerLoop
 from pam_actuation.control.reference_buffer import ReferenceBuffer
 from pam_actuation.control.tick import join_stamp
 from pam_actuation.messages import Contraction, Pressure, Reference, ReferenceTrajectory
+from pam_sim import load_rig
 from pam_sim.units import P_ATM_PA
 import pytest
 from straight_rig import sofc
@@ -138,6 +139,19 @@ def test_a_contraction_no_muscle_has_is_refused(wanted):
     _, state = loop.tick(START + MS)
     assert by_name(state)['reference_m'] == 0.01 and loop.rejected_references == 2
     assert 'not within -0.01 to 0.1 m' in loop.references.refusal
+
+
+def test_a_long_muscle_is_followed_to_the_end_of_its_stroke():
+    rig = load_rig('muscle: {like: dmsp_20_300, length_m: 0.6}\nload: hanging_mass\nvalve: ppr\n')
+    loop = ControllerLoop(sofc(), rig)
+    stroke_m = rig.muscle.stroke_m
+    assert stroke_m > 0.14
+    for wanted in (stroke_m, stroke_m + 0.03):
+        loop.take('contraction', Contraction(START, stroke_m - 0.01))
+        loop.take('reference', Reference(START, wanted, 0.0))
+        _, state = loop.tick(START)
+        assert loop.reason == 'ok' and by_name(state)['reference_m'] == stroke_m
+    assert loop.rejected_references == 1
 
 
 def test_a_loop_that_forgot_waits_for_new_inputs():
