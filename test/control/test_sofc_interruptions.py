@@ -88,11 +88,11 @@ def test_without_a_pressure_the_prediction_is_finite_from_the_start():
 def test_a_text_of_before_is_of_revision_0():
     rig = load_rig('dmsp_5_300_realistic')
     tree = load_yaml(load_controller('sofc_model_ppr', rig).to_yaml(), name='text').plain()
-    assert tree['settings'].pop('revision') == 1.0
+    assert tree['settings'].pop('revision') == 2.0
     assert load_controller(dump_yaml(tree), rig).settings['revision'] == 0.0
     for name in ('static_inverse', 'made_for', 'initial_rules'):
         del tree[name]
-    assert load_controller(dump_yaml(tree), rig).settings['revision'] == 1.0
+    assert load_controller(dump_yaml(tree), rig).settings['revision'] == 2.0
 
 
 @pytest.mark.parametrize('age_s', [0.02, 0.05])

@@ -23,8 +23,13 @@ same mean speed are compared with the best one, which keeps a copy of the rules.
   changed.
 * Two such windows in a row, the second clearly worse than the first, mean that learning itself
   spoils the rules. After a change of the plant, the error would fall from window to window. The
-  copy is restored and the full rate is halved until there is a new best. So do five of them that
-  grow slowly; five without growth are the new normal.
+  copy is restored and the full rate is halved until there is a new best. So do five of them,
+  unless they fall.
+* The restored rules have to do as well as before. If five windows after a roll-back are bad too,
+  the plant has changed: they are the new normal. Meanwhile the rate is not halved again.
+
+Revisions 0 and 1 forgot the best error with each roll-back, and took five windows without growth
+for normal at once. So an error that grew slowly became normal step by step.
 """
 
 import math
@@ -85,6 +90,7 @@ def _new_best(st: np.record, rms: float, values: Tables, kept: Tables) -> None:
     """Take a window as the one to compare with."""
     st.best_rms_m = rms
     st.bad_windows = 0.0
+    st.unproven = 0.0
     keep(values, kept)
 
 
@@ -103,6 +109,7 @@ def _judge(par: np.record, st: np.record, values: Tables, kept: Tables) -> bool:
         return False
     if rms <= par.guard_ratio * best + par.dead_zone_m:
         st.bad_windows = 0.0
+        st.unproven = 0.0
         if rms < best:
             st.rate_ceiling = min(1.0, 2.0 * st.rate_ceiling)
             _new_best(st, rms, values, kept)
@@ -121,6 +128,11 @@ def _judge(par: np.record, st: np.record, values: Tables, kept: Tables) -> bool:
     if bad_windows >= _NEW_NORMAL:
         if rms > _GROWING * st.first_bad_rms_m:
             return True
+        if par.revision > 1.5 and st.unproven < 0.5:
+            falls = _GROWING * rms < st.first_bad_rms_m
+            st.bad_windows = 1.0
+            st.first_bad_rms_m = rms
+            return not falls
         _new_best(st, rms, values, kept)
     return False
 
@@ -151,8 +163,11 @@ def watch(par: np.record, st: np.record, error_m: float, rate_m_per_s: float, va
     restart_window(st)
     if worse:
         keep(kept, values)
-        st.rate_ceiling = max(_LEAST_FACTOR, 0.5 * st.rate_ceiling)
-        st.best_rms_m = 0.0          # the restored rules are judged anew
+        if st.unproven < 0.5:
+            st.rate_ceiling = max(_LEAST_FACTOR, 0.5 * st.rate_ceiling)
+        if par.revision < 1.5:
+            st.best_rms_m = 0.0          # the restored rules are judged anew
+        st.unproven = 1.0
         st.bad_windows = 0.0
         st.times_rolled_back += 1.0
     return worse

@@ -112,6 +112,7 @@ STATE = record(
     'former_rms_m',
     'bad_windows',
     'first_bad_rms_m',
+    'unproven',                       # 1 until rules that were restored do as well as before
     'rate_factor',                    # of learning, by annealing
     'rate_ceiling',                   # the same, by roll-backs
     'times_rolled_back',

@@ -206,9 +206,9 @@ SETTINGS = (
     setting('unknown_acceleration_m_per_s2', 'm/s^2', 0.0, 0.0, 1e3,
             'what the model does not tell of the acceleration: an estimate with it and with the '
             'noise of the sensor begins the prediction; 0 = reading and filtered rate do'),
-    setting('revision', '-', 1.0, 0.0, 1.0,
-            'of this law: 1 the present one, 0 that of recordings and tuned files which do not '
-            'say it'),
+    setting('revision', '-', 2.0, 0.0, 2.0,
+            'of this law: 2 the present one, 1 before its guard saw slow growth, 0 that of '
+            'recordings and tuned files which do not say it'),
 )
 
 PARAMETERS = parameter_record(

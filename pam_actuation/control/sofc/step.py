@@ -61,7 +61,7 @@ def _start(par: np.record, inverse: FloatArray, values: Tables, kept: Tables, ri
     st.offset_m = inp.reference_m - x
     st.contraction_m = x
     # It moved before, too.
-    way = par.revision * par.period_s
+    way = min(par.revision, 1.0) * par.period_s
     st.reference_m = inp.reference_m - way * inp.reference_rate_m_per_s
     st.lead_reference_m = inp.lead_reference_m - way * inp.lead_rate_m_per_s
     st.model.slow_m = x
