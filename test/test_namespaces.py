@@ -31,7 +31,7 @@ def test_every_form_is_the_same(text):
     assert node_name_of('recorder', namespace_of(text)) == '/leg/flexor/recorder'
     assert node_name_of(f'{text}/recorder', '/elsewhere') == '/leg/flexor/recorder'
     assert {node.namespace for node in layouts.rig(text)} == {'/leg/flexor'}
-    assert {node.parameters['muscle'] for node in layouts.knee(text)} == {'flexor'}
+    assert {node.parameters['muscle'] for node in layouts.knee(text)} == {'leg_flexor'}
     assert all(node.namespace.startswith('/leg/flexor/left_knee')
                or node.namespace.startswith('/leg/flexor/right_knee')
                for node in layouts.exo(text))

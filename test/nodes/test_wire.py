@@ -50,9 +50,10 @@ def joint(name=('knee',), position=(), velocity=(), effort=()):
                       velocity=array('d', velocity), effort=array('d', effort))
 
 
-def wrench(force_n):
+def wrench(force_n=0.0, torque_n_m=0.0):
     message = WrenchStamped()
     message.wrench.force.x = force_n
+    message.wrench.torque.y = torque_n_m
     return message
 
 
@@ -76,6 +77,7 @@ SAMPLES = [
     ('co_contraction', messages.Pressure(STAMP_NS, 4e5), FluidPressure(fluid_pressure=4e5)),
     ('force', messages.Force(STAMP_NS, 49.03), wrench(49.03)),
     ('external_force', messages.Force(STAMP_NS, -3.5), wrench(-3.5)),
+    ('external_torque', messages.Torque(STAMP_NS, -1.5), wrench(torque_n_m=-1.5)),
     ('contraction', messages.Contraction(STAMP_NS, 0.014, 0.02),
      joint(position=(0.014,), velocity=(0.02,))),
     ('contraction', messages.Contraction(STAMP_NS, 0.014), joint(position=(0.014,))),
