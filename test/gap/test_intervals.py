@@ -23,7 +23,8 @@ from pam_sim.gap.verify.together import known_together
 import pytest
 
 SD = 1e-3                    # of the difference in the toy problem
-OPEN_S, CLOSE_S = 1.7e-3, 2.0e-3
+# A difference of 0.3 ms is at the edge: a conductance 7 % off explains it as well.
+OPEN_S, CLOSE_S = 1.7e-3, 2.4e-3
 
 
 class Valley:
@@ -146,7 +147,7 @@ def test_of_opening_and_closing_times_only_the_difference_is_told():
         assert 0.0 <= said['equivalent'][name]['ci95'][0]
         assert said['parameters'][name] == said['equivalent'][name]
     assert len(said['together']) == 1
-    assert said['together'][0].startswith('close_time_s - open_time_s = 0.0003')
+    assert said['together'][0].startswith('close_time_s - open_time_s = 0.0007')
     assert f'the data determine only {said["together"][0]}' in result.reason
 
 
