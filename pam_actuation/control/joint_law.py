@@ -71,10 +71,13 @@ class JointLaw:
         self.controller.pause()
         self.torque.pause()
 
+    def limit_pressure(self, highest_pa: float) -> None:
+        """Keep all commands below a pressure [absolute Pa] as well; NaN: no such limit."""
+        self.controller.limit_pressure(highest_pa)
+        self.torque.limit_pressure(highest_pa)
+
     def step(self, inputs: TickInputs) -> tuple[float, ...]:
         """Return the wanted absolute pressures [Pa] of flexor and extensor."""
-        self.controller.limit_pressure(inputs.limit_pa)
-        self.torque.limit_pressure(inputs.limit_pa)
         if math.isfinite(inputs.co_contraction_pa):
             self.controller.want_co_contraction(inputs.co_contraction_pa - P_ATM_PA)
         commands_pa = self._torque(inputs) if inputs.effort.follows else self._angle(inputs)

@@ -62,7 +62,6 @@ class JointTorque:
     def __init__(self, joint: 'JointRig', controller: JointController) -> None:
         settings, value = controller.settings, joint.parameters
         low, high = (P_ATM_PA + gauge_pa for gauge_pa in limits_gauge_pa(settings))
-        self._limits = low, high
         self._reach_pa = controller.co_contraction_reach_pa
         self._arms = value['flexor_radius_m'], value['extensor_radius_m']
         lower, upper = joint.range_rad
@@ -77,6 +76,8 @@ class JointTorque:
         self._lag_s = controller.lead_s + settings.get('valve_lag_s', 0.0)
         self._wanted = _Ahead(self._lag_s, self._period_s)
         self._angle = _Ahead(self._lag_s, self._period_s)
+        self._lowest_pa, self._highest_pa = low, high
+        self.limit_pressure(math.nan)
         self.pause()
 
     def pause(self) -> None:
@@ -88,8 +89,10 @@ class JointTorque:
 
     def limit_pressure(self, highest_pa: float) -> None:
         """Keep both commands below a pressure [absolute Pa] as well; NaN: no such limit."""
-        low, high = self._limits[0], float(self._pressures[-1])
-        self._limits = low, max(low, min(high, highest_pa))
+        low = self._lowest_pa
+        high = max(low, min(self._highest_pa, highest_pa))
+        self._limits = low, high
+        self._allowed = np.clip(self._differences, -0.5 * (high - low), 0.5 * (high - low))
 
     def state_values(self) -> tuple[float, float, float]:
         """Return the values of ``STATE_NAMES`` of the last tick."""
@@ -137,7 +140,7 @@ class JointTorque:
         wanted = min(max(self._wanted.at(self._given) + self._offset, torques[0]), torques[-1])
         self._offset *= _START_TIME_S / (_START_TIME_S + self._period_s)
         torque = wanted + self._correction(wanted, torques)
-        difference = float(np.interp(torque, torques, self._within_limits()))
+        difference = float(np.interp(torque, torques, self._allowed))
         mean = min(max(self._mean, low + abs(difference)), high - abs(difference))
         return mean + difference, mean - difference
 
@@ -154,7 +157,7 @@ class JointTorque:
         row = min(int(place), _ANGLES - 2)
         part = place - row
         low, high = self._limits
-        differences = self._within_limits()
+        differences = self._allowed
         size = np.abs(differences)
         mean = np.minimum(np.maximum(self._mean, low + size), high - size)
         flexor, extensor = (
@@ -163,11 +166,6 @@ class JointTorque:
             for pressure, table in zip(
                 (mean + differences, mean - differences), self._tables))
         return flexor - extensor + _SLOPE_N_M_PER_PA * self._differences
-
-    def _within_limits(self) -> FloatArray:
-        """Return the differences of the tables, cut to what the limits let both have."""
-        low, high = self._limits
-        return np.clip(self._differences, -0.5 * (high - low), 0.5 * (high - low))
 
     def _start(self, torque_n_m: float) -> None:
         """Begin at the torque of the pressures before; an offset to it fades."""

@@ -169,6 +169,9 @@ class Law(Protocol):
     def pause(self) -> None:
         """Forget the motion: the next step starts bumplessly."""
 
+    def limit_pressure(self, highest_pa: float) -> None:
+        """Keep all commands below a pressure [absolute Pa] as well; NaN: no such limit."""
+
     def step(self, inputs: TickInputs) -> tuple[float, ...]:
         """Return the wanted absolute pressure [Pa] of each muscle."""
 
@@ -198,9 +201,12 @@ class MuscleLaw:
         """Forget the motion: the next step starts bumplessly."""
         self.controller.pause()
 
+    def limit_pressure(self, highest_pa: float) -> None:
+        """Keep the commands below a pressure [absolute Pa] as well; NaN: no such limit."""
+        self.controller.limit_pressure(highest_pa)
+
     def step(self, inputs: TickInputs) -> tuple[float, ...]:
         """Return the wanted absolute pressure [Pa]."""
-        self.controller.limit_pressure(inputs.limit_pa)
         (pressure_pa,), (force_n,) = inputs.pressures_pa, inputs.forces_n
         return float(self.controller.step(
             inputs.position, inputs.reference, inputs.reference_rate,
@@ -237,6 +243,7 @@ class TickCore:
         self._nothing = (math.nan,) * len(law.places)
         self._no_stamps_ns = (-1,) * len(law.stamped)
         self.ticks = 0
+        self._limit_pa = math.inf       # what the law was told last; none before the first tick
         self.names = (*input_names(law.tracked), *AGES, LIMIT, *law.names)
 
     def run(self, inputs: TickInputs) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -256,6 +263,7 @@ class TickCore:
         if inputs.restarted or not running:
             law.pause()
         if running:
+            self._tell_limit(inputs.limit_pa)
             commands_pa = tuple([
                 rise.limited(command_pa if math.isfinite(command_pa) else P_ATM_PA, self._period_s)
                 for rise, command_pa in zip(self.rises, law.step(inputs))])
@@ -276,3 +284,10 @@ class TickCore:
             inputs.held_back, *inputs.ages_s, inputs.limit_pa, *law.internals(inputs))
         self.ticks += 1
         return commands_pa, values
+
+    def _tell_limit(self, limit_pa: float) -> None:
+        """Tell the law of a limit of its driver that is another one than before."""
+        before_pa = self._limit_pa
+        if limit_pa != before_pa and not (math.isnan(limit_pa) and math.isnan(before_pa)):
+            self.law.limit_pressure(limit_pa)
+            self._limit_pa = limit_pa
