@@ -74,6 +74,7 @@ class CommandFollowing:
         self._expected_pa = math.nan
         self.fell_ns: int | None = None
         self.recovers = False
+        self._obeyed_ns: int | None = None      # when it did not vent against a command
 
     def on_followed(self, message: 'Pressure') -> None:
         """Take the ``Pressure`` that the driver follows; atmosphere while it vents."""
@@ -124,6 +125,12 @@ class CommandFollowing:
             return False
         lowest_pa, _ = self._sent_before(self._followed.stamp_ns)
         return P_ATM_PA + TOLERANCE_PA < lowest_pa < math.inf
+
+    def vented_ns(self, now_ns: int) -> int:
+        """Return for how long [ns] it has vented against the commands, asked at each tick."""
+        if self._obeyed_ns is None or not self.vents(now_ns):
+            self._obeyed_ns = now_ns
+        return now_ns - self._obeyed_ns
 
     def _sent_before(self, stamp_ns: int) -> tuple[float, float]:
         """

@@ -41,14 +41,11 @@ class Interruption:
     def forget(self) -> None:
         """Begin anew, as before the first message."""
         self._lasts = False
-        self._obeyed_ns: int | None = None
 
     def judge(self, now_ns: int) -> bool:
         """Return whether the driver is interrupted in this tick, or was until this tick."""
         following = self._following
-        if self._obeyed_ns is None or not following.vents(now_ns):
-            self._obeyed_ns = now_ns
-        if now_ns - self._obeyed_ns >= VENTS_NS or following.silent_ns(now_ns) >= LOST_NS:
+        if following.vented_ns(now_ns) >= VENTS_NS or following.silent_ns(now_ns) >= LOST_NS:
             self._lasts = True
         elif self._lasts and (following.gives_air or following.asks_for_none(now_ns)):
             self._lasts = False

@@ -25,7 +25,6 @@ from collections.abc import Collection
 import math
 
 from pam_actuation.control.following import CommandFollowing
-
 from pam_actuation.control.frozen import RESUME_NS
 from pam_sim.units import P_ATM_PA
 
@@ -70,7 +69,6 @@ class SlackMuscle:
         self._measured_ns: int | None = None     # newest fresh reading
         self._judged_ns: int | None = None
         self._empty_ns = 0          # how long it was wanted under air and was not
-        self._obeyed_ns: int | None = None       # when its driver did not vent against a command
         self._awaited_ns: int | None = None      # since when its driver's first word is due
         self._noticed_ns = 0
 
@@ -97,8 +95,7 @@ class SlackMuscle:
         if math.isfinite(pressure_pa):
             self._measured_ns = now_ns
         self._count(now_ns, command_pa, pressure_pa)
-        if self._obeyed_ns is None or not self._following.vents(now_ns):
-            self._obeyed_ns = now_ns
+        vented_ns = self._following.vented_ns(now_ns)
         lost = self._measured_ns is not None and now_ns - self._measured_ns >= LOST_NS
         silent = self._silent_ns(now_ns, any(other.told for other in others)) >= LOST_NS
         why = ''
@@ -107,16 +104,16 @@ class SlackMuscle:
         elif silent:
             why = f'its driver has been silent for {LOST_NS * 1e-9:g} s'
         elif not self.slack:
-            why = self._found(now_ns, others)
+            why = self._found(now_ns, vented_ns, others)
         if why:
             self.slack, self.why, self._noticed_ns = True, why, now_ns
         elif self.slack and now_ns - self._noticed_ns >= RESUME_NS and self._proven(pressure_pa):
             self.slack, self.why = False, ''
         return self.slack
 
-    def _found(self, now_ns: int, others: Collection[CommandFollowing]) -> str:
+    def _found(self, now_ns: int, vented_ns: int, others: Collection[CommandFollowing]) -> str:
         """Return what is wrong with a muscle that was sound until now, '' for nothing."""
-        if self._obeyed_ns is not None and now_ns - self._obeyed_ns >= VENTS_NS:
+        if vented_ns >= VENTS_NS:
             return 'its driver vents although pressure is commanded'
         if self._rises_alone(now_ns, others):
             return 'its driver vented and begins anew from the atmosphere'
