@@ -16,6 +16,7 @@
 
 from bisect import bisect_right
 import math
+from operator import sub
 from typing import NamedTuple, TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -80,6 +81,10 @@ class Course(NamedTuple):
         Its points lie within the range; where they are joined by straight lines, so does the rest.
         """
         times, values = self.times_ns, self.values
+        # How far a cubic may reach beyond the values of its points.
+        reach = self._fastest() * max(map(sub, times[1:], times), default=0) * 1e-9
+        if lower <= min(values) - reach and max(values) + reach <= upper:
+            return None
         for i, (x0, x1) in enumerate(zip(values, values[1:])):
             v0, v1 = self._rate(i, math.nan), self._rate(i + 1, math.nan)
             span_s = (times[i + 1] - times[i]) * 1e-9
@@ -105,6 +110,8 @@ class Course(NamedTuple):
         None where they do not. They do where most segments that are told to move faster than
         ``jump_per_s`` move slower than told by more than that. A jump is faster than told.
         """
+        if self._fastest() <= jump_per_s:
+            return None
         fast, found = 0, []
         for i in range(len(self.times_ns) - 1):
             told = 0.5 * (self._rate(i, math.nan) + self._rate(i + 1, math.nan))
@@ -116,6 +123,10 @@ class Course(NamedTuple):
             if abs(told) - abs(moves) > jump_per_s:
                 found.append((self.times_ns[i], told, moves))
         return found[0] if 2 * len(found) > fast else None
+
+    def _fastest(self) -> float:
+        """Return the highest rate that is told, 0 where none is."""
+        return max(map(abs, filter(math.isfinite, self.rates)), default=0.0)
 
     def _rate(self, index: int, missing: float = 0.0) -> float:
         """Return the rate of a point, ``missing`` where there is none."""
