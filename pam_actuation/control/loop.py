@@ -174,13 +174,14 @@ class ControllerLoop:
         if tracked == JOINT:
             raise InputError('the controller tracks a joint; this is the loop of one muscle',
                              controller.rig_name)
-        (lower_m, upper_m), resting = _CONTRACTIONS_M, _RESTING_M
-        if rig is not None:
-            upper_m = max(upper_m, rig.muscle.stroke_m + _BEYOND_STROKE_M)
-        plausible = lower_m, upper_m
         if tracked == FORCE:
             upper_n = controller.upper_force_n
             plausible, resting = (-0.5 * upper_n, _FORCE_MARGIN * upper_n), _RESTING_N
+        else:
+            lower_m, upper_m = _CONTRACTIONS_M
+            if rig is not None:
+                upper_m = max(upper_m, rig.muscle.stroke_m + _BEYOND_STROKE_M)
+            plausible, resting = (lower_m, upper_m), _RESTING_M
         return (MuscleLaw(controller),
                 Measurement(tracked, self._newest, plausible, (resting, math.inf)),
                 MuscleSetpoint(tracked, plausible))
@@ -347,8 +348,8 @@ class ControllerLoop:
             if self.controller.learns:
                 still = self._on_time.says
         held_back = self._held_back(now_ns)
-        limit_pa = min((muscle.limit.limit_pa for muscle in muscles
-                        if muscle.limit.limit_pa == muscle.limit.limit_pa), default=math.nan)
+        limits_pa = [muscle.limit.limit_pa for muscle in muscles]
+        limit_pa = min([one for one in limits_pa if not math.isnan(one)], default=math.nan)
         self._remarks = self._tick_rate.says, still, self._limited(limit_pa)
         inputs = TickInputs(reason, may_learn, stalled)
         inputs.effort, inputs.co_contraction_pa = effort, setpoint.co_contraction_pa
@@ -462,7 +463,7 @@ class ControllerLoop:
         """Return what to say of the limit of a driver, '' where none is known."""
         if math.isnan(limit_pa):
             return ''
-        whose = ' and '.join(muscle.place.rstrip('/') for muscle in self.muscles
+        whose = ' and '.join(muscle.side for muscle in self.muscles
                              if muscle.limit.limit_pa == limit_pa)
         own = f'{whose}/valve_driver' if whose else 'valve_driver'
         gauge_pa = limit_pa - P_ATM_PA
