@@ -38,13 +38,12 @@ from launch.substitutions import NotEqualsSubstitution
 from launch.substitutions import NotSubstitution
 from launch.substitutions import OrSubstitution
 from launch_ros.actions import LifecycleNode
-from launch_ros.actions import SetParametersFromFile
 from launch_ros.parameter_descriptions import ParameterValue
 from pam_actuation.control.modes.files import joint_preset_for
 from pam_actuation.hardware.files import hardware_file
 from pam_actuation.namespaces import launch_namespace, name_in
-from pam_actuation.nodes.hardware_check import check_hardware, check_users_file
-from pam_actuation.nodes.launched import full_namespace, RigEnd
+from pam_actuation.nodes.hardware_check import check_hardware
+from pam_actuation.nodes.launched import full_namespace, RigEnd, users_file
 from pam_actuation.rigging import layouts
 from pam_actuation.rigging.layouts import AWAITED_S, BY_SENSORS, BY_TOPIC, SIMULATED, TOPICS
 from pam_sim.joint import load_joint
@@ -231,10 +230,4 @@ def _note_names(context, end):
         if given('experiment') != 'none':
             noted[RECORDED_EXPERIMENT] = given('experiment')
     actions = [SetLaunchConfiguration(name, value) for name, value in noted.items()]
-    if given('params_file'):
-        check_users_file(given('params_file'), nodes, {
-            'learning': given('learning') == 'true',
-            'use_sim_time': given('use_sim_time') == 'true',
-            'realtime_priority': int(given('realtime_priority'))})
-        actions.append(SetParametersFromFile(given('params_file')))
-    return actions
+    return [*actions, *users_file(given, nodes)]

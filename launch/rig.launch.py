@@ -36,12 +36,11 @@ from launch.substitutions import LaunchConfiguration
 from launch.substitutions import NotEqualsSubstitution
 from launch.substitutions import OrSubstitution
 from launch_ros.actions import LifecycleNode
-from launch_ros.actions import SetParametersFromFile
 from launch_ros.parameter_descriptions import ParameterValue
 from pam_actuation.hardware.files import hardware_file
 from pam_actuation.namespaces import launch_namespace
-from pam_actuation.nodes.hardware_check import check_hardware, check_users_file
-from pam_actuation.nodes.launched import full_namespace, RigEnd
+from pam_actuation.nodes.hardware_check import check_hardware
+from pam_actuation.nodes.launched import full_namespace, RigEnd, users_file
 from pam_actuation.nodes.pid_controller import PidNode
 from pam_actuation.rigging import layouts
 from pam_actuation.rigging.layouts import AWAITED_S, controller_node, NO_CONTROLLER
@@ -217,10 +216,4 @@ def _note_what_is_needed(context, end):
              # Real sensors have no seed.
              RECORDED_SEED: seed if given('hardware') == SIMULATED else '-1'}
     actions = [SetLaunchConfiguration(key, text) for key, text in noted.items()]
-    if given('params_file'):
-        check_users_file(given('params_file'), nodes, {
-            'learning': given('learning') == 'true',
-            'use_sim_time': given('use_sim_time') == 'true',
-            'realtime_priority': int(given('realtime_priority'))})
-        actions.append(SetParametersFromFile(given('params_file')))
-    return actions
+    return [*actions, *users_file(given, nodes)]

@@ -11,20 +11,25 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""How the launch files end a rig: once, with all its nodes, and with a word for its recorder."""
+"""What the launch files share: the end of a rig, and a parameter file for all its nodes."""
 
 import atexit
 from collections.abc import Callable, Iterable
 import shutil
 import signal
 import tempfile
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 from launch.actions import EmitEvent, RegisterEventHandler
 from launch.event_handlers import OnProcessExit
 from launch.events import matches_action, Shutdown
 from launch.events.process import ShutdownProcess
+from launch_ros.actions import SetParametersFromFile
 from pam_actuation.bags.ending import ERROR, INTERRUPTED, REFERENCE, tell_recorder
+from pam_actuation.nodes.hardware_check import check_users_file
+
+if TYPE_CHECKING:
+    from pam_actuation.rigging.node_spec import NodeSpec
 
 Handler = Callable[[Any, Any], list[Any]]
 
@@ -82,3 +87,30 @@ def full_namespace(context: Any, namespace: str) -> str:
     above = '' if namespace.startswith('/') else context.launch_configurations.get(
         'ros_namespace', '').rstrip('/') + '/'
     return f'{above}{namespace}'
+
+
+def users_file(given: Callable[[str], str], nodes: 'Iterable[NodeSpec]') -> list[Any]:
+    """
+    Return the action that hands the file of ``params_file`` to all nodes, [] without a file.
+
+    Parameters
+    ----------
+    given : callable
+        The value of a launch argument.
+    nodes : iterable of NodeSpec
+        What is started, for the names and values of the file.
+
+    Raises
+    ------
+    InputError
+        As of ``check_users_file``.
+
+    """
+    file = given('params_file')
+    if not file:
+        return []
+    check_users_file(file, nodes, {
+        'learning': given('learning') == 'true',
+        'use_sim_time': given('use_sim_time') == 'true',
+        'realtime_priority': int(given('realtime_priority'))})
+    return [SetParametersFromFile(file)]
