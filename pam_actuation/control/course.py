@@ -64,15 +64,9 @@ class Course(NamedTuple):
         part = (time_ns - times[i]) * 1e-9 / span_s
         x0, x1 = values[i], values[after]
         v0, v1 = self._rate(i, math.nan), self._rate(after, math.nan)
-        if math.isnan(v0) or math.isnan(v1):
-            return x0 + (x1 - x0) * part, (x1 - x0) / span_s
-        if _is_jump(x1 - x0, span_s, v0, v1, jump_per_s):
+        if _is_jump(x1 - x0, span_s, v0, v1, jump_per_s):       # never where a rate is not told
             return x0 + v0 * part * span_s, v0
-        a, b = span_s * v0 - (x1 - x0), (x1 - x0) - span_s * v1
-        bend = part * (1.0 - part) * ((1.0 - part) * a + part * b)
-        slope = ((1.0 - 2.0 * part) * ((1.0 - part) * a + part * b)
-                 + part * (1.0 - part) * (b - a))
-        return x0 + (x1 - x0) * part + bend, ((x1 - x0) + slope) / span_s
+        return joined(x0, x1, v0, v1, span_s, part)
 
     def beyond(self, lower: float, upper: float, jump_per_s: float) -> tuple[int, float] | None:
         """
@@ -134,6 +128,23 @@ class Course(NamedTuple):
         if index < len(rates) and math.isfinite(rates[index]):
             return rates[index]
         return missing
+
+
+def joined(x0: float, x1: float, v0: float, v1: float, span_s: float,
+           part: float) -> tuple[float, float]:
+    """
+    Return value and rate per second between two points ``span_s`` apart.
+
+    They are joined by a cubic, by a straight line where a rate is NaN. ``part`` is that of the
+    time between them, 0 to 1.
+    """
+    if math.isnan(v0) or math.isnan(v1):
+        return x0 + (x1 - x0) * part, (x1 - x0) / span_s
+    a, b = span_s * v0 - (x1 - x0), (x1 - x0) - span_s * v1
+    bend = part * (1.0 - part) * ((1.0 - part) * a + part * b)
+    slope = ((1.0 - 2.0 * part) * ((1.0 - part) * a + part * b)
+             + part * (1.0 - part) * (b - a))
+    return x0 + (x1 - x0) * part + bend, ((x1 - x0) + slope) / span_s
 
 
 def _is_jump(change: float, span_s: float, v0: float, v1: float, jump_per_s: float) -> bool:

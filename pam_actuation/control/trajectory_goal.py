@@ -23,7 +23,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 
-from pam_actuation.control.course import Course
+from pam_actuation.control.course import Course, joined
 from pam_actuation.control.joint_trajectory import TOLERANCE_RAD
 from pam_actuation.control.modes.tracked import JOINT
 from pam_actuation.messages import AngleTrajectory, NamedTrajectory
@@ -132,16 +132,9 @@ class JointGoal:
         if time_ns >= times[-1]:
             return angles[-1], 0.0
         k = next(k for k, end_ns in enumerate(times) if time_ns < end_ns) - 1
-        span_s, share = (times[k + 1] - times[k]) / NS_PER_S, (
-            (time_ns - times[k]) / (times[k + 1] - times[k]))
-        change, (first, second) = angles[k + 1] - angles[k], self.rates_rad_per_s[k:k + 2]
-        if math.isnan(first) or math.isnan(second):
-            return angles[k] + share * change, change / span_s
-        # Cubic Hermite, written in the share of the segment.
-        a = span_s * (first + second) - 2.0 * change
-        b = 3.0 * change - span_s * (2.0 * first + second)
-        return (angles[k] + share * (span_s * first + share * (b + share * a)),
-                (span_s * first + share * (2.0 * b + 3.0 * a * share)) / span_s)
+        span_ns, rates = times[k + 1] - times[k], self.rates_rad_per_s
+        return joined(angles[k], angles[k + 1], rates[k], rates[k + 1], span_ns / NS_PER_S,
+                      (time_ns - times[k]) / span_ns)
 
     def ahead(self, now_ns: int) -> AngleTrajectory:
         """Return what to send now: the next 0.6 s, so that a dead server stops the joint."""
