@@ -25,7 +25,7 @@ import numpy as np
 from pam_actuation.control.modes.force import FORCE_INPUT, force_inputs
 from pam_actuation.control.sofc.step import sofc_step
 from pam_actuation.tuning.loop_parts import (
-    drive, Driver, look_up, Plant, read, READINGS, RISE, risen, WANTED)
+    drive, Driver, look_up, Plant, read_muscle, READINGS, RISE, risen, WANTED)
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import entry_point, inlined, source_key
 from pam_sim.records import part, record
@@ -60,9 +60,7 @@ def sense(tick: int, plant: Plant, hsv: bool, driver: Driver, timing: tuple[int,
     seen, off = part(plant_out, 0, layout.OUTPUT), noise.view(READINGS)[tick]
     steps_of, wanted = part(quantum, 0, READINGS), reference.view(WANTED)[tick]
     inp, row = part(raw, 0, FORCE_INPUT), log.view(FORCE_LOG)[tick]
-    inp.pressure_pa = read(seen.pressure_pa + off.pressure_pa, steps_of.pressure_pa)
-    inp.contraction_m = read(seen.contraction_m + off.contraction_m, steps_of.contraction_m)
-    inp.force_n = read(seen.force_n + off.force_n, steps_of.force_n)
+    read_muscle(seen, off, steps_of, inp)
     inp.reference_n = wanted.reference
     inp.reference_rate_n_per_s = wanted.rate
     inp.lead_reference_n = wanted.lead

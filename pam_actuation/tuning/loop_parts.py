@@ -23,7 +23,7 @@ from pam_actuation.drivers.ppr import ppr_step
 from pam_actuation.slow_rise import (
     NEARLY_PA, RISE_PA_PER_S, UNDER_PRESSURE_PA, UNTIL_FOLLOWED_S)
 from pam_sim.annotations import FloatArray
-from pam_sim.compiled import compiled
+from pam_sim.compiled import compiled, inlined
 from pam_sim.records import part, record
 
 
@@ -50,6 +50,14 @@ def read(value: float, step_size: float) -> float:
     if step_size > 0.0:
         return np.rint(value / step_size) * step_size
     return value
+
+
+@inlined
+def read_muscle(seen: np.record, off: np.record, steps_of: np.record, inp: np.record) -> None:
+    """Fill the measured part of the inputs of a law, with ``READINGS`` of noise and of steps."""
+    inp.contraction_m = read(seen.contraction_m + off.contraction_m, steps_of.contraction_m)
+    inp.pressure_pa = read(seen.pressure_pa + off.pressure_pa, steps_of.pressure_pa)
+    inp.force_n = read(seen.force_n + off.force_n, steps_of.force_n)
 
 
 @compiled

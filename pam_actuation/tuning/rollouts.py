@@ -29,7 +29,7 @@ from pam_actuation.control.lqi import lqi_step
 from pam_actuation.control.pid import pid_step
 from pam_actuation.control.sofc.step import sofc_step
 from pam_actuation.tuning.loop_parts import (
-    DISTURBANCE, drive, Driver, Plant, read, READINGS, RISE, risen, WANTED)
+    DISTURBANCE, drive, Driver, Plant, read_muscle, READINGS, RISE, risen, WANTED)
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import entry_point, inlined, source_key
 from pam_sim.records import part, record
@@ -87,9 +87,7 @@ def sense(tick: int, plant: Plant, hsv: bool, driver: Driver, timing: tuple[int,
     seen, off = part(plant_out, 0, layout.OUTPUT), noise.view(READINGS)[tick]
     steps_of, wanted = part(quantum, 0, READINGS), reference.view(WANTED)[tick]
     inp, row = part(inputs, 0, INPUT), log.view(LOG)[tick]
-    inp.contraction_m = read(seen.contraction_m + off.contraction_m, steps_of.contraction_m)
-    inp.pressure_pa = read(seen.pressure_pa + off.pressure_pa, steps_of.pressure_pa)
-    inp.force_n = read(seen.force_n + off.force_n, steps_of.force_n)
+    read_muscle(seen, off, steps_of, inp)
     inp.reference_m = wanted.reference
     inp.reference_rate_m_per_s = wanted.rate
     inp.lead_reference_m = wanted.lead
