@@ -21,7 +21,8 @@ the installed files. Nodes that start at the same time would each compile the sa
 one another meanwhile.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import partial
 from pathlib import Path
 import sys
 import tempfile
@@ -65,9 +66,6 @@ def short(domain: str, values: str) -> Experiment:
 
 def muscle() -> None:
     """Run a short experiment with each rig, valve and law, as live nodes step through it."""
-    # First: of a step that was compiled for a rollout, all later rollouts are a tenth faster than
-    # of one that was compiled for a live plant.
-    tracked(FIRST)
     experiment = short('contraction', 'to_m: 0.002')
     for name in (NOMINAL_RIG, RIG):
         for valve in VALVES:
@@ -80,28 +78,31 @@ def muscle() -> None:
                 controller.reset_rules()
 
 
-def rollouts() -> None:
-    """Simulate rig and joint over whole arrays, the rig with a term that has no name as well."""
+def recording() -> None:
+    """Simulate the rig over a whole array, and read its force with a term that has no name."""
     rig = load_rig(NOMINAL_RIG)
-    # As the search for a form does. First, since all of it is its own: meanwhile `muscle` compiles
-    # what the others need, too.
-    term = {'name': 'load_term', 'parameters': {'first_of_1': 1.0}}
-    rig.with_(effects=[term]).simulate(np.zeros(ROWS))
-    load_joint(JOINT).simulate(np.zeros(ROWS), np.zeros(ROWS), np.zeros(ROWS))
     found = rig.simulate(np.zeros(ROWS))
     reading, = rig.with_(effects=[
         {'name': 'force_reading_term', 'parameters': {'first_of_1': 1.0}}]).effects
     with_terms(found.outputs, 'force', reading.parameters, rig)
+
+
+def search() -> None:
+    """Use what finds a term without a name, and the dead times of a recorded valve."""
+    rig = load_rig(NOMINAL_RIG)
+    term = {'name': 'load_term', 'parameters': {'first_of_1': 1.0}}
+    rig.with_(effects=[term]).simulate(np.zeros(ROWS))
     follow(*np.zeros((3, ROWS)))
     make_law('lookup').formula_n(3e5, 0.1)
     mean_openings_with_lift(np.zeros(ROWS), 0.01, 0.0, 0.0, 0.0, 0.0, np.empty(ROWS))
-    # As a report does, which finds the dead time of a recorded valve.
     DelayEstimator(RATE_HZ).steps(*np.zeros((2, ROWS)))
     ValveDelayEstimator(RATE_HZ).steps(*np.zeros((4, ROWS)))
 
 
 def limb() -> None:
-    """Run a short experiment with a joint and each valve, as live nodes step through it."""
+    """Simulate, tune and run a joint, with each valve as live nodes step through it."""
+    load_joint(JOINT).simulate(np.zeros(ROWS), np.zeros(ROWS), np.zeros(ROWS))
+    tracked_angle()
     experiment = short('joint_angle', 'to_rad: 0.05')
     for valve in VALVES:
         joint = load_joint(JOINT, valve=valve)
@@ -142,11 +143,18 @@ def warm_up(jobs: int = -1) -> None:
         Processes; -1 for as many as there are cores.
 
     """
-    # What is compiled in the first round is part of all that the second one compiles.
-    for uses in ([joblib.delayed(rollouts)(), joblib.delayed(muscle)()],
-                 [*(joblib.delayed(use)() for use in (limb, tracked_angle, tracked_force)),
-                  *(joblib.delayed(tracked)(law) for law in LAWS if law != FIRST)]):
-        _all(in_processes(jobs, uses))
+    # All share the physics, which two processes at once would both compile. So one compiles it,
+    # and meanwhile the other one what is its own. It is compiled for a rollout: with physics
+    # compiled for a live plant, all later rollouts would be a tenth slower.
+    first, *laws, last = (partial(tracked, law) for law in LAWS)
+    for uses in ([(first,), (search,)],
+                 [(limb, last), (muscle, recording, tracked_force, *laws)]):
+        _all(in_processes(jobs, (joblib.delayed(_in_turn)(*part) for part in uses)))
+
+
+def _in_turn(*uses: Callable[[], None]) -> None:
+    for use in uses:
+        use()
 
 
 def _all(results: Iterable[None]) -> None:
