@@ -17,7 +17,6 @@
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
 from multiprocessing import resource_tracker as standard_tracker
-import os
 import sys
 from typing import Any, TypeVar
 import warnings
@@ -25,10 +24,10 @@ import warnings
 import joblib
 from joblib.externals.loky.backend import resource_tracker
 from pam_actuation.interrupts import kept_from_children
+from pam_actuation.priority import give_way
 
 R = TypeVar('R')
 Results = Generator[R, None, None]
-NICENESS = 10               # of 19
 
 
 def in_processes(jobs: int, calls: Iterable[tuple[Any, ...]]) -> Results[Any]:
@@ -58,7 +57,7 @@ def giving_way(call: Callable[..., R], *arguments: Any) -> R:
 
     For calls ``in_processes`` beside live nodes: these go first.
     """
-    os.nice(max(NICENESS - os.nice(0), 0))
+    give_way()
     return call(*arguments)
 
 

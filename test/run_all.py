@@ -20,7 +20,6 @@ have a low priority: a live process that wakes gets a core at once. Live tests t
 among all others are run once more, with the machine to themselves. Both times are printed.
 """
 
-import contextlib
 import os
 from pathlib import Path
 import signal
@@ -28,6 +27,7 @@ import subprocess
 import sys
 import tempfile
 
+from pam_actuation.priority import give_way
 from stall_watch import EXIT_CROWDED, NAMES_A_LIVE_TEST, TIMED
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -37,8 +37,6 @@ ROOT = Path(__file__).resolve().parent.parent
 OTHERS = ('-m', f'not ({TIMED})', '--numprocesses', str(1 + (os.cpu_count() or 1)),
           '--dist', 'loadfile', '--no-loadscope-reorder', '-o', 'timeout=900')
 TESTS_FAILED = 1            # exit code of pytest
-# A tenth of the time where a live process wants the core as well.
-NICE = 10
 
 
 def live_tests():
@@ -67,21 +65,13 @@ def ended(*processes):
         raise
 
 
-def to_background():
-    """Let other processes go first, as far as the system knows how."""
-    os.nice(NICE)
-    # Linux may share the cores between sessions first, and only then between their processes.
-    with contextlib.suppress(OSError):
-        Path('/proc/self/autogroup').write_text(str(NICE))
-
-
 def main():
     """Run the tests and print what they say; return 1 if any failed."""
     live_arguments = live_tests()
     with tempfile.TemporaryFile('w+') as said:
         live, others = ended(
             pytest(*live_arguments, stdout=said, stderr=subprocess.STDOUT),
-            pytest(*OTHERS, preexec_fn=to_background))
+            pytest(*OTHERS, preexec_fn=give_way))
         said.seek(0)
         print('\nThe live tests that ran beside them:\n', said.read(), sep='', flush=True)
     if live == TESTS_FAILED:

@@ -41,7 +41,7 @@ from typing import Any
 
 from pam_actuation.nodes import executables
 from pam_actuation.rigging.compile_ahead import compile_ahead
-from pam_actuation.rigging.processes import end_with_parent, name_process
+from pam_actuation.rigging.processes import begin_session, name_process
 from pam_sim.compile_notice import told_of_compilation
 
 # What nodes import only once they know their parameters.
@@ -141,7 +141,7 @@ class Children:
             end.close()
         os.setsid()
         gc.enable()
-        end_with_parent(own)
+        begin_session(own)
         _become(request)
         os.close(begins)
         words: list[str] = request['words']

@@ -36,7 +36,7 @@ import threading
 import time
 from typing import Any
 
-from pam_actuation.rigging.processes import end_with_parent, node_environment
+from pam_actuation.rigging.processes import begin_session, node_environment
 
 OF_A_SESSION = ('ROS_DOMAIN_ID', 'ROS_LOG_DIR')     # differ from node to node
 # Imported by a template that is started before the rig is known.
@@ -71,7 +71,7 @@ class NodeTemplate:
                  *dict.fromkeys(names), ' ' * ROOM_FOR_WORDS],
                 env=dict(environment), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL, start_new_session=True, pass_fds=(theirs.fileno(),),
-                preexec_fn=partial(end_with_parent, os.getpid()))
+                preexec_fn=partial(begin_session, os.getpid()))
         self._unread = b''
         self._ready = self._spoiled = False
         self._asked = self._compiles = False

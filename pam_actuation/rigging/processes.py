@@ -25,6 +25,7 @@ import sys
 import time
 from typing import Any, TYPE_CHECKING
 
+from pam_actuation.priority import keep_niceness
 from pam_actuation.transport import prepare_middleware
 
 if TYPE_CHECKING:
@@ -142,7 +143,7 @@ class NodeProcess:
                 [*(program or (sys.executable, '-m', f'pam_actuation.nodes.{self.name}')),
                  *arguments],
                 env=environment, stdin=subprocess.DEVNULL, stdout=log, stderr=log,
-                start_new_session=True, preexec_fn=partial(end_with_parent, os.getpid()))
+                start_new_session=True, preexec_fn=partial(begin_session, os.getpid()))
 
     @property
     def exit_code(self) -> int | None:
@@ -219,9 +220,15 @@ def end_all(processes: Iterable[NodeProcess], timeout_s: float = 5.0) -> None:
         process.wait(timeout_s)
 
 
+def begin_session(parent_pid: int) -> None:
+    """Keep the priority of the parent in a new session, and end with it (a ``preexec_fn``)."""
+    keep_niceness()
+    end_with_parent(parent_pid)
+
+
 def end_with_parent(parent_pid: int) -> None:
     """
-    Ask Linux for a SIGTERM to this process when its parent dies (a ``preexec_fn``).
+    Ask Linux for a SIGTERM to this process when its parent dies.
 
     A parent that died before is not told of any more: the process ends at once.
     """

@@ -26,7 +26,7 @@ import sys
 import time
 from typing import Final
 
-from pam_actuation.rigging.processes import end_with_parent, node_environment
+from pam_actuation.rigging.processes import begin_session, node_environment
 
 START_S: Final = 20.0       # on a busy machine; it has a low priority
 END_S: Final = 3.0
@@ -57,7 +57,7 @@ def page_beside(domain_id: int, log_dir: str | os.PathLike[str]) -> Iterator[str
          '--domain-id', str(domain_id)],
         env=node_environment(domain_id, log_dir), stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, start_new_session=True,
-        preexec_fn=partial(end_with_parent, os.getpid()))
+        preexec_fn=partial(begin_session, os.getpid()))
     try:
         yield _address(process)
     finally:

@@ -23,6 +23,8 @@ import subprocess
 import sys
 import time
 
+from pam_actuation.priority import keep_niceness
+
 LONGEST_S = 180.0
 _ENDS_WITHIN_S = 60.0           # after Ctrl-C: the nodes vent, the bag is closed
 _VENTS_WITHIN_S = 10.0          # after SIGTERM, before it is killed
@@ -56,7 +58,8 @@ class Terminal:
             # A process group of its own: Ctrl-C reaches all that the command started in it.
             self._process = subprocess.Popen(
                 ['bash', '-c', command], cwd=folder, env=environment(), stdout=output,
-                stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, start_new_session=True)
+                stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, start_new_session=True,
+                preexec_fn=keep_niceness)
 
     def printed(self):
         """Return all that the command has printed so far."""

@@ -42,6 +42,8 @@ import tempfile
 import time
 import uuid
 
+from pam_actuation.priority import keep_niceness
+
 ROOT = Path(__file__).resolve().parents[2]
 BAG = str(ROOT / 'test' / 'replay' / 'pinned' / 'sofc_ppr.mcap')
 RIG = 'dmsp_5_300_hanging_mass'
@@ -125,7 +127,7 @@ def interrupt(one, folder, environment):
     mark = uuid.uuid4().hex
     process = subprocess.Popen(
         one.command(), cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE, text=True, start_new_session=True,
+        stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=keep_niceness,
         env={**environment, MARK: mark, 'PYTHONPATH': str(ROOT)})
     sent = 0
     try:
