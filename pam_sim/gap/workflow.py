@@ -36,6 +36,7 @@ from pam_sim.gap.report.reason import explain
 from pam_sim.gap.result import GapResult
 from pam_sim.gap.select.context import context_of
 from pam_sim.gap.select.memory import as_sets, memories
+from pam_sim.gap.select.refit import within_ranges
 from pam_sim.gap.select.search import search
 from pam_sim.gap.subsystems.problems import subsystem_problems
 from pam_sim.gap.subsystems.pulses_seen import shows_pulses
@@ -143,7 +144,9 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     estimator.use = (FIT, SELECT)
     # What a fit does not touch stays as calibrated now.
     base = estimator.base = estimator.fit_base()
-    final = estimator.polish(outcome.final) if outcome.final.hypothesis.names else base
+    final = base
+    if outcome.final.hypothesis.names:
+        final = within_ranges(context, estimator.polish(outcome.final))
     one_speed = moves_at_one_speed(recordings, criteria)
     # A proof at another speed tells creep from hysteresis, one at the same speed does not.
     same_speed = one_speed and moves_at_one_speed([*recordings, held_out], criteria)

@@ -22,6 +22,7 @@ from typing import Any
 from pam_sim.effects.fitting import FreeParameter
 from pam_sim.effects.registry import get_effect
 
+NEAR = 0.05                  # of an end of a range that is not 0, as near counts as at it
 Setting = dict[str, Any]       # an effect as an entry of a model file
 
 
@@ -59,6 +60,11 @@ class Candidate:
         """Return the free parameters whose response is about proportional to their value."""
         return [f for f in self.free if not f.shape]
 
+    def at_end(self, values: Mapping[str, float]) -> FreeParameter | None:
+        """Return the first amplitude that is at an end of its range other than 0, or none."""
+        return next((f for f in self.amplitudes if is_at_end(values[f.name], f.lower, f.upper)),
+                    None)
+
     def starts(self) -> list[dict[str, float]]:
         """Return the parameter dicts that the screening tries."""
         grids = [f.starts or (f.typical,) for f in self.free]
@@ -72,3 +78,8 @@ class Candidate:
     def setting(self, values: Mapping[str, float]) -> Setting:
         """Return the effect as an entry of a model file."""
         return {'name': self.effect, 'parameters': {**dict(self.held), **values}}
+
+
+def is_at_end(value: float, *ends: float) -> bool:
+    """Return whether a value is at an end of its range that is not 0."""
+    return any(end and abs(value - end) <= NEAR * abs(end) for end in ends)

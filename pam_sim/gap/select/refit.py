@@ -78,6 +78,29 @@ def other_formulations(context: SearchContext, current: Fit, always: bool = Fals
     return current
 
 
+def within_ranges(context: SearchContext, current: Fit) -> Fit:
+    """
+    Return the fit with formulations whose numbers are within their ranges, if these do as well.
+
+    A number that changes nothing in these data may end anywhere. The one with the fewest numbers
+    is taken.
+    """
+    for place, (old, values) in enumerate(zip(current.hypothesis.effects, current.values())):
+        if old.at_end(values) is None:
+            continue
+        others = sorted((c for c in context.pool if c.name == old.name and c != old),
+                        key=lambda c: len(c.free))
+        least = sum(context.explained(current).values()) - context.criteria.done_share
+        for tried in _in_formulations(context.estimator, current, place, others):
+            found = context.estimator.polish(tried)
+            c = found.hypothesis.effects[place]
+            if (c.at_end(found.values()[place]) is None
+                    and sum(context.explained(found).values()) >= least):
+                current = found
+                break
+    return current
+
+
 def _in_formulations(estimator: Estimator, current: Fit, place: int,
                      others: Sequence[Candidate]) -> list[Fit]:
     """Return the fits with one effect in other formulations, from their typical sizes."""

@@ -22,13 +22,13 @@ of another muscle.
 from collections.abc import Iterator, Sequence
 
 from pam_sim.effects.registry import get_effect
+from pam_sim.gap.fit.candidate import is_at_end
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit
 from pam_sim.gap.select.rival import NamedEffect
 from pam_sim.gap.verify.model import numbers_of
 from pam_sim.gap.words import in_words
 
-NEAR = 0.05                  # of an end of the range that is not 0, as near counts as at it
 AT_END = ('`{}` would need {} = {:.4g} {}, at the end of its range, so it is not named. Check '
           'first whether the model is that of the recorded rig, and the zeros of the sensors.')
 
@@ -53,15 +53,15 @@ def at_end(named: Sequence[NamedEffect], estimator: Estimator, final: Fit
         The name, and a sentence on it.
 
     """
-    told = {p.name: [(p.name, p.unit, value, (p.lower, p.upper))]
-            for p in estimator.rig.number_list
-            for value in [numbers_of(estimator, final)[0].get(p.name)] if value is not None}
+    found = numbers_of(estimator, final)[0]
+    told = {p.name: (p.name, found[p.name], p.unit) for p in estimator.rig.number_list
+            if p.name in found and is_at_end(found[p.name], p.lower, p.upper)}
     for c, values in zip(final.hypothesis.effects, final.values()):
-        units = {p.name: p.unit for p in get_effect(c.effect).parameters}
-        told[c.name] = [(f.name, units[f.name], values[f.name], (f.lower, f.upper))
-                        for f in c.amplitudes]
+        end = c.at_end(values)
+        if end is not None:
+            units = {p.name: p.unit for p in get_effect(c.effect).parameters}
+            told[c.name] = (end.name, values[end.name], units[end.name])
     for w in named:
-        for name, unit, value, ends in told.get(w.name, ()) if len(w.names) == 1 else ():
-            if any(end and abs(value - end) <= NEAR * abs(end) for end in ends):
-                yield w.name, AT_END.format(w.name, in_words(name), value, unit)
-                break
+        if w.name in told and len(w.names) == 1:
+            name, value, unit = told[w.name]
+            yield w.name, AT_END.format(w.name, in_words(name), value, unit)
