@@ -26,6 +26,7 @@ from pam_sim.characterise.points import (
 from pam_sim.errors import InputError
 from pam_sim.muscle.laws.lookup import Lookup
 from pam_sim.muscle.lookup_table import LookupTable
+from pam_sim.muscle.registry import make_law
 from pam_sim.short_repr import short_repr
 from scipy.interpolate import PchipInterpolator, RegularGridInterpolator
 
@@ -204,7 +205,10 @@ def _law(
         mass: FloatArray | None) -> Lookup:
     # The force does not depend on the air: any rising mass serves where it is unknown.
     air = mass if mass is not None else np.repeat(1.0 + pressure[:, None], loads.size, axis=1)
-    return Lookup(LookupTable(pressure, loads, strain, air))
+    # By the registry, which gives the class its compiled formula.
+    law = make_law('lookup', LookupTable(pressure, loads, strain, air))
+    assert isinstance(law, Lookup)
+    return law
 
 
 def _force(

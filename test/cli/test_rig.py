@@ -208,6 +208,11 @@ def test_forces_measured_by_others_become_a_muscle(folder, capsys):
     # (49 N + 30 N) / (1 - 0.15 / 0.25) / 2.5 mN per Pa, from the formula above
     assert float(rig.static_pressure_pa(0.045)) - P_ATM_PA == pytest.approx(79e3, rel=0.03)
     assert (folder / 'made_force_map.csv').is_file()
+    # As a user's first command does, in a process that has used no muscle before.
+    subprocess.run(
+        [sys.executable, '-m', 'pam_actuation.cli.main', 'rig', 'new', '--force-map', 'others.csv',
+         '--length-mm', '300', '--bore-mm', '20', '--out', 'first.yaml'], check=True, timeout=60)
+    assert (folder / 'first.yaml').read_text().count('first_force_map.csv') > 0
     before = sorted(path.name for path in folder.iterdir())
     assert main(['rig', 'new', '--force-map', 'others.csv', '--out', 'other.yaml']) == 2
     assert '--length-mm' in capsys.readouterr().err
