@@ -67,14 +67,13 @@ def numbers_first(runs: Sequence[Run], rig: Rig, holds_certify: bool, seed: int 
 
 def left_open(given: Rig, found: Identification) -> Rig:
     """
-    Return the identified rig for the look: bent numbers stay unknown, as they were given.
+    Return the identified rig for the look: bent numbers are starting values and stay unknown.
 
     What is missing has bent them, and an interval about a bent value would forbid the true one.
     The zero of the pressure sensor acts in valve and muscle alike, so none of them moves it.
     """
     names = [name for name in found.bent if name in given.unknown and name != ZERO]
-    rig = found.rig.with_(parameters={name: given.number(name) for name in names},
-                          tolerance=dict.fromkeys(names, UNKNOWN))
+    rig = found.rig.with_(tolerance=dict.fromkeys(names, UNKNOWN))
     if ZERO in given.unknown and ZERO in found.bent:
         rig = rig.with_(parameters={ZERO: found[ZERO].value}, tolerance={ZERO: 0.0})
     return rig
