@@ -22,7 +22,7 @@ import gc
 import importlib
 import os
 import sys
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 import warnings
 
 from pam_actuation import interrupts
@@ -133,7 +133,7 @@ def _parsed_and_run(argv: list[str] | None, begin: Callable[[], object]) -> int:
         tell_when_compiling(lambda: print(
             f'pam {args.verb}: compiling the equations of this rig, once; up to two minutes',
             file=sys.stderr, flush=True))
-        with _no_numerical_warnings():
+        with _few_warnings(f'pam {args.verb}'):
             code = args.call(args)
         sys.stdout.flush()      # a full disk shows here, not when the interpreter ends
         # A verb that did its work on data that cannot be right has found something.
@@ -153,15 +153,28 @@ def _parsed_and_run(argv: list[str] | None, begin: Callable[[], object]) -> int:
 
 
 @contextmanager
-def _no_numerical_warnings() -> Iterator[None]:
+def _few_warnings(verb: str) -> Iterator[None]:
     """
     Keep warnings of NumPy and SciPy from people: a result that is not finite is told as such.
 
-    ``python -W`` and ``PYTHONWARNINGS`` show them.
+    A force law that is used beyond its table warns at every simulation, each time of another
+    share: the first one is told in a line. ``python -W`` and ``PYTHONWARNINGS`` show all.
     """
     with warnings.catch_warnings():
         if not sys.warnoptions:
             warnings.simplefilter('ignore', RuntimeWarning)
+            usual, told = warnings.showwarning, False
+
+            def show(message: Warning | str, category: type[Warning], *where: Any,
+                     **more: Any) -> None:
+                nonlocal told
+                if category.__name__ != 'ExtrapolationWarning':
+                    usual(message, category, *where, **more)
+                elif not told:
+                    told = True
+                    print(f'{verb}: {message}', file=sys.stderr, flush=True)
+
+            warnings.showwarning = show
         yield
 
 

@@ -21,6 +21,7 @@ import time
 from typing import Any
 
 from pam_sim.gap.criteria import CRITERIA, Criteria
+from pam_sim.gap.data.beyond_table import beyond_table
 from pam_sim.gap.data.checked import checked_runs, recording_of
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.speeds import moves_at_one_speed
@@ -120,6 +121,7 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     is_certify = checked.certify is not None
     recordings = [recording_of(run, rig, criteria) for run in checked.runs]
     result = GapResult('unknown', '', remarks=checked.remarks, recorded=_recorded(checked.runs))
+    result.remarks += beyond_table(recordings, rig)
     if _needs_pulses(rig, recordings, criteria):
         rig = rig.with_(fidelity='switching')
         result.remarks.append(PULSES)
