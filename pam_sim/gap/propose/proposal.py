@@ -132,7 +132,7 @@ def propose(result: GapResult, validation: Validation,
         if found is None:
             continue
         proved = both.polish(found.fit)
-        proof = validation.of(proved, final, both)
+        proof = validation.of(proved, _without_term(validation, both, found, proved), both)
         fell, _ = proof.fall(proof.refit, proof.after)
         explained = 1.0 - proof.unexplained()
         if (explained > criteria.greater_part and fell > criteria.greater_part
@@ -169,6 +169,27 @@ def _fits(stand_in: StandIn, learning: Estimator, problem: SubsystemProblem) -> 
             and (not stand_in.signal or stand_in.signal in problem.signals))
 
 
+def _without_term(validation: Validation, both: Estimator, found: Sum, proved: Fit) -> Fit:
+    """
+    Return what a term is compared with: the final model, or the numbers of the fit alone.
+
+    The fit with the term may have found better numbers; that is no merit of the term.
+    """
+    bare = _bare(found, proved)
+    gained = 1.0 - validation.of(bare, validation.final, both).unexplained()
+    return bare if gained > both.criteria.close_share else validation.final
+
+
+def _bare(found: Sum, proved: Fit) -> Fit:
+    """Return a fit less its term."""
+    h = proved.hypothesis
+    kept = [p for p in range(len(h.effects)) if p != found.place]
+    return Fit(
+        Hypothesis(tuple(h.effects[p] for p in kept), h.numbers),
+        np.concatenate([np.zeros(0), *(proved.theta_of(p) for p in kept)]), proved.known_z,
+        proved.errors, proved.temper)
+
+
 def _written(found: Sum, proof: Validation) -> Proposal:
     """Return the proposal of proved terms, with its file and its model."""
     proved, explained = proof.final, 1.0 - proof.unexplained()
@@ -176,13 +197,7 @@ def _written(found: Sum, proof: Validation) -> Proposal:
     ranges = {one.symbol: (found.ends[f'low_of_{i}'], found.ends[f'high_of_{i}'])
               for i, one in enumerate(found.stand_in.inputs) if f'low_of_{i}' in found.ends}
     effect = EffectText(found.stand_in, found.terms, values, ranges, explained)
-    h = proved.hypothesis
-    kept = [p for p in range(len(h.effects)) if p != found.place]
-    bare = Fit(
-        Hypothesis(tuple(h.effects[p] for p in kept), h.numbers),
-        np.concatenate([np.zeros(0), *(proved.theta_of(p) for p in kept)]), proved.known_z,
-        proved.errors, proved.temper)
-    data = yaml.safe_load(model_of(proof.estimator, bare).to_yaml())
+    data = yaml.safe_load(model_of(proof.estimator, _bare(found, proved)).to_yaml())
     data['effects'] = [*data.get('effects', ()), {
         'name': effect.name, 'parameters': effect.values()}]
     return Proposal(effect.equation, effect.name, found.stand_in.subsystem, float(explained),
