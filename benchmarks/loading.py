@@ -32,6 +32,7 @@ import time
 from long_bag import TOPICS, write_long_bag
 import numpy as np
 from pam_actuation.bags.load import load_run, read_series
+from pam_actuation.bags.oddities import Oddities
 from pam_actuation.bags.source import read_bag
 from pam_actuation.topics import definitions
 import results_page
@@ -60,18 +61,18 @@ HOUR = '\n'.join((
     'seconds = time.perf_counter() - start',
     'peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024',
     'counts = {name: len(one) for name, one in run.topics.items()}',
-    'print(json.dumps([seconds, time.process_time(), peak, counts, list(run.remarks)]))'))
+    'print(json.dumps([seconds, time.process_time(), peak, counts, [*run.remarks, *run.notes]]))'))
 
 
 def load_here(path):
     """Return short name to Series of all topics, whatever they are."""
     bag = read_bag(path)
-    remarks = []
+    odd = Oddities()
     series = {
-        name.rsplit('/', 1)[-1]: read_series(name.rsplit('/', 1)[-1], topic, remarks)
+        name.rsplit('/', 1)[-1]: read_series(name.rsplit('/', 1)[-1], topic, odd)
         for name, topic in bag.topics.items()}
-    if remarks:
-        raise SystemExit(f'the bag is odd: {remarks}')
+    if odd != Oddities():
+        raise SystemExit(f'the bag is odd: {odd}')
     return series
 
 

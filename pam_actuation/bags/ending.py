@@ -30,7 +30,6 @@ from typing import Any
 from pam_actuation.messages import LEVEL_ERROR, Status
 from pam_sim.files import StrPath, write_text
 from pam_sim.joint.parameters import SIDES
-from pam_sim.run import Run
 
 PLANNED, REACHED, ENDED, BECAUSE, VENTS = (
     'planned_length_s', 'reached_length_s', 'ended', 'ended_because', 'vented_meanwhile')
@@ -106,12 +105,6 @@ def ending_of(metadata: Mapping[str, str] | None) -> Ending:
         _seconds(metadata.get(PLANNED)), _seconds(metadata.get(REACHED)),
         ended if ended in EARLY or ended == COMPLETE else '', metadata.get(BECAUSE, ''),
         metadata.get(VENTS, ''))
-
-
-def early_sentences(runs: Iterable[Run]) -> list[str]:
-    """Return a sentence on every run that is known to have stopped early, with its path."""
-    found = [(run, ending_of(run.metadata)) for run in runs]
-    return [f'{run.path}: {ending.sentence}' for run, ending in found if ending.early]
 
 
 class EndWatch:

@@ -27,6 +27,7 @@ import numpy as np
 
 from pam_actuation.bags import renamed, series
 from pam_actuation.bags.markers import is_marker, markers_of
+from pam_actuation.bags.oddities import Oddities
 from pam_actuation.bags.plausibility import (
     Implausible, not_finite, recorded_size, topic_findings)
 from pam_actuation.bags.rig_topics import is_read, is_rig_topic, namespaces
@@ -57,6 +58,10 @@ class RecordedRun(Run):
         All messages of ``reference_trajectory``, by stamp.
     remarks : tuple of str
         Sentences on anything odd in the bag.
+    left_out : tuple of str
+        Those of the remarks that tell of lost messages, such as damaged ones.
+    notes : tuple of str
+        Sentences on what is harmless, such as stamps that repeat.
     markers : tuple of Marker
         What a person set meanwhile, by stamp.
 
@@ -64,6 +69,8 @@ class RecordedRun(Run):
 
     reference_trajectories: tuple[ReferenceTrajectory, ...] = ()
     remarks: tuple[str, ...] = ()
+    left_out: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     markers: tuple[Marker, ...] = ()
 
     @property
@@ -133,19 +140,20 @@ def run_of(bag: Bag, path: StrPath, namespace: str | None = None) -> RecordedRun
     """Return the run of one muscle of a bag that was read; errors are those of ``load_run``."""
     chosen = _choose_namespace(bag, namespace)
     found = topics_of(bag, chosen)
-    remarks = list(bag.remarks)
+    odd = Oddities(list(bag.remarks))
     series_of: dict[str, Series] = {}
     trajectories: tuple[ReferenceTrajectory, ...] = ()
     for short, topic in found.items():
         if OF_A_RUN[short].numeric is None:
-            trajectories = _trajectories(topic, remarks)
+            trajectories = _trajectories(topic, odd)
         else:
-            one = read_series(short, topic, remarks)
+            one = read_series(short, topic, odd)
             if len(one):
                 series_of[short] = one
     return RecordedRun(
         topics=series_of, metadata=bag.experiment, namespace=chosen, path=str(path),
-        reference_trajectories=trajectories, remarks=tuple(remarks),
+        reference_trajectories=trajectories, remarks=tuple(odd.remarks),
+        left_out=tuple(odd.left_out), notes=tuple(odd.notes),
         markers=tuple(marker for _, marker in markers_of(bag, chosen)))
 
 
@@ -200,42 +208,37 @@ def _listed(names: Iterable[str]) -> str:
     return ', '.join(name or '/' for name in sorted(names)) or 'none'
 
 
-def read_series(short: str, topic: TopicData, remarks: list[str]) -> Series:
-    """Return the Series of a TopicData; what is odd is appended to ``remarks`` as sentences."""
+def read_series(short: str, topic: TopicData, odd: Oddities) -> Series:
+    """Return the Series of a TopicData; what is odd is appended to ``odd`` as sentences."""
     row = BY_NAME[short]
     stamp_ns, values, bad = series.table(short, topic.payloads)
     keep = ~bad
     if bad.any():
-        remarks.append(
+        odd.leave_out(
             f'{topic.name}: {int(bad.sum())} messages are not {topic.type_name}, left out.')
-    stamp_ns, keep = _checked_stamps(row, stamp_ns, keep, topic, remarks)
+    stamp_ns, keep = _checked_stamps(row, stamp_ns, keep, topic, odd)
     if row.missing == KEPT:
         values = {name: values[name] for name in _SIGNAL_NAMES if name in values}
         if not values and len(stamp_ns):
-            remarks.append(
+            odd.remarks.append(
                 f'{topic.name} has none of the signals {", ".join(_SIGNAL_NAMES)}: left out.')
             keep = np.zeros_like(keep)
     stamp_ns = stamp_ns[keep]
     values = {name: column[keep] for name, column in values.items()}
-    backward = int((np.diff(stamp_ns) < 0).sum())
-    if backward:
-        remarks.append(
-            f'{topic.name}: the stamp goes back {backward} times; sorted by stamp.')
+    odd.tell_stamps(topic.name, stamp_ns)
+    if (np.diff(stamp_ns) < 0).any():
         order = np.argsort(stamp_ns, kind='stable')
         stamp_ns = stamp_ns[order]
         values = {name: column[order] for name, column in values.items()}
-    same = int((np.diff(stamp_ns) == 0).sum())
-    if same:
-        remarks.append(f'{topic.name}: {same} messages repeat the stamp before, kept.')
     if row.missing == KEPT:
-        stamp_ns, values = _held(stamp_ns, values, topic.name, remarks)
+        stamp_ns, values = _held(stamp_ns, values, topic.name, odd)
     elif row.missing == TOLD and not row.internals and len(stamp_ns):
-        _remark_not_finite(row.name, values, topic.name, remarks)
+        _remark_not_finite(row.name, values, topic.name, odd)
     return Series(stamp_ns, values, {name: unit_of(name) for name in values}, held=row.held)
 
 
 def _checked_stamps(row: Topic, stamp_ns: IntArray, keep: BoolArray, topic: TopicData,
-                    remarks: list[str]) -> tuple[IntArray, BoolArray]:
+                    odd: Oddities) -> tuple[IntArray, BoolArray]:
     """
     Treat messages that nobody stamped: all of them by receive time, single ones left out.
 
@@ -245,17 +248,18 @@ def _checked_stamps(row: Topic, stamp_ns: IntArray, keep: BoolArray, topic: Topi
     if not row.stamped:
         return np.where(unset, topic.log_time_ns, stamp_ns), keep
     if int(unset.sum()) > 1 and not (stamp_ns[keep] != 0).any():
-        remarks.append(f'{topic.name}: no message has a header stamp, receive times are used.')
+        odd.remarks.append(f'{topic.name}: no message has a header stamp, so receive times are '
+                           'used, which are later.')
         return topic.log_time_ns, keep
     if unset.any() and int(np.median(stamp_ns[keep])) > _WALL_CLOCK_NS:
-        remarks.append(
+        odd.leave_out(
             f'{topic.name}: {int(unset.sum())} messages without a header stamp, left out.')
         keep = keep & ~unset
     return stamp_ns, keep
 
 
 def _held(stamp_ns: IntArray, values: Mapping[str, FloatArray], name: str,
-          remarks: list[str]) -> tuple[IntArray, dict[str, FloatArray]]:
+          odd: Oddities) -> tuple[IntArray, dict[str, FloatArray]]:
     """Return the signal as a valve takes it: it ignores non-finite entries and holds the last."""
     known = np.ones(len(stamp_ns), dtype=bool)
     held = {}
@@ -266,20 +270,21 @@ def _held(stamp_ns: IntArray, values: Mapping[str, FloatArray], name: str,
         known &= last >= 0
     ignored = sum(int((~np.isfinite(column)).sum()) for column in values.values())
     if ignored:
-        remarks.append(
+        odd.remarks.append(
             f'{name}: {ignored} missing or non-finite entries, the value before is held.')
     return stamp_ns[known], {key: column[known] for key, column in held.items()}
 
 
 def _remark_not_finite(short: str, values: Mapping[str, FloatArray], name: str,
-                       remarks: list[str]) -> None:
+                       odd: Oddities) -> None:
     for key, column in values.items():
         count = not_finite(short, key, column)
         if count:
-            remarks.append(f'{name}: {count} of {len(column)} {key} are not finite, kept as NaN.')
+            odd.notes.append(
+                f'{name}: {count} of {len(column)} {key} are not finite, kept as NaN.')
 
 
-def _trajectories(topic: TopicData, remarks: list[str]) -> tuple[ReferenceTrajectory, ...]:
+def _trajectories(topic: TopicData, odd: Oddities) -> tuple[ReferenceTrajectory, ...]:
     messages, bad = [], 0
     for raw in topic.payloads:
         try:
@@ -287,5 +292,5 @@ def _trajectories(topic: TopicData, remarks: list[str]) -> tuple[ReferenceTrajec
         except InputError:
             bad += 1
     if bad:
-        remarks.append(f'{topic.name}: {bad} messages are not {topic.type_name}, left out.')
+        odd.leave_out(f'{topic.name}: {bad} messages are not {topic.type_name}, left out.')
     return tuple(sorted(messages, key=lambda message: message.stamp_ns))

@@ -23,6 +23,7 @@ import os
 
 from pam_actuation.bags.load import NAMESPACE, read_series, RecordedRun, run_of
 from pam_actuation.bags.markers import is_marker, markers_of
+from pam_actuation.bags.oddities import Oddities
 from pam_actuation.bags.renamed import full_names, may_be_in
 from pam_actuation.bags.source import Bag, read_bag, TopicData
 from pam_actuation.topics.table import BY_NAME, JOINT, MUSCLE, short_name
@@ -72,14 +73,15 @@ def load_recording(path: str | os.PathLike[str], namespace: str | None = None,
         raise InputError(f'the bag has several joints, {", ".join(sorted(joints))}; choose one '
                          f'with {NAMESPACE}', str(path))
     found: dict[str, Series] = {}
-    remarks = list(bag.remarks)
+    odd = Oddities(list(bag.remarks))
     for relative, topic in topics_of_joint(bag, joints[0]).items():
         if BY_NAME[short_name(relative)].numeric is not None:
-            series = read_series(short_name(relative), topic, remarks)
+            series = read_series(short_name(relative), topic, odd)
             if len(series):
                 found[relative] = series
     return RecordedRun(topics=found, metadata=bag.experiment, namespace=joints[0],
-                       path=str(path), remarks=tuple(remarks),
+                       path=str(path), remarks=tuple(odd.remarks),
+                       left_out=tuple(odd.left_out), notes=tuple(odd.notes),
                        markers=tuple(one for _, one in markers_of(bag, joints[0])))
 
 

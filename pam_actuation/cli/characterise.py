@@ -119,8 +119,8 @@ def _simulated(args: argparse.Namespace) -> 'tuple[Rig, list[str]]':
 
 def _characterised(args: argparse.Namespace, sources: list[str]) -> 'Characterisation':
     """Return the Characterisation of bags or of one table."""
-    from pam_actuation.bags.ending import early_sentences
     from pam_actuation.bags.load import load_run
+    from pam_actuation.bags.oddities import recording_remarks
     from pam_actuation.tables.separated import rows_of_text
     from pam_sim.characterise import characterise_held, characterise_runs, characterise_table
     from pam_sim.characterise.tables import read_measured_table
@@ -145,7 +145,7 @@ def _characterised(args: argparse.Namespace, sources: list[str]) -> 'Characteris
             # Simulated loads are read off the load cell like any others.
             loads = None if args.simulate else args.load_n
             result = characterise_runs(runs, _dimensions(args, runs), loads, args.load_step_n)
-        result.remarks += early_sentences(runs)
+        result.remarks += recording_remarks(runs)
         return result
     if args.held_mm is not None:
         raise InputError('goes with bags; a table says its lengths itself', '--held-mm')

@@ -97,7 +97,7 @@ def effect_names(args: argparse.Namespace) -> list[str]:
 def note_implausible(args: argparse.Namespace, runs: 'list[RecordedRun]',
                      must_be_right: bool = False) -> None:
     """
-    Note what cannot be right in loaded bags: ``emit`` says it, and the verb ends with 1.
+    Note lost messages and values that cannot be right: ``emit`` says it, the verb ends with 1.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def note_implausible(args: argparse.Namespace, runs: 'list[RecordedRun]',
         if must_be_right and run.unusable:
             raise InputError(run.unusable[0].rstrip('.'), run.path)
         several = f'{run.path}: ' if len(runs) > 1 else ''
-        found = [f'{several}{sentence}' for sentence in run.implausible]
+        found = [f'{several}{sentence}' for sentence in (*run.left_out, *run.implausible)]
         args.implausible = [*getattr(args, 'implausible', []), *found]
 
 

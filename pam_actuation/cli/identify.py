@@ -52,6 +52,7 @@ def add_arguments(parser: Parser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Identify, write what was found, and say what to measure next."""
     from pam_actuation.bags.load import load_run
+    from pam_actuation.bags.oddities import recording_remarks
     from pam_actuation.report.identify import FILES, save_identification
     from pam_actuation.report.next_run import before_it, command_on_rig
     from pam_sim import load_rig
@@ -65,6 +66,7 @@ def run(args: argparse.Namespace) -> int:
     with progress(args, 1.0, '', 'identify') as bar:
         found = identify(runs, rig, args.unknown, args.added_kg, args.seed,
                          progress=lambda done: bar.update(done - bar.n))
+    found.remarks += recording_remarks(runs)
     lines = [found.text()]
     if args.out is not None:
         save_identification(found, runs, args.out)

@@ -40,8 +40,8 @@ def add_arguments(parser: Parser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Load the bags and write the page."""
-    from pam_actuation.bags.ending import early_sentences
     from pam_actuation.bags.load_joint import load_recording, MEASURED
+    from pam_actuation.bags.oddities import recording_remarks
     from pam_actuation.report.full_valves import full_valves
     from pam_actuation.report.joint_page import joint_report
     from pam_actuation.report.origin import default_page, origin
@@ -54,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
     note_implausible(args, runs)
     write = joint_report if any(MEASURED in run for run in runs) else bag_report
     summary = write(runs, out, of=origin(args.bag, out))
-    remarks = [*early_sentences(runs), *filter(None, map(full_valves, runs)), *(
+    remarks = [*recording_remarks(runs), *filter(None, map(full_valves, runs)), *(
         f'{title}: {said}' for title, facts in summary.items()
         for said in facts.get('learned_worse', ()))]
     emit(args, {'report': out, 'remarks': remarks, **summary},

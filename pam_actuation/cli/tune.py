@@ -97,6 +97,7 @@ def run(args: argparse.Namespace) -> int | None:
     """Tune; exit code 1 where the held-out check did not improve or the model is wrong."""
     from pam_actuation.bags.facts import mistakes_of
     from pam_actuation.bags.load_joint import load_recording
+    from pam_actuation.bags.oddities import recording_remarks
     from pam_actuation.experiments.limits import unknown_remarks
     from pam_actuation.replay.model import check_kind
     from pam_actuation.report.tuning_page import tuning_report
@@ -134,7 +135,8 @@ def run(args: argparse.Namespace) -> int | None:
         result.save(files['controller'], files.get('rules'))
         tuning_report(files['report'], result, recordings, rig, experiments, runs)
     emit(args, {**{key: os.fspath(path) for key, path in written.items()}, **result.to_dict(),
-                'recordings': [one.to_dict() for one in recordings]},
+                'recordings': [one.to_dict() for one in recordings],
+                'remarks': recording_remarks(runs)},
          '\n'.join([result.text(), *(f'  {text}' for one in recordings for text in one.lines()),
                     *(f'{key}: {path}' for key, path in written.items())]))
     wrong = any(one.model is not None and one.model.verdict == 'wrong' for one in recordings)

@@ -22,7 +22,7 @@ from typing import Any, TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from pam_actuation.bags.ending import early_sentences
+from pam_actuation.bags.oddities import recording_remarks
 from pam_actuation.replay.chain import ChainReplay, replay_chain
 from pam_actuation.replay.controller import replay_controller, ReplayResult
 from pam_actuation.replay.difference import Difference, difference
@@ -176,7 +176,7 @@ def replay_run(run: 'RecordedRun', controller: 'Controller | str | os.PathLike[s
     """
     preview = () if chain else preview_remark(run, controller)
     result = Replay(counterfactual=controller is not None, start_ns=run.start_ns,
-                    remarks=(*early_sentences([run]), *other_model(run, model),
+                    remarks=(*recording_remarks([run]), *other_model(run, model),
                              *valve_remark(controller), *preview))
     run = with_model(run, model)
     if chain:

@@ -29,8 +29,8 @@ import os
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
-from pam_actuation.bags.ending import early_sentences
 from pam_actuation.bags.metadata import name_of
+from pam_actuation.bags.oddities import recording_remarks
 from pam_actuation.control.config import load_controller
 from pam_actuation.control.modes.joint import JointController
 from pam_actuation.drivers.recorded import as_recorded
@@ -156,7 +156,7 @@ def replay_joint(run: Run, controller: 'Controller | str | os.PathLike[str] | No
     """
     path = str(run.path)
     other = other_model(run, model)     # another joint asks for other commands
-    remarks = (*early_sentences([run]), *other, *valve_remark(controller))
+    remarks = (*recording_remarks([run]), *other, *valve_remark(controller))
     run = with_model(run, model)
     if not run.metadata.get('rig'):
         raise InputError(f'the recording does not say which joint it is; {GIVE_MODEL}', path)

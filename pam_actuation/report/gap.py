@@ -29,7 +29,7 @@ from typing import Any, TYPE_CHECKING
 
 import numpy as np
 
-from pam_actuation.bags.ending import early_sentences
+from pam_actuation.bags.oddities import recording_remarks
 from pam_actuation.bags.writer import BagWriter
 from pam_actuation.experiments.separating import cell_would_tell, next_experiment, not_played
 from pam_actuation.experiments.separating_joint import in_joint
@@ -132,6 +132,7 @@ def gap_of(runs: 'Sequence[Run]', model: 'StrPath | Rig', certify: 'Run | None' 
         raise InputError('a gap look needs at least one recording')
     rig = model_for(runs[0], model)
     held = model_held(rig, runs)
+    recorded = recording_remarks([*runs, *([certify] if certify else [])])
     # Now, for a gain that is unknown is another one after its identification.
     runs, certify, remarks = all_commanded(runs, certify, rig)
     began, told = time.perf_counter(), options.pop('progress', lambda done: None)
@@ -161,7 +162,7 @@ def gap_of(runs: 'Sequence[Run]', model: 'StrPath | Rig', certify: 'Run | None' 
             has_cell = 'force' in result.signals
             result.remarks.append(INSEPARABLE + (A_CELL_WOULD if not has_cell and cell_would_tell(
                 rig, result.rivals, result.noise, recorded_pa, place) else '.'))
-    result.remarks += early_sentences([*runs, *([certify] if certify else [])])
+    result.remarks += recorded
     return result
 
 

@@ -71,7 +71,7 @@ def page(result: 'Identification', runs: 'Sequence[Run]') -> str:
     body = table(('number', 'status', 'value', '95 % interval'),
                  [(one.number.name, one.verdict, *one.shown()) for one in result.found])
     body += ''.join(paragraph(f'Known together: {c.text()}.') for c in result.combinations)
-    body += ''.join(paragraph(f'{remark}.', 'note') for remark in result.remarks)
+    body += ''.join(paragraph(f'{remark.rstrip(".")}.', 'note') for remark in result.remarks)
     if result.next_experiment is not None:
         body += paragraph(f'What to measure next: {result.next_experiment["why"]}.')
     profiles = paragraph(

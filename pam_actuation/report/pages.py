@@ -17,7 +17,7 @@
 from collections.abc import Sequence
 from typing import Any, TYPE_CHECKING
 
-from pam_actuation.bags.ending import early_sentences
+from pam_actuation.bags.oddities import recording_remarks
 from pam_actuation.report.errors import by_part
 from pam_actuation.report.full_valves import full_valves_section
 from pam_actuation.report.metrics import run_metrics, RunMetrics
@@ -145,9 +145,11 @@ def experiment_report(runs: 'Sequence[Run]', out_path: StrPath,
 
 
 def early_section(runs: 'Sequence[Run]') -> Section | None:
-    """Return the section that warns of runs that stopped early, None without any."""
-    found = early_sentences(runs)
-    return Section('ended', 'Stopped early', ''.join(map(paragraph, found))) if found else None
+    """Return the section that warns of runs that stopped early or are odd, None without any."""
+    found = recording_remarks(runs)
+    title = 'Remarks on the recordings' if any(
+        getattr(run, 'remarks', ()) for run in runs) else 'Stopped early'
+    return Section('ended', title, ''.join(map(paragraph, found))) if found else None
 
 
 def _implausible(runs: 'Sequence[tuple[str, Run]]') -> Section | None:

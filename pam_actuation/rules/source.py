@@ -43,7 +43,7 @@ class FoundRules:
     ``rules`` are shown; ``before`` those they started from, None for the initial ones kept
     in ``rules``; ``since`` names these in words. ``kind`` is 'rule file', 'controller' or
     'recording'; ``remarks`` are sentences on anything odd, ``implausible`` those of them on
-    values of the recording that cannot be right.
+    lost messages and on values of the recording that cannot be right.
     """
 
     title: str
@@ -110,10 +110,12 @@ def _of_recording(path: Path, namespace: str | None, recover: bool,
                   topics: Mapping[str, object] | None) -> FoundRules:
     """Return the rules of a recording, with what cannot be right in its values."""
     from pam_actuation.bags.load import load_run
+    from pam_actuation.bags.oddities import recording_remarks
     run = load_run(path, namespace=namespace, recover=recover, topics=topics)
     found = _of_run(run, path, progress)
-    return replace(found, remarks=(*run.implausible, *found.remarks),
-                   implausible=run.implausible)
+    return replace(found, remarks=(
+        *run.implausible, *recording_remarks([run]), *found.remarks),
+                   implausible=(*run.left_out, *run.implausible))
 
 
 def _of_run(run: 'RecordedRun', path: Path,

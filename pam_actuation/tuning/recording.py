@@ -26,7 +26,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
-from pam_actuation.bags.ending import ending_of
+from pam_actuation.bags.oddities import run_remarks
 from pam_actuation.control.config import load_controller
 from pam_actuation.control.modes.joint import JointController
 from pam_actuation.control.tick import RUNNING
@@ -164,7 +164,7 @@ def check_recordings(runs: 'Sequence[RecordedRun | Run]', rig: 'Rig | JointRig',
     """Return a RecordingCheck of every run for a model and a tuned controller."""
     checks = []
     for run in runs:
-        notes = [ending_of(run.metadata).sentence] * ending_of(run.metadata).early
+        notes = run_remarks(run)
         model, tuned = None, None
         try:
             model = check_model(run, rig)

@@ -288,4 +288,5 @@ class GapResult:
             'unexplained_fraction': self.unexplained_fraction,
             'fingerprint': self.fingerprint, 'minimum_detectable': self.minimum_detectable,
             'runtime_s': self.runtime_s, 'simulations': self.simulations,
-            'reason': self.reason, 'numbers_first': self.numbers_first})
+            'reason': self.reason, 'numbers_first': self.numbers_first,
+            'remarks': self.remarks})

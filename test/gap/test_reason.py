@@ -272,7 +272,7 @@ def test_another_run_of_the_same_clock_is_a_proof(run):
     ('refused', [], 1), ('effects', ['pressure: it cannot be right.'], 1)])
 def test_an_answer_ends_with_0_and_what_is_wrong_with_the_data_with_1(
         monkeypatch, tmp_path, capsys, verdict, implausible, code):
-    run = SimpleNamespace(implausible=implausible, unusable=())
+    run = SimpleNamespace(implausible=implausible, unusable=(), left_out=())
     monkeypatch.setattr('pam_actuation.report.joint_gap.load_run',
                         lambda path, namespace=None, topics=None: run)
     monkeypatch.setattr('pam_actuation.report.origin.origin', lambda *given: '')

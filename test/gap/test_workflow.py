@@ -276,7 +276,7 @@ def test_the_folder_holds_what_others_rely_on(two_effects):
         'schema', 'verdict', 'model', 'subsystems', 'proposal', 'surrogate', 'effects',
         'parameters', 'ambiguity_set', 'next_experiment', 'where', 'signals',
         'unexplained_fraction', 'fingerprint', 'minimum_detectable', 'runtime_s', 'simulations',
-        'reason', 'numbers_first', 'not_judged'}
+        'reason', 'numbers_first', 'remarks', 'not_judged'}
     assert set(found['subsystems']) == {'valve', 'muscle'}
     assert set(found['subsystems']['valve']) >= {'verdict', 'names', 'unexplained', 'unit'}
     assert set(found['signals']['pressure']) == {
