@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 HELD_TOPICS = (
     'valve_signal', 'valve_command', 'reference', 'pressure_command', 'followed_pressure',
     'controller_state')
+MEASURED_TOPICS = ('pressure', 'contraction', 'force')
 # A day at 1 kHz; stamps of a broken clock would ask for far more than memory holds.
 MAX_GRID_POINTS = 100_000_000
 LEAST_RATE_HZ, MOST_RATE_HZ = 0.1, 1e5       # of the rows of a data frame
@@ -185,11 +186,16 @@ class Run:
 
         """
         if topic not in self:
-            have = sorted(name for name in self.topics if name in self)
-            raise InputError(
-                f'has no `{topic}` messages{did_you_mean(topic, have)}; topics with messages: '
-                f'{", ".join(have) or "none"}', self.path)
+            raise InputError(self.why_not(topic), self.path)
         return self.topics[topic]
+
+    def why_not(self, topic: str) -> str:
+        """Return that a topic has no messages, and which topics have some."""
+        have = sorted(name for name in self.topics if name in self)
+        known = topic.rpartition('/')[2] in (*HELD_TOPICS, *MEASURED_TOPICS)
+        hint = '' if known else did_you_mean(topic, have)
+        return (f'has no `{topic}` messages{hint}; topics with messages: '
+                f'{", ".join(have) or "none"}')
 
     @property
     def start_ns(self) -> int:

@@ -39,7 +39,7 @@ from pam_actuation.bags.markers import markers_of
 from pam_actuation.bags.recorder import RECORDING_RECORD
 from pam_actuation.bags.recover import RECOVERY_RECORD
 from pam_actuation.bags.renamed import full_names
-from pam_actuation.bags.rig_topics import namespaces
+from pam_actuation.bags.rig_topics import namespaces, of_another_type
 from pam_actuation.bags.source import Bag, read_bag
 from pam_actuation.bags.topic_info import topic_info, TopicInfo
 from pam_actuation.bags.writer import EXPERIMENT_RECORD
@@ -170,6 +170,8 @@ def bag_info(path: StrPath, recover: bool = False, namespace: str | None = None,
     remarks += [f'{joint} has no messages on {MEASURED}: the analyses of a joint need it.'
                 for joint in half_joints(bag)]
     remarks += missing
+    remarks += [text for name, text in of_another_type(bag).items()
+                if name.rpartition('/')[0] in muscles or not muscles]
     ending = ending_of(experiment)
     if ending.early:
         remarks.append(ending.sentence)

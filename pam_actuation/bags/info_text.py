@@ -121,4 +121,6 @@ def _verdict(info: 'BagInfo') -> str:
         text = (
             f'Incomplete: {info.lost} messages lost, {info.dropped} dropped, '
             f'{info.missed_at_start} sent before the recorder was connected{absent}.')
+        if not (info.lost or info.dropped or info.missed_at_start or info.absent):
+            text = 'Incomplete: the recording broke off.'
     return text + (' Remarks:' if info.remarks else '')

@@ -20,7 +20,7 @@ used is returned, what is odd is said in ``remarks``.
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache, cached_property
 
 import numpy as np
@@ -30,11 +30,12 @@ from pam_actuation.bags.markers import is_marker, markers_of
 from pam_actuation.bags.oddities import Oddities
 from pam_actuation.bags.plausibility import (
     Implausible, not_finite, recorded_size, topic_findings)
-from pam_actuation.bags.rig_topics import is_read, is_rig_topic, namespaces
+from pam_actuation.bags.rig_topics import (
+    is_read, is_rig_topic, namespaces, of_another_type)
 from pam_actuation.bags.source import Bag, read_bag, TopicData
 from pam_actuation.messages import Marker, ReferenceTrajectory, VALVE_NAMES, valve_of
 from pam_actuation.topics.codec import decode
-from pam_actuation.topics.table import BY_NAME, KEPT, OF_A_RUN, TOLD, Topic
+from pam_actuation.topics.table import BY_NAME, KEPT, OF_A_RUN, short_name, TOLD, Topic
 from pam_sim.annotations import BoolArray, FloatArray, IntArray
 from pam_sim.errors import InputError
 from pam_sim.files import StrPath
@@ -62,6 +63,8 @@ class RecordedRun(Run):
         Those of the remarks that tell of lost messages, such as damaged ones.
     notes : tuple of str
         Sentences on what is harmless, such as stamps that repeat.
+    of_another_type : mapping of str to str
+        Short name to a sentence on each topic that was left out for its type or encoding.
     markers : tuple of Marker
         What a person set meanwhile, by stamp.
 
@@ -71,7 +74,13 @@ class RecordedRun(Run):
     remarks: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    of_another_type: Mapping[str, str] = field(default_factory=dict)
     markers: tuple[Marker, ...] = ()
+
+    def why_not(self, topic: str) -> str:
+        """Return why a topic has no messages, with the topics that have some."""
+        other = self.of_another_type.get(topic)
+        return other.rstrip('.') if other else super().why_not(topic)
 
     @property
     def valve(self) -> str:
@@ -140,7 +149,8 @@ def run_of(bag: Bag, path: StrPath, namespace: str | None = None) -> RecordedRun
     """Return the run of one muscle of a bag that was read; errors are those of ``load_run``."""
     chosen = _choose_namespace(bag, namespace)
     found = topics_of(bag, chosen)
-    odd = Oddities(list(bag.remarks))
+    others = of_another_type(bag, chosen)
+    odd = Oddities([*bag.remarks, *others.values()])
     series_of: dict[str, Series] = {}
     trajectories: tuple[ReferenceTrajectory, ...] = ()
     for short, topic in found.items():
@@ -154,15 +164,12 @@ def run_of(bag: Bag, path: StrPath, namespace: str | None = None) -> RecordedRun
         topics=series_of, metadata=bag.experiment, namespace=chosen, path=str(path),
         reference_trajectories=trajectories, remarks=tuple(odd.remarks),
         left_out=tuple(odd.left_out), notes=tuple(odd.notes),
+        of_another_type={short_name(name): text for name, text in others.items()},
         markers=tuple(marker for _, marker in markers_of(bag, chosen)))
 
 
 def topics_of(bag: Bag, namespace: str) -> dict[str, TopicData]:
-    """
-    Return short name to TopicData of the readable rig topics in a namespace.
-
-    Topics of another message type or encoding are left out, with a remark in the bag.
-    """
+    """Return short name to TopicData of the readable rig topics in a namespace."""
     found = {}
     for name, topic in bag.topics.items():
         parent, _, short = name.rpartition('/')
@@ -170,12 +177,6 @@ def topics_of(bag: Bag, namespace: str) -> dict[str, TopicData]:
             continue
         if is_rig_topic(topic):
             found[short] = topic
-            continue
-        remark = (
-            f'{name} is {topic.type_name} in {topic.encoding}, not '
-            f'{OF_A_RUN[short].type_name} in cdr: left out.')
-        if remark not in bag.remarks:
-            bag.remarks.append(remark)
     return found
 
 
@@ -201,6 +202,7 @@ def _choose_namespace(bag: Bag, wanted: str | None) -> str:
     hints = filter(None, (renamed.may_be(short, types) for short in ('pressure', 'contraction')))
     raise InputError('; '.join([
         'the bag has no messages on a pressure or contraction topic of a muscle', *hints,
+        *(text.rstrip('.') for text in of_another_type(bag).values()),
         f'its topics: {names}']), bag.path)
 
 

@@ -26,6 +26,27 @@ def is_rig_topic(topic: TopicData) -> bool:
     return _is_of_rig(topic.name, topic.type_name, topic.encoding)
 
 
+def of_another_type(bag: Bag, namespace: str | None = None) -> dict[str, str]:
+    """
+    Return full name to a sentence on each topic that is left out for its type or encoding.
+
+    Parameters
+    ----------
+    bag : Bag
+        A bag that was read.
+    namespace : str, optional
+        Of which muscle; by default any.
+
+    """
+    found = {}
+    for name, topic in bag.topics.items():
+        parent, _, short = name.rpartition('/')
+        if short in OF_A_RUN and namespace in (None, parent) and not is_rig_topic(topic):
+            found[name] = (f'{name} is {topic.type_name} in {topic.encoding}, not '
+                           f'{OF_A_RUN[short].type_name} in cdr: left out.')
+    return found
+
+
 def is_read(name: str, type_name: str, encoding: str) -> bool:
     """Return whether ``load_run`` makes numbers of a topic; the bytes of others are not kept."""
     return short_name(name) in OF_A_RUN and _is_of_rig(name, type_name, encoding)

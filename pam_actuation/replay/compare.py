@@ -212,8 +212,10 @@ def _why_not(run: 'RecordedRun', name: str,
         if 'controller_state' not in run or not (controller or run.metadata.get('controller')):
             return 'the bag has no recorded controller'
     elif name == 'driver':
-        if 'valve_signal' not in run or not os.path.exists(run.path):
-            return 'the run has no valve_signal or is not from a bag'
+        if 'valve_signal' not in run:
+            return run.why_not('valve_signal')
+        if not os.path.exists(run.path):
+            return 'the run is not from a bag'
     elif not run.metadata.get('rig'):
         return f'the bag does not say which rig it is; {GIVE_MODEL}'
     elif 'valve_signal' not in run and not ('pressure' in run and 'contraction' in run):

@@ -16,6 +16,7 @@
 
 import json
 
+from mcap.writer import Writer
 import numpy as np
 from pam_actuation import messages
 from pam_actuation.bags.load import load_run
@@ -24,10 +25,11 @@ from pam_actuation.bags.source import read_bag
 from pam_actuation.bags.writer import BagWriter, EXPERIMENT_RECORD
 from pam_actuation.cli.main import main
 from pam_actuation.topics.codec import decode, encode
+from pam_sim.errors import InputError
 import pytest
 from sample_bag import START_NS, write_bag
 
-PRESSURE = '/muscle/pressure'
+PRESSURE, CONTRACTION = '/muscle/pressure', '/muscle/contraction'
 # What is done to the pressure, the sentence and whether messages are lost.
 SPOILED = {
     'damaged': ('messages are not sensor_msgs/msg/FluidPressure, left out', True),
@@ -48,11 +50,13 @@ def spoiled_message(how, data, k, count):
     return encode('pressure', messages.Pressure(stamp_ns, one.pressure_pa))
 
 
-def spoiled_bag(bag, how, directory):
+def spoiled_bag(bag, how, directory, leave_out=''):
     """Copy a bag with a spoiled pressure; return its folder."""
     old = read_bag(bag)
     with BagWriter(directory, {EXPERIMENT_RECORD: old.experiment}) as writer:
         for name, topic in old.topics.items():
+            if name == leave_out:
+                continue
             writer.add_topic(name, topic.type_name)
             for k, (log_ns, data) in enumerate(zip(topic.log_time_ns.tolist(), topic.payloads)):
                 if name == PRESSURE:
@@ -124,3 +128,55 @@ def test_what_is_harmless_is_no_remark(tmp_path):
         'the stamp goes back 1 times, by up to 0.005 s; sorted by stamp.',
         '1 messages repeat the stamp before, kept.']
     assert np.all(np.diff(run['pressure'].stamp_ns) >= 0)
+
+
+def retyped(bag, directory, type_name='sensor_msgs/msg/JointState', encoding='cdr'):
+    """Copy a bag with a contraction of another type or encoding into one file; return it."""
+    old = read_bag(bag)
+    directory.mkdir()
+    with open(directory / 'run.mcap', 'wb') as stream:
+        writer = Writer(stream)
+        writer.start('ros2')
+        for name, topic in old.topics.items():
+            odd = name == CONTRACTION
+            channel = writer.register_channel(
+                name, encoding if odd else 'cdr', writer.register_schema(
+                    type_name if odd else topic.type_name, 'ros2msg', b''))
+            for log_ns, data in zip(topic.log_time_ns.tolist(), topic.payloads):
+                writer.add_message(channel, log_ns, data, log_ns)
+        writer.finish()
+    return directory / 'run.mcap'
+
+
+def test_a_topic_of_another_type_is_no_missing_one(bags, tmp_path, capsys):
+    bag = retyped(bags['whole'], tmp_path / 'bag', 'sensor_msgs/msg/FluidPressure')
+    sentence = (f'{CONTRACTION} is sensor_msgs/msg/FluidPressure in cdr, not '
+                'sensor_msgs/msg/JointState in cdr: left out')
+    model = ['--model', 'dmsp_5_300_hanging_mass']
+    for arguments, code in ((['replay', bag, '--only', 'plant', *model], 2), (['info', bag], 1),
+                            (['gap', bag, '--out', tmp_path / 'gap', *model], 1)):
+        assert main([str(word) for word in arguments]) == code
+        assert sentence in ''.join(capsys.readouterr()), arguments
+
+
+def test_an_encoding_that_is_not_read_is_named(bags, tmp_path):
+    bag = retyped(spoiled_bag(bags['whole'], 'damaged', tmp_path / 'copy', leave_out=PRESSURE),
+                  tmp_path / 'bag', encoding='json')
+    with pytest.raises(InputError, match=f'{CONTRACTION} is sensor_msgs/msg/JointState in json'):
+        load_run(bag)
+
+
+def test_what_is_not_there_is_told_without_another_quantity(bags, tmp_path, capsys):
+    for name, words in ((f'{PRESSURE}_command', 'has no `pressure_command` messages; topics'),
+                        ('/muscle/valve_signal', 'has no `valve_signal` messages; topics')):
+        bag = spoiled_bag(bags['whole'], 'stepped', tmp_path / name.rpartition('/')[2],
+                          leave_out=name)
+        assert main(['replay', str(bag), '--only', 'driver']) == 2
+        assert f'{words} with messages: ' in capsys.readouterr().err
+
+
+def test_a_recording_that_broke_off_says_no_zeros(bags, tmp_path, capsys):
+    data = next(bags['whole'].glob('*.mcap')).read_bytes()
+    (tmp_path / 'cut.mcap').write_bytes(data[:2 * len(data) // 3])
+    assert main(['info', str(tmp_path / 'cut.mcap')]) == 1
+    assert 'Incomplete: the recording broke off. Remarks:\n' in capsys.readouterr().out
