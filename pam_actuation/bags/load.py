@@ -39,10 +39,12 @@ from pam_actuation.topics.table import BY_NAME, KEPT, OF_A_RUN, short_name, TOLD
 from pam_sim.annotations import BoolArray, FloatArray, IntArray
 from pam_sim.errors import InputError
 from pam_sim.files import StrPath
-from pam_sim.run import Run, Series
+from pam_sim.run import MEASURED_TOPICS, Run, Series
 from pam_sim.units import unit_of
 
 _SIGNAL_NAMES = tuple(name for names in VALVE_NAMES.values() for name in names)
+# No message of these is meant for later, so a stamp far ahead is a mistake too.
+_STAMPED_AT_ONCE = {*MEASURED_TOPICS, 'joint_state', 'supply_pressure', 'valve_signal'}
 # Any clock that counts from 1970 is far above this; a simulation's may start at 0.
 _WALL_CLOCK_NS = 10**17
 NAMESPACE = '--namespace (in Python: namespace)'      # for messages
@@ -219,6 +221,8 @@ def read_series(short: str, topic: TopicData, odd: Oddities) -> Series:
         odd.leave_out(
             f'{topic.name}: {int(bad.sum())} messages are not {topic.type_name}, left out.')
     stamp_ns, keep = _checked_stamps(row, stamp_ns, keep, topic, odd)
+    if short in _STAMPED_AT_ONCE:
+        keep[keep] = odd.without_stray(topic.name, stamp_ns[keep], topic.log_time_ns[keep])
     if row.missing == KEPT:
         values = {name: values[name] for name in _SIGNAL_NAMES if name in values}
         if not values and len(stamp_ns):

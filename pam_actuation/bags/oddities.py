@@ -25,11 +25,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pam_actuation.bags.ending import ending_of
-from pam_sim.annotations import IntArray
+from pam_sim.annotations import BoolArray, IntArray
 from pam_sim.run import Run
 
 # Messages of two senders, or of two threads, overtake each other by less.
 USUAL_BACK_S = 0.1
+# A stray stamp is off by more than this and by so many periods of its topic.
+STRAY_S, STRAY_PERIODS = 1.0, 10
+# The largest share of a topic that is stray; more is the work of a clock. One always may be.
+STRAY_SHARE = 0.01
 
 
 @dataclass
@@ -57,6 +61,20 @@ class Oddities:
         self.remarks.append(sentence)
         self.left_out.append(sentence)
 
+    def without_stray(self, name: str, stamp_ns: IntArray, log_time_ns: IntArray) -> BoolArray:
+        """Return which messages of a topic to keep, and tell of stamps that are stray."""
+        found = np.flatnonzero(stray(stamp_ns, log_time_ns))
+        keep = np.ones(len(stamp_ns), dtype=bool)
+        if found.size:
+            keep[found] = False
+            first = int(found[0])
+            by_s = 1e-9 * float(stamp_ns[first] - np.median(stamp_ns[max(first - 2, 0):first + 3]))
+            self.leave_out(
+                f'{name}: {found.size} messages have a stamp far from those around them (stamp '
+                f'{1e-9 * float(stamp_ns[first]):.3f} s, {abs(by_s):.1f} s '
+                f'{"ahead" if by_s > 0.0 else "behind"}), left out.')
+        return keep
+
     def tell_stamps(self, name: str, stamp_ns: IntArray) -> None:
         """Tell of the stamps of a topic, in the order of recording, that go back or repeat."""
         steps_ns = np.diff(stamp_ns)
@@ -80,3 +98,40 @@ def run_remarks(run: Run) -> list[str]:
 def recording_remarks(runs: Iterable[Run]) -> list[str]:
     """Return what to know of the recordings behind an answer, each sentence with its path."""
     return [f'{run.path}: {remark}' for run in runs for remark in run_remarks(run)]
+
+
+def stray(stamp_ns: IntArray, log_time_ns: IntArray) -> BoolArray:
+    """
+    Return which few stamps of a topic are far from those around them.
+
+    The receive times must tell that the message came in its turn.
+
+    Parameters
+    ----------
+    stamp_ns, log_time_ns : array of int
+        Stamps and receive times, in the order of recording.
+
+    """
+    none = np.zeros(len(stamp_ns), dtype=bool)
+    if len(stamp_ns) < 5 or not (np.diff(stamp_ns) < 0).any() and not _ends_jump(stamp_ns):
+        return none
+    delay_ns = log_time_ns - stamp_ns
+    period_ns = float(np.median(np.abs(np.diff(stamp_ns))))
+    if 2.0 * float(np.median(np.abs(np.diff(delay_ns)))) > period_ns:
+        return none             # receive times that tell nothing
+    far_ns = max(1e9 * STRAY_S, STRAY_PERIODS * period_ns)
+    found: BoolArray = (_off_ns(stamp_ns) > far_ns) & (_off_ns(delay_ns) > far_ns)
+    return found if found.sum() <= max(1, STRAY_SHARE * len(found)) else none
+
+
+def _off_ns(times_ns: IntArray) -> IntArray:
+    """Return how far each is from the median of itself and two neighbours on either side."""
+    padded = np.pad(times_ns, 2, mode='reflect')
+    around = np.lib.stride_tricks.sliding_window_view(padded, 5)
+    return np.abs(times_ns - np.sort(around, axis=1)[:, 2])
+
+
+def _ends_jump(stamp_ns: IntArray) -> bool:
+    """Return whether the first or last stamp is far from its neighbour."""
+    first_ns, last_ns = np.diff(stamp_ns)[[0, -1]]
+    return bool(max(first_ns, last_ns) > 1e9 * STRAY_S)

@@ -14,13 +14,14 @@
 
 """What is odd in a recording stands beside every answer that rests on it."""
 
+from dataclasses import replace
 import json
 
 from mcap.writer import Writer
 import numpy as np
 from pam_actuation import messages
 from pam_actuation.bags.load import load_run
-from pam_actuation.bags.oddities import recording_remarks
+from pam_actuation.bags.oddities import recording_remarks, stray
 from pam_actuation.bags.source import read_bag
 from pam_actuation.bags.writer import BagWriter, EXPERIMENT_RECORD
 from pam_actuation.cli.main import main
@@ -180,3 +181,65 @@ def test_a_recording_that_broke_off_says_no_zeros(bags, tmp_path, capsys):
     (tmp_path / 'cut.mcap').write_bytes(data[:2 * len(data) // 3])
     assert main(['info', str(tmp_path / 'cut.mcap')]) == 1
     assert 'Incomplete: the recording broke off. Remarks:\n' in capsys.readouterr().out
+
+
+def strayed(bag, directory, name, by_ns, which):
+    """Copy a bag with other stamps of some messages of a topic, by index; return its folder."""
+    old = read_bag(bag)
+    short = name.rpartition('/')[2]
+    with BagWriter(directory, {EXPERIMENT_RECORD: old.experiment}) as writer:
+        for topic in old.topics.values():
+            writer.add_topic(topic.name, topic.type_name)
+            chosen = {k % len(topic.payloads) for k in which if topic.name == name}
+            for k, (log_ns, data) in enumerate(zip(topic.log_time_ns.tolist(), topic.payloads)):
+                if k in chosen:
+                    one = decode(short, data)
+                    data = encode(short, replace(one, stamp_ns=one.stamp_ns + by_ns))
+                writer.write(topic.name, data, log_ns, log_ns)
+    return directory
+
+
+@pytest.mark.parametrize('name, by_s, which, words', [
+    (PRESSURE, 20, [500], '20.0 s ahead'), (PRESSURE, 400_000_000, [0], 'ahead'),
+    (CONTRACTION, -3600, [-1], 'behind'), (CONTRACTION, 20, [100, 101, 900], '20.0 s ahead'),
+    ('/muscle/valve_signal', 400_000_000, [300], '400000000.0 s ahead')])
+def test_a_stray_stamp_is_left_out(bags, tmp_path, name, by_s, which, words):
+    run = load_run(strayed(bags['whole'], tmp_path / 'bag', name, by_s * 10**9, which))
+    whole = load_run(bags['whole'])
+    short = name.rpartition('/')[2]
+    told, = run.left_out
+    assert f'{name}: {len(which)} messages have a stamp far from' in told and words in told
+    kept = np.delete(np.arange(len(whole[short])), which)
+    np.testing.assert_array_equal(run[short].stamp_ns, whole[short].stamp_ns[kept])
+    for key, column in whole[short].values.items():
+        np.testing.assert_array_equal(run[short].values[key], column[kept])
+
+
+@pytest.mark.parametrize('by_s, which', [
+    (0.5, [500]),                       # less than the shortest that is stray
+    (20, range(500, 900)),              # a clock that was set, and set back
+    (20, range(500, 10_000))])          # a clock that was set
+def test_a_clock_that_was_set_is_not_stray(bags, tmp_path, by_s, which):
+    count = len(load_run(bags['whole'])['pressure'])
+    run = load_run(strayed(bags['whole'], tmp_path / 'bag', PRESSURE, int(by_s * 1e9),
+                           [k for k in which if k < count]))
+    assert run.left_out == () and len(run['pressure']) == count
+
+
+def test_messages_that_came_late_are_not_stray():
+    """Their stamps are right; nor are receive times of use that all messages share."""
+    stamp_ns = np.arange(1000) * 4_000_000
+    for late in (slice(995, 1000), slice(0, 3), slice(200, 950)):
+        late_ns = stamp_ns.copy()
+        late_ns[late] = late_ns[late].max() + 3_000_000_000
+        assert not stray(stamp_ns, np.maximum.accumulate(late_ns)).any()
+    with_hole_ns = stamp_ns + 60_000_000_000 * (np.arange(1000) > 0)
+    assert not stray(with_hole_ns, np.zeros(1000, dtype=np.int64)).any()
+    assert not stray(with_hole_ns, with_hole_ns + 300_000).any()
+
+
+def test_a_stray_stamp_does_not_make_gap_refuse(bags, tmp_path, capsys):
+    bag = strayed(bags['whole'], tmp_path / 'bag', '/muscle/valve_signal', 4 * 10**17, [300])
+    assert main(asked('gap', bag, tmp_path)) == 1
+    found = json.loads((tmp_path / 'gap' / 'gap.json').read_text())
+    assert found['verdict'] == 'no_gap' and '400000000.0 s ahead' in found['remarks'][-1]
