@@ -26,6 +26,7 @@ import math
 from operator import attrgetter
 from typing import Any, Generic, TYPE_CHECKING, TypeVar
 
+from pam_actuation.disturbance import Disturbance
 from pam_actuation.messages import (
     Contraction, Force, JointAngle, Pressure, SAFE_EFFORTS, Torque, VALVE_NAMES, ValveSignal)
 from pam_sim.sensors import SensorChain
@@ -259,6 +260,8 @@ class PlantLoop(PlantClock):
     ----------
     muscles : dict of str to PlantMuscle
         By their place as in ``Rig.muscles``.
+    disturbance : Disturbance
+        On its load or limb.
 
     """
 
@@ -273,7 +276,8 @@ class PlantLoop(PlantClock):
         self._encoder: Encoder | None = None
         if '' not in rig.muscles:       # of a joint
             self._encoder = Encoder((seed, len(rig.muscles)))
-        self._external = 0.0        # force on a load [N], torque on a limb [N m]
+        self.disturbance = Disturbance(
+            'external_torque' if self._encoder else 'external_force', self.dt_ns)
 
     @property
     def topics(self) -> tuple[str, ...]:
@@ -295,18 +299,21 @@ class PlantLoop(PlantClock):
         self.muscles[place].signal.take(message, writer, self.now_ns or 0)
 
     def set_external_force(self, message: Force) -> None:
-        """Take the disturbance force on the load [N]; not finite is ignored."""
-        if math.isfinite(message.force_n):
-            self._external = float(message.force_n)
+        """Take the disturbance force on the load [N], for its stamp."""
+        self.disturbance.take(message.stamp_ns, message.force_n, self.now_ns)
 
     def set_external_torque(self, message: Torque) -> None:
-        """Take the disturbance torque on the limb [N m]; not finite is ignored."""
-        if math.isfinite(message.torque_n_m):
-            self._external = float(message.torque_n_m)
+        """Take the disturbance torque on the limb [N m], for its stamp."""
+        self.disturbance.take(message.stamp_ns, message.torque_n_m, self.now_ns)
 
     def step(self, count: int) -> None:
         """Advance the plant by some steps with the signals held."""
-        self.plant.step(*map(_EFFORTS, self._signals), self._external, steps=count)
+        for steps in self.disturbance.parts(count, self.now_ns):
+            self.plant.step(*map(_EFFORTS, self._signals), self.disturbance.acts, steps=steps)
+
+    def problems(self, now_ns: int) -> list[str]:
+        """Return what is wrong with what it takes, a sentence each."""
+        return [text for text in (self.disturbance.problem(now_ns),) if text]
 
     def sample(self, now_ns: int) -> dict[str, Any]:
         """

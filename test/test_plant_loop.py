@@ -16,6 +16,8 @@
 
 import math
 
+from pam_actuation.loops.bus import Bus
+from pam_actuation.loops.wiring import attach_plant
 from pam_actuation.messages import Force, Torque, ValveSignal
 from pam_actuation.plant_loop import Backlog, PlantLoop
 import pam_sim
@@ -131,6 +133,81 @@ def test_external_torque_turns_the_limb():
         plant.advance_to(START + 250 * MS)
         held.append(plant.plant.angle_rad)
     assert held[1] > held[0] + 0.1
+
+
+def contraction_after(stamps_and_forces, at_ms):
+    """Return the contraction [m] at some times; each force is sent at the start."""
+    plant, found = make(), []
+    plant.set_signal(ValveSignal(0, ('ppr_voltage',), (4.0,)))
+    for stamp_ms, force_n in stamps_and_forces:
+        plant.set_external_force(Force(START + stamp_ms * MS, force_n))
+    for now_ms in at_ms:
+        plant.advance_to(START + now_ms * MS)
+        found.append(plant.plant.contraction_m)
+    return found
+
+
+@pytest.mark.parametrize('at_ms', [range(4, 600, 4), range(7, 600, 97), range(200, 600, 200)])
+def test_a_force_stamped_ahead_acts_from_its_stamp_on_however_often_the_plant_is_called(at_ms):
+    plant, expected = make(), []
+    plant.set_signal(ValveSignal(0, ('ppr_voltage',), (4.0,)))
+    for now_ms in at_ms:
+        for stamp_ms, force_n in ((300, 10.0), (450, 0.0)):
+            if stamp_ms < now_ms:
+                plant.advance_to(START + stamp_ms * MS)
+                plant.set_external_force(Force(0, force_n))
+        plant.advance_to(START + now_ms * MS)
+        expected.append(plant.plant.contraction_m)
+    assert contraction_after([(450, 0.0), (300, 10.0)], at_ms) == expected
+    assert contraction_after([(300, 7.0), (450, 0.0), (300, 10.0)], at_ms) == expected
+    assert expected != contraction_after([], at_ms)
+
+
+def test_a_torque_stamped_ahead_waits_as_well():
+    angles_rad = []
+    for stamp_ms in (100, 10):
+        plant = PlantLoop(load_joint('joint_dmsp_5_300_realistic', valve='ppr'))
+        plant.advance_to(START)
+        plant.takes()['external_torque'](Torque(START + stamp_ms * MS, 0.3))
+        plant.advance_to(START + 100 * MS)
+        before_rad = plant.plant.angle_rad
+        plant.advance_to(START + 250 * MS)
+        angles_rad.append((before_rad, plant.plant.angle_rad))
+    assert angles_rad[0][0] < angles_rad[1][0] - 0.05
+    assert angles_rad[0][0] < angles_rad[0][1] - 0.05
+
+
+def test_a_force_too_far_ahead_is_refused_told_and_not_kept():
+    plant = make()
+    plant.set_external_force(Force(START + 10_000 * MS, 1.0))
+    assert plant.disturbance.waiting == 1 and plant.problems(START) == []
+    plant.set_external_force(Force(START + 10_001 * MS, 1.0))
+    assert plant.disturbance.waiting == 1 and plant.disturbance.refused == 1
+    assert plant.problems(START + 999 * MS) == [
+        'an external_force was ignored: it is stamped 10.001 s ahead (limit 10 s)']
+    assert plant.problems(START + 1001 * MS) == []
+    for k in range(1100):
+        plant.set_external_force(Force(START + 5000 * MS + k, 1.0))
+    assert plant.disturbance.waiting == 1000 and plant.disturbance.refused == 102
+    assert '1000 that lie ahead' in plant.problems(START)[0]
+
+
+def test_a_valve_signal_stamped_ahead_is_never_delayed():
+    plant = make()
+    plant.set_signal(ValveSignal(START + 5000 * MS, ('ppr_voltage',), (3.0,)))
+    plant.advance_to(START + 500 * MS)
+    assert plant.plant.pressure_pa > P_ATM_PA + 200e3
+
+
+def test_on_a_bus_a_force_stamped_ahead_lets_the_valve_signals_before_it_act():
+    plant, bus = PlantLoop(pam_sim.load_rig('dmsp_5_300_hanging_mass', valve='ppr')), Bus()
+    bus.add(attach_plant(bus, plant), range(START, START + 400 * MS, 4 * MS))
+    bus.step()
+    bus.send('external_force', Force(START + 350 * MS, 5.0), START)
+    bus.send('valve_signal', ValveSignal(START, ('ppr_voltage',), (3.0,)), START)
+    bus.run_until(START + 300 * MS)
+    assert plant.now_ns == START + 300 * MS
+    assert plant.plant.pressure_pa > P_ATM_PA + 200e3
 
 
 def test_late_call_is_bounded_and_counted():

@@ -55,6 +55,7 @@ class Bus:
         self._ticks: list[Tick] = []                # of each loop: what is called
         self._times: list[Iterator[int]] = []       # and when
         self._due: list[tuple[int, int]] = []       # heap of (time, loop)
+        self.now_ns = 0                             # of the last delivery
 
     def connect(self, topic: str, take: Take) -> None:
         """Have ``take(message)`` called with every message of a topic."""
@@ -72,7 +73,7 @@ class Bus:
 
     def deliver(self, now_ns: int) -> None:
         """Hand over what has arrived."""
-        on_the_way = self._on_the_way
+        self.now_ns, on_the_way = now_ns, self._on_the_way
         while on_the_way and on_the_way[0][0] <= now_ns:
             _, take, message = on_the_way.popleft()
             take(message)

@@ -77,11 +77,12 @@ def attach_plant(bus: Bus, plant: Plant) -> Tick:
     """
     Have a plant on a clock take its topics; return its tick, which measures.
 
-    A message acts from its stamp on, where physics has not passed that yet.
+    A message acts from its stamp on, where physics has not passed that yet. A valve signal whose
+    stamp lies ahead acts at once, and a disturbance waits in the plant.
     """
     def from_its_stamp(apply: Take) -> Take:
         def take(message: Message) -> None:
-            plant.advance_to(message.stamp_ns)
+            plant.advance_to(min(message.stamp_ns, bus.now_ns))
             apply(message)
         return take
 

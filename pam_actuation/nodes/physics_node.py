@@ -18,8 +18,8 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, TYPE_CHECKING
 
-from pam_actuation.messages import Message
-from pam_actuation.nodes.diagnostics import Values
+from pam_actuation.messages import ACTIVE, Message
+from pam_actuation.nodes.diagnostics import OK, Values, WARN
 from pam_actuation.nodes.endpoints import PolledSubscription
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.timing import Latency
@@ -38,7 +38,8 @@ class PhysicsNode(ManagedNode):
     """
     Run ``plant``, a ``PlantLoop``, up to the present at every tick.
 
-    What arrives acts from its own stamp on if physics has not passed it yet, else at once.
+    What arrives acts from its own stamp on if physics has not passed it yet, else at once. A
+    valve signal whose stamp lies ahead acts at once as well, and a disturbance waits for it.
     How old it then is stands in the diagnostics, for the whole run (``input.latency``).
     Derived nodes have the parameters ``seed`` and ``publish_rate_hz`` and call ``set_up`` with
     their rig.
@@ -107,17 +108,23 @@ class PhysicsNode(ManagedNode):
             if self.simulated_time is None and self._latency is not None:
                 self._latency.add(now_ns - plain.stamp_ns)
         self.plant.advance_to(now_ns)
+        problems = self.plant.problems(now_ns)
+        self.diagnostics.update(WARN if problems else OK, '; '.join((ACTIVE, *problems)))
         if self.plant.steps == self._sampled_steps:
             return {}
         self._sampled_steps = self.plant.steps
         return self.plant.sample(now_ns)
 
     def diagnostic_values(self) -> Values:
-        """Add how the physics keeps up with the clock."""
+        """Add the disturbances ahead, and how the physics keeps up with the clock."""
         values = super().diagnostic_values()
         if self.plant is None:
             return values
         if self._latency is not None:
             values = (*values, *self._latency.values('input.latency'))
-        return (*values, ('physics.steps', self.plant.steps),
+        disturbance = self.plant.disturbance
+        return (*values, ('disturbances.waiting', disturbance.waiting),
+                ('disturbances.refused', disturbance.refused),
+                ('disturbances.refusal', disturbance.refusal),
+                ('physics.steps', self.plant.steps),
                 ('physics.skipped_s', f'{self.plant.skipped_s:.3f}'))

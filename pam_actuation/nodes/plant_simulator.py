@@ -39,6 +39,7 @@ class PlantSimulator(PhysicsNode):
 
     At every tick the physics runs up to the present. A valve signal or a disturbance acts from
     its own stamp on, or at once if the physics has passed that time. It is held without limit.
+    With a stamp ahead of the clock, a valve signal acts at once and a disturbance at its stamp.
     With use_sim_time the plant makes the time and is the only publisher of ``/clock``.
     """
 

@@ -51,7 +51,7 @@ class SuppliedPlant(PlantLoop):
     def step(self, count):
         """Advance; a regulator without supply lets the air back into the line, as at 0 V."""
         if self.rig.valve == 'ppr' and self._usual_pa:
-            self.plant.step((0.0,), self._external, steps=count)
+            self.plant.step((0.0,), self.disturbance.acts, steps=count)
         else:
             super().step(count)
 
