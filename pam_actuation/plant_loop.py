@@ -22,13 +22,13 @@ its sensors on request. The simulator nodes and the offline simulation use it.
 
 from collections.abc import Callable, Hashable, Iterable
 from functools import partial
-import math
 from operator import attrgetter
 from typing import Any, Generic, TYPE_CHECKING, TypeVar
 
 from pam_actuation.disturbance import Disturbance
+from pam_actuation.held_signal import HeldSignal
 from pam_actuation.messages import (
-    Contraction, Force, JointAngle, Pressure, SAFE_EFFORTS, Torque, VALVE_NAMES, ValveSignal)
+    Contraction, Force, JointAngle, Pressure, Torque, ValveSignal)
 from pam_sim.sensors import SensorChain
 from pam_sim.sensors.encoder import Encoder
 from pam_sim.units import NS_PER_S
@@ -39,57 +39,6 @@ if TYPE_CHECKING:
     from pam_sim.rig import Rig
 
 _EFFORTS = attrgetter('efforts')
-SAFE_COUNTS_NS = 100_000_000     # a safe signal against the openings of others
-
-
-class HeldSignal:
-    """
-    The valve signal that acts: the last effort of each name, held without limit.
-
-    Where several send, as a driver and somebody who should not, one of them saying *vent* is
-    enough: its safe signal acts for 0.1 s, whatever the others say. Of two openings the later
-    one acts, as on a valve.
-
-    Parameters
-    ----------
-    valve : {'ppr', 'hsv'}
-
-    """
-
-    def __init__(self, valve: str) -> None:
-        self._names = VALVE_NAMES[valve]
-        self._safe = SAFE_EFFORTS[valve]
-        self._last = self.efforts = (0.0,) * len(self._names)
-        # writer to the time until which its safe signal counts
-        self._safe_until_ns: dict[Hashable, int] = {}
-        self.taken = 0
-        self.ignored = 0
-
-    def take(self, message: ValveSignal, writer: Hashable = None, now_ns: int = 0) -> None:
-        """
-        Take efforts by name; anything not finite or unknown is ignored and counted.
-
-        ``writer`` is who sent it, None where that is not known; ``now_ns`` the time of the plant.
-        """
-        self.taken += 1
-        efforts = list(self._last)
-        for name, effort in zip(message.names, message.efforts):
-            if name in self._names and math.isfinite(effort):
-                efforts[self._names.index(name)] = float(effort)
-            else:
-                self.ignored += 1
-        self._last = self.efforts = tuple(efforts)
-        if writer is not None and self._another_vents(writer, now_ns):
-            self.efforts = self._safe
-
-    def _another_vents(self, writer: Hashable, now_ns: int) -> bool:
-        if self._last == self._safe:
-            self._safe_until_ns[writer] = now_ns + SAFE_COUNTS_NS
-        else:
-            self._safe_until_ns.pop(writer, None)
-        self._safe_until_ns = {one: until_ns for one, until_ns in self._safe_until_ns.items()
-                               if now_ns <= until_ns <= now_ns + SAFE_COUNTS_NS}
-        return bool(self._safe_until_ns.keys() - {writer})
 
 
 class PlantMuscle:
@@ -313,7 +262,9 @@ class PlantLoop(PlantClock):
 
     def problems(self, now_ns: int) -> list[str]:
         """Return what is wrong with what it takes, a sentence each."""
-        return [text for text in (self.disturbance.problem(now_ns),) if text]
+        texts = [muscle.signal.problem(f'{place}valve_signal', now_ns)
+                 for place, muscle in self.muscles.items()]
+        return [text for text in (*texts, self.disturbance.problem(now_ns)) if text]
 
     def sample(self, now_ns: int) -> dict[str, Any]:
         """

@@ -26,7 +26,8 @@ ROOT = Path(__file__).resolve().parent.parent
 LAYERS = (
     ('messages', 'topics', 'namespaces', 'resources', 'interrupts', 'exit_timer', 'kept_folders',
      'parallel', 'priority', 'random_levels', 'ros_missing', 'slow_rise', 'transport', 'control',
-     'disturbance', 'drivers', 'loops', 'bags', 'hardware', 'plant_loop', 'workers'),
+     'disturbance', 'drivers', 'held_signal', 'loops', 'bags', 'hardware', 'plant_loop',
+     'workers'),
     ('experiments', 'replay', 'tuning', 'valves', 'rules', 'tables', 'rig_files'),
     ('report', 'models', 'view'),
     ('campaign',),

@@ -92,6 +92,38 @@ def test_of_several_senders_one_that_vents_is_enough(valve, opening, safe):
     assert acts(105, 'stranger', opening) == opening
 
 
+@pytest.mark.parametrize('names, efforts, got', [
+    (('fill_duty', 'vent_duty'), (0.5, 0.0), 'fill_duty, vent_duty'),
+    ((), (), 'no names'),
+    (('ppr_voltage',), (math.nan,), 'ppr_voltage nan'),
+    (('a', 'ppr_voltage'), (1.0,), 'a, ppr_voltage nan'),
+    (tuple('abcdef'), (1.0,) * 6, 'a, b, c, d, 2 more')])
+def test_a_plant_that_can_use_nothing_of_its_signal_says_what_it_got_and_needs(
+        names, efforts, got):
+    plant = make('ppr')
+    told = [f'nothing of valve_signal can be used: it has {got}; this PPR valve needs ppr_voltage']
+
+    def problems(at_ms, *signal):
+        plant.advance_to(START + at_ms * MS)
+        plant.set_signal(ValveSignal(0, *signal))
+        return plant.problems(START + at_ms * MS)
+
+    assert problems(100, names, efforts) == [] and problems(599, names, efforts) == []
+    assert problems(600, names, efforts) == told and plant.problems(START + 5000 * MS) == told
+    assert plant.muscles[''].signal.unusable == 3
+    assert problems(700, ('x', 'ppr_voltage'), (1.0, 2.0)) == []
+    assert problems(1500, names, efforts) == [] and problems(2000, names, efforts) == told
+
+
+def test_a_joint_names_the_muscle_whose_signal_it_cannot_use():
+    plant = PlantLoop(load_joint('joint_dmsp_5_300_realistic', valve='hsv'))
+    plant.advance_to(START)
+    plant.takes()['extensor/valve_signal'](ValveSignal(0, ('ppr_voltage',), (1.0,)))
+    assert plant.problems(START + 600 * MS) == [
+        'nothing of extensor/valve_signal can be used: it has ppr_voltage; '
+        'this HSV valve needs fill_duty, vent_duty']
+
+
 def test_ppr_reaches_its_pressure():
     """3 V give 300 kPa gauge and the contraction of the force map."""
     plant = make()

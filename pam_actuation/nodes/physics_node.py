@@ -116,14 +116,16 @@ class PhysicsNode(ManagedNode):
         return self.plant.sample(now_ns)
 
     def diagnostic_values(self) -> Values:
-        """Add the disturbances ahead, and how the physics keeps up with the clock."""
+        """Add what could not be used or waits, and how the physics keeps up with the clock."""
         values = super().diagnostic_values()
         if self.plant is None:
             return values
         if self._latency is not None:
             values = (*values, *self._latency.values('input.latency'))
+        unusable = ((f'{place}valve_signal.unusable', muscle.signal.unusable)
+                    for place, muscle in self.plant.muscles.items())
         disturbance = self.plant.disturbance
-        return (*values, ('disturbances.waiting', disturbance.waiting),
+        return (*values, *unusable, ('disturbances.waiting', disturbance.waiting),
                 ('disturbances.refused', disturbance.refused),
                 ('disturbances.refusal', disturbance.refusal),
                 ('physics.steps', self.plant.steps),

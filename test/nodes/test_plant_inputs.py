@@ -21,7 +21,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 from live_rig import LiveRig, wait_for                                      # noqa: E402, I100
-from pam_actuation.messages import Force, LEVEL_OK, LEVEL_WARN              # noqa: E402
+from pam_actuation.messages import Force, LEVEL_OK, LEVEL_WARN, ValveSignal  # noqa: E402
 from pam_actuation.topics.codec import Writer                               # noqa: E402
 
 pytestmark = pytest.mark.ros
@@ -76,3 +76,20 @@ def test_a_force_too_far_ahead_is_told_and_does_nothing(rig):
     wait_for(lambda: rig.health['plant_simulator'][-1].level == LEVEL_OK, 5.0, 'its end')
     assert rig.health['plant_simulator'][-1].message == 'active'
     assert first_pulled(rig, now_ns, rest_n + 4.0) is None
+
+
+def test_a_signal_of_another_valve_is_told_until_one_that_can_be_used(rig):
+    def level():
+        send(rig, 'valve_signal', signal)
+        time.sleep(0.01)
+        return rig.health['plant_simulator'][-1].level
+
+    signal = ValveSignal(time.time_ns(), ('fill_duty', 'vent_duty'), (0.5, 0.0))
+    wait_for(lambda: level() == LEVEL_WARN, 10.0, 'the warning')
+    told = rig.health['plant_simulator'][-1]
+    assert told.message == ('active; nothing of valve_signal can be used: it has fill_duty, '
+                            'vent_duty; this PPR valve needs ppr_voltage')
+    assert int(told.values['valve_signal.unusable']) > 0
+    signal = ValveSignal(time.time_ns(), ('ppr_voltage',), (1.0,))
+    wait_for(lambda: level() == LEVEL_OK, 5.0, 'its end')
+    assert rig.health['plant_simulator'][-1].message == 'active'
