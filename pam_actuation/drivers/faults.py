@@ -76,7 +76,12 @@ FAULT_TABLE = (
     Fault('two_publishers', 'Two publishers on pressure_command',
           f'{_HEARD_TWICE}; or two or more commands in {_LIMITS.two_publishers_window_s:g} s '
           'with a stamp or publisher sequence number that goes backwards, or with equal stamps '
-          'and different values', VENT, False,
+          'and different values, unless they are known to come from one publisher', VENT, False,
+          f'no such command for {_LIMITS.two_publishers_clear_s:g} s, ' + _RAMP),
+    Fault('command_clock', 'Stamps of a single publisher of commands do not rise',
+          f'two or more commands in {_LIMITS.two_publishers_window_s:g} s with a stamp that goes '
+          'backwards, or with equal stamps and different values, all from one writer (by its '
+          'GID), whose clock may have been set back', VENT, False,
           f'no such command for {_LIMITS.two_publishers_clear_s:g} s, ' + _RAMP),
     Fault('second_driver', 'Second sender of valve_signal',
           'a message on valve_signal from a writer (by its GID) that is neither the driver nor, '

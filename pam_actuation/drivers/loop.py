@@ -163,6 +163,10 @@ class DriverLoop:
         """Tell of a second sender: (key in ``FAULTS``, sentence), None where there is none."""
         self.safety.sender_fault = fault
 
+    def set_commander(self, name_of: Callable[[int], str]) -> None:
+        """Tell who names, at a time [ns], the only publisher of commands; '' for several."""
+        self.safety.commander = name_of
+
     def vented_elsewhere(self, now_ns: int) -> None:
         """Tell that another node, such as the watchdog, sent the signal that vents."""
         self.safety.vented_elsewhere(now_ns)

@@ -23,6 +23,7 @@ certified safety function.
 """
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
 import math
 import re
@@ -98,6 +99,8 @@ class SafetySupervisor:
         self.publishers = 1
         self.publisher_names = ''
         self.sender_fault: Fault | None = None      # of a second sender, as senders.py tells
+        # Names the only publisher of commands at a time; '' for several, or if not known.
+        self.commander: Callable[[int], str] | None = None
         self.command_stamp_ns: int | None = None
         self.command_pa = math.nan
         # of a pair of valves, where it is commanded itself
@@ -351,6 +354,10 @@ class SafetySupervisor:
     def _command_fault(self, now_ns: int, grace_s: float) -> Fault | None:
         lim = self.limits
         if self.order.mixed(now_ns):
+            who = self.commander(now_ns) if self.commander is not None else ''
+            if who:
+                return 'command_clock', (f'the commands of {who}, their only publisher, have '
+                                         'stamps that do not rise, look at its clock')
             return 'two_publishers', ('two publishers send pressure_command (stamps or sequence '
                                       'numbers go back and forth), stop one of them')
         if not self._seen_command:

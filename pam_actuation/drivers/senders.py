@@ -197,6 +197,12 @@ class DriverSenders:
                 return key, two_send(topic, [self._name_of(topic, one) for one in rivals])
         return None
 
+    def commander(self, now_ns: int) -> str:
+        """Return the name of the only writer of commands heard lately, '' for none or several."""
+        heard = [(topic, one) for topic in ('pressure_command', 'valve_command')
+                 for one in self.topics[topic].active(now_ns)]
+        return told([self._name_of(*heard[0])]) if len(heard) == 1 else ''
+
 
 def two_send(topic: str, names: list[str]) -> str:
     """Return the sentence on several nodes that send on one topic."""

@@ -129,6 +129,10 @@ class DriverEar:
         """Return (key in ``FAULTS``, sentence) of a second sender, None where there is none."""
         return self._senders.fault(now_ns)
 
+    def commander(self, now_ns: int) -> str:
+        """Return the name of the only writer of commands heard lately, '' for none or several."""
+        return self._senders.commander(now_ns)
+
     def publishers(self, topic: str, full_topic: str) -> tuple[int, str]:
         """
         Return how many publishers of a topic send or may yet, and their names as words.

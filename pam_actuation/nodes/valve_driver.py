@@ -148,6 +148,7 @@ class ValveDriver(ManagedNode):
             self.raw_commands = self.add_subscription('valve_command', writers=True)
         self.pressures = self.add_subscription('pressure', writers=True)
         self.ear = DriverEar(self, self._watchdog)
+        loop.set_commander(self.ear.commander)
         self.supplies = self.add_subscription('supply_pressure')
         self.contractions = None
         if loop.uses_contraction:

@@ -14,6 +14,7 @@
 
 """Every fault of one muscle of a joint vents both, and the joint comes back calmly."""
 
+import itertools
 import math
 
 from faulty_joint import FaultyJoint, MS_NS, RATE_HZ
@@ -93,6 +94,14 @@ def _two_senders(rig, side):
         rig.run(0.05)
 
 
+def _command_clock(rig, side):
+    """Let every second command of the only controller be stamped 30 ms back."""
+    behind_ns = itertools.cycle((0, 30 * MS_NS))
+    rig.drivers[side].safety.commander = lambda now_ns: '/joint_controller'
+    rig.spoil[f'{side}/pressure_command'] = lambda sound: Pressure(
+        sound.stamp_ns - next(behind_ns), sound.pressure_pa)
+
+
 def _one_sender(rig, side):
     rig.drivers[side].set_sender_fault(None)
 
@@ -167,6 +176,7 @@ ROWS = {
     'device_refuses': _latched(_device_refuses),
     'no_command': (_no_command, _silent('')[1]),
     'command_timeout': _silent('pressure_command'),
+    'command_clock': (_command_clock, _silent('')[1]),
     'second_driver': (_second_driver, _one_sender),
     'two_senders': (_two_senders, _one_sender),
     'valve_command_interrupted': _latched(_interrupted),

@@ -43,8 +43,8 @@ def changed_rows():
     ('frozen_after_s', 0.3, {'pressure_frozen'}),
     ('frozen_change_pa', 50e3, {'pressure_frozen'}),
     ('pause_s', 0.4, {'driver_paused', 'clock_ahead'}),
-    ('two_publishers_window_s', 0.6, {'two_publishers'}),
-    ('two_publishers_clear_s', 2.0, {'two_publishers'}),
+    ('two_publishers_window_s', 0.6, {'two_publishers', 'command_clock'}),
+    ('two_publishers_clear_s', 2.0, {'two_publishers', 'command_clock'}),
     ('supply_margin_pa', 25e3, {'supply_low'})])
 def test_the_table_tells_the_limits_of_the_supervisor(monkeypatch, name, value, rows):
     assert changed_rows() == set()

@@ -211,6 +211,30 @@ def test_two_publishers_by_stamp_and_by_sequence():
         assert bench.last(300).state == OK
 
 
+@pytest.mark.parametrize('equal', [False, True])
+def test_stamps_of_a_single_publisher_that_do_not_rise_are_told_as_its_clock(equal):
+    bench = Bench()
+    bench.run(100)
+    bench.safety.commander = lambda now_ns: '/muscle/own'
+    bench.command = None
+    for k in range(30):
+        bench.now += 5 * MS
+        bench.safety.on_pressure(bench.now, P_ATM_PA + k)
+        stamp_ns = bench.now - (0 if equal else k % 2 * 30 * MS)
+        bench.safety.on_command(stamp_ns, P_ATM_PA + 2e5, 2 * k)
+        if equal:
+            bench.safety.on_command(stamp_ns, P_ATM_PA + 3e5, 2 * k + 1)
+        decision = bench.safety.tick(bench.now)
+    assert decision.state == VENTED and decision.fault == 'command_clock'
+    assert decision.message == ('vented because the commands of /muscle/own, their only '
+                                'publisher, have stamps that do not rise, look at its clock')
+    bench.safety.commander = lambda now_ns: ''      # another one was heard as well
+    assert bench.last(10).fault == 'two_publishers'
+    bench.command = P_ATM_PA + 2e5
+    assert bench.last(880).state == VENTED
+    assert bench.last(300).state == OK
+
+
 @pytest.mark.parametrize('sequence', [0, 2 ** 64 - 1, None])
 def test_middleware_without_sequence_numbers(sequence):
     """A constant number means unknown, not two publishers."""

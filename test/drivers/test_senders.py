@@ -125,6 +125,19 @@ def test_the_fault_names_whom_the_driver_saw():
     assert key == 'second_driver' and 'another node named /muscle/valve_driver' in text
 
 
+def test_the_only_one_who_commands_is_known_by_who_was_heard_on_both_topics():
+    senders = driver_senders()
+    assert senders.commander(0) == ''
+    now_ns = heard(senders.topics['pressure_command'], [b'a', b'a'])
+    assert senders.commander(now_ns) == '/muscle/sofc_controller'
+    senders.topics['valve_command'].heard(b'b', now_ns)
+    assert senders.commander(now_ns) == ''
+    now_ns = heard(senders.topics['valve_command'], [b'?'], begin_ms=5000)
+    assert senders.commander(now_ns) == 'a program without a node name'
+    senders.topics['pressure_command'].heard(None, now_ns)
+    assert senders.commander(now_ns + 1001 * MS) == ''
+
+
 @pytest.mark.parametrize('valve', ['ppr', 'hsv'])
 def test_the_driver_vents_for_a_second_sender_and_rises_slowly_afterwards(valve):
     driver = DriverLoop(valve)

@@ -159,6 +159,26 @@ def test_two_controllers_are_vented_and_named(rig, commander):
     wait_until_followed(rig)
 
 
+def test_a_single_controller_whose_clock_steps_back_is_not_called_two(rig):
+    back_ns = 0
+    own = Stranger(rig, 'pressure_command', lambda now_ns: Pressure(now_ns - back_ns, COMMAND_PA))
+    try:
+        wait_until_followed(rig)
+        time.sleep(1.1)             # the controller of another test has gone for longer than 1 s
+        since, begin_s, back_ns = len(rig.health['valve_driver']), time.monotonic(), 80_000_000
+        assert first_said(rig, 'valve_driver', [
+            'the commands of /muscle/listener, their only publisher, have stamps that do not '
+            'rise, look at its clock'], begin_s) < ALLOWED_S
+        assert is_safe(rig.heard['valve_signal'][-1].plain)
+        assert rig.health['valve_driver'][-1].values['fault'] == 'command_clock'
+        back_ns = 0
+        wait_until_followed(rig)
+        said = [one.message for one in rig.health['valve_driver'][since:]]
+        assert not [one for one in said if 'two publishers' in one], said
+    finally:
+        own.end()
+
+
 def test_two_pressure_sensors_are_vented_and_named(rig, commander):
     wait_until_followed(rig)
     stranger = Stranger(rig, 'pressure', lambda now_ns: Pressure(now_ns, 4e5 + now_ns % 100))
