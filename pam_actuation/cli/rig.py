@@ -120,8 +120,9 @@ def _new(args: argparse.Namespace) -> int:
         if table is not None:
             described.force_map_off = off_in_table(table)
             described.force_map_unknown = unknown_in_table(table)
-        if table is not None and args.muscle is None and not described.dimensions:
-            described.dimensions.update(size_in_table(table))
+        if table is not None and args.muscle is None and not (
+                described.dimensions.keys() & {'length_m', 'bore_m'}):
+            described.dimensions = {**size_in_table(table), **described.dimensions}
         described.work_out()
         text, rig = rig_file(described, args.out)
         write_text(args.out, text)

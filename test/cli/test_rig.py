@@ -304,6 +304,12 @@ def test_a_table_of_pam_characterise_tells_the_size_of_its_muscle(folder):
     assert (muscle.length_m, muscle.bore_m) == (0.25, 0.01)
     stated = new('--force-map', 'map.csv', '--length-mm', '200', '--overwrite').muscle
     assert (stated.length_m, stated.bore_m) == (0.2, 0.005)
+    for option, value, name in (('--max-strain', '0.3', 'max_strain'),
+                                ('--angle-deg', '25', 'braid_angle_rad')):
+        muscle = new('--force-map', 'map.csv', option, value, '--overwrite').muscle
+        assert (muscle.length_m, muscle.bore_m) == (0.25, 0.01)
+        assert getattr(muscle, name) == pytest.approx(
+            0.3 if name == 'max_strain' else math.radians(25.0))
 
 
 @pytest.mark.parametrize('name', regulator_names())
