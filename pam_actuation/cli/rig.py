@@ -56,7 +56,8 @@ def add_arguments(parser: Parser) -> None:
                         metavar='DEG', help='angle between thread and axis at rest')
     parser.add_argument('--max-strain', type=number(0.05, 0.5), default=None, metavar='SHARE',
                         help='largest contraction, as a share of the length at rest (default: '
-                        '0.25; with another --angle-deg what the braid allows)')
+                        '0.25; with another --angle-deg what the braid allows; that of the force '
+                        'map, if larger)')
     parser.add_argument('--force-map', type=source, default=None, metavar='FILE.csv',
                         help='static table of the muscle, as "pam characterise" writes it, or '
                         'force over pressure and length as others measure it')
@@ -103,12 +104,12 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _new(args: argparse.Namespace) -> int:
-    from pam_actuation.rig_files.force_map import (
-        off_in_table, size_in_table, unknown_in_table)
+    from pam_actuation.rig_files.force_map import describe_table
     from pam_actuation.rig_files.questions import ask_description
     from pam_actuation.rig_files.text import rig_file
     from pam_sim.errors import InputError
     from pam_sim.files import write_text
+    from pam_sim.muscle.table_remarks import table_remarks
     if not args.out.endswith(('.yaml', '.yml')):
         raise InputError('a rig file ends in .yaml', f'--out {args.out}')
     check_outputs(args, args.out)
@@ -116,16 +117,12 @@ def _new(args: argparse.Namespace) -> int:
     if _nothing_said(args) and not args.json and sys.stdin.isatty() and sys.stdout.isatty():
         described = ask_description(read_line, print)
     with _force_map(args, described) as (table, remarks):
-        described.force_map = table or described.force_map
         if table is not None:
-            described.force_map_off = off_in_table(table)
-            described.force_map_unknown = unknown_in_table(table)
-        if table is not None and args.muscle is None and not (
-                described.dimensions.keys() & {'length_m', 'bore_m'}):
-            described.dimensions = {**size_in_table(table), **described.dimensions}
+            describe_table(described, table)
         described.work_out()
         text, rig = rig_file(described, args.out)
         write_text(args.out, text)
+    remarks = [*remarks, *table_remarks(rig.muscle)]
     following = _following(rig, args.out)
     lines = [f'rig file: {args.out}', *_numbers_text(rig), *_law_text(rig),
              *remarks, f'next: {following}']
@@ -235,9 +232,11 @@ def _check(args: argparse.Namespace) -> int:
     from pam_actuation.rig_files.by_size import nominal_beside_size
     from pam_sim import load_rig
     from pam_sim.idle import idle_remarks
+    from pam_sim.muscle.table_remarks import table_remarks
     from pam_sim.rig_text import rig_title
     rig = load_rig(args.file)
-    remarks = [*nominal_beside_size(rig), *idle_remarks(args.file, rig)]
+    remarks = [*nominal_beside_size(rig), *table_remarks(rig.muscle),
+               *idle_remarks(args.file, rig)]
     size = f'muscle of {1e3 * rig.muscle.bore_m:.4g} mm by {1e3 * rig.muscle.length_m:.4g} mm'
     lines = [rig_title(rig), f'{size}, load {rig.load}, valve {rig.valve}', *_numbers_text(rig),
              *_exact_text(rig), *(f'remark: {text}' for text in remarks)]

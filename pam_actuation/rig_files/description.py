@@ -22,7 +22,7 @@ from pam_actuation.rig_files.by_size import by_size, BySize, DAMPING, nearest_mu
 from pam_actuation.rig_files.numbers import Stated
 from pam_sim.errors import InputError
 from pam_sim.muscle.geometry import (
-    BORE_M as NOMINAL_BORE_M, BRAID_ANGLE_RAD, most_strain)
+    BORE_M as NOMINAL_BORE_M, BRAID_ANGLE_RAD, MAX_STRAIN, most_strain)
 from pam_sim.muscle.muscle import DIMENSIONS, get_muscle
 from pam_sim.parameters import Parameter
 from pam_sim.rig_parameters import rig_parameters
@@ -54,6 +54,8 @@ class Description:
         Path of a table that ``pam characterise`` wrote.
     force_map_off : float
         How far it is off the points it was made from, as a fraction of the largest force.
+    force_map_strain : float
+        Its largest contraction, as a fraction of the length.
     force_map_unknown : list of str
         Sentences on what the table does not know.
     load, valve, volume : str
@@ -77,6 +79,7 @@ class Description:
     dimensions: dict[str, float] = field(default_factory=dict)
     force_map: str | None = None
     force_map_off: float = 0.0
+    force_map_strain: float = 0.0
     force_map_unknown: list[str] = field(default_factory=list)
     load: str = 'hanging_mass'
     valve: str = 'ppr'
@@ -104,9 +107,7 @@ class Description:
             A dimension or number out of range, or one that was said twice.
 
         """
-        angle_rad = self.dimensions.get('braid_angle_rad')
-        if angle_rad is not None and angle_rad != BRAID_ANGLE_RAD:
-            self.dimensions.setdefault('max_strain', round(most_strain(angle_rad), 3))
+        self._end_of_contraction()
         for dimension in DIMENSIONS:
             if dimension.name in self.dimensions:
                 dimension.check(self.dimensions[dimension.name], 'muscle')
@@ -125,6 +126,18 @@ class Description:
         if not self.dimensions:
             return self.muscle
         return {'like': self.muscle, **self.dimensions}
+
+    def _end_of_contraction(self) -> None:
+        """Fill in what the braid allows, or what the force map shows if that is more."""
+        if 'max_strain' in self.dimensions:
+            return
+        angle_rad = self.dimensions.get('braid_angle_rad', BRAID_ANGLE_RAD)
+        end = MAX_STRAIN if angle_rad == BRAID_ANGLE_RAD else round(most_strain(angle_rad), 3)
+        if self.force_map_strain > end:
+            end = self.force_map_strain
+            self.notes['max_strain'] = 'not stated: the largest contraction of the force map'
+        if end != MAX_STRAIN:
+            self.dimensions['max_strain'] = end
 
     def _nearest(self) -> str:
         bore = self.dimensions.get('bore_m')

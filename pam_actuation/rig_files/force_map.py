@@ -19,13 +19,17 @@ from contextlib import contextmanager
 import math
 import os
 import re
+from typing import TYPE_CHECKING
 
 from pam_actuation.tables.separated import rows_of_text
 from pam_sim.errors import InputError
 from pam_sim.files import check_file
 from pam_sim.muscle.geometry import BRAID_ANGLE_RAD
 from pam_sim.muscle.lookup_table import COLUMNS, read_commented_csv, read_table
+from pam_sim.muscle.table_remarks import max_strain_in
 
+if TYPE_CHECKING:
+    from pam_actuation.rig_files.description import Description
 
 _SIZE = re.compile(r'^muscle of length (\d+(?:\.\d+)?) mm(?:, bore (\d+(?:\.\d+)?) mm)?', re.M)
 
@@ -63,6 +67,20 @@ def off_in_table(path: str) -> float:
 def unknown_in_table(path: str) -> list[str]:
     """Return what the comments of a table say is not known, as ``pam characterise`` writes it."""
     return _UNKNOWN.findall(read_commented_csv(path)[1])
+
+
+def describe_table(described: 'Description', path: str) -> None:
+    """
+    Take into a description what a table says of itself.
+
+    Its size counts where neither muscle nor length nor bore is stated.
+    """
+    described.force_map = path
+    described.force_map_off = off_in_table(path)
+    described.force_map_unknown = unknown_in_table(path)
+    described.force_map_strain = max_strain_in(read_table(path))
+    if described.muscle is None and not described.dimensions.keys() & {'length_m', 'bore_m'}:
+        described.dimensions = {**size_in_table(path), **described.dimensions}
 
 
 @contextmanager

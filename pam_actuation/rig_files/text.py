@@ -113,8 +113,9 @@ def _muscle(described: Description, force_map: str) -> list[str]:
         lines.append(f'muscle: {data}')
     else:
         lines.append('muscle:')
-        lines += [f'  {key}: {value!r}' if isinstance(value, float) else f'  {key}: {value}'
-                  for key, value in data.items()]
+        for key, value in data.items():
+            lines += _comment(described.notes.get(key, ''), '  ')
+            lines.append(f'  {key}: {repr(value) if isinstance(value, float) else value}')
         if END.name not in data:
             lines.append(_line(END, END.default, True))
     if force_map:
