@@ -122,7 +122,7 @@ def _new(args: argparse.Namespace) -> int:
         described.work_out()
         text, rig = rig_file(described, args.out)
         write_text(args.out, text)
-    remarks = [*remarks, *table_remarks(rig.muscle)]
+    remarks = list(dict.fromkeys([*remarks, *table_remarks(rig.muscle)]))
     following = _following(rig, args.out)
     lines = [f'rig file: {args.out}', *_numbers_text(rig), *_law_text(rig),
              *remarks, f'next: {following}']

@@ -29,6 +29,7 @@ from pam_sim.characterise.tables import loads_of_table, MeasuredTable
 from pam_sim.errors import InputError
 from pam_sim.joint import load_rig_or_joint
 from pam_sim.muscle.lookup_table import LookupTable
+from pam_sim.muscle.table_remarks import vented_remarks
 from pam_sim.rig import Rig
 from pam_sim.run import Run
 from pam_sim.short_repr import short_repr
@@ -252,6 +253,8 @@ def _finish(result: Characterisation, smallest_n: float) -> None:
     if smallest_n > 0.05:
         result.remarks.append(
             'No run that was kept had 0 N: that column was extrapolated from the others.')
+    law = result.surfaces.law()
+    result.remarks += vented_remarks(law, law.table)
     if result.surfaces.unknown:
         result.remarks.append(result.surfaces.unknown)
         result.provenance.append(f'not known: {result.surfaces.unknown}')

@@ -15,12 +15,18 @@
 """What a reader should know of a measured table before it is the force law of a muscle."""
 
 import math
+from typing import TYPE_CHECKING
 
+import numpy as np
 from pam_sim.muscle.lookup_table import LookupTable
 from pam_sim.muscle.muscle import DIMENSIONS, Muscle
 
+if TYPE_CHECKING:
+    from pam_sim.muscle.law import MuscleLaw
+
 _END = next(one for one in DIMENSIONS if one.name == 'max_strain')
 _WORTH_A_REMARK = 1e-3      # of contraction, beyond the end of the muscle
+_PULLS = 0.01               # of the largest force; a vented muscle that pulls less is at rest
 
 
 def max_strain_in(table: LookupTable) -> float:
@@ -28,13 +34,27 @@ def max_strain_in(table: LookupTable) -> float:
     return min(math.ceil(round(1e4 * float(table.strain.max()), 3)) / 1e4, _END.upper)
 
 
+def vented_remarks(law: 'MuscleLaw', table: LookupTable) -> list[str]:
+    """Return a sentence where a table begins so high that a vented muscle would still pull."""
+    lowest_pa, highest_pa = table.pressure_gauge_pa[[0, -1]]
+    pull_n, most_n = law.force_n(np.array([lowest_pa, highest_pa]), 0.0, 'allow')
+    return [] if lowest_pa <= 0.0 or pull_n <= _PULLS * most_n else [
+        f'The table begins at {1e-3 * lowest_pa:.0f} kPa, and below that its edge is used: a '
+        f'vented muscle would still pull {pull_n:.3g} N at rest. Measure at 0 kPa as well, or add '
+        'rows of pressure 0 to the measured table: force 0 at every length, or contraction 0 '
+        'under every load.']
+
+
 def table_remarks(muscle: Muscle) -> list[str]:
-    """Return a sentence on what a muscle leaves of its table; none where its law is a formula."""
-    table = getattr(muscle.law.law, 'table', None)
+    """Return what a reader should know of the table of a muscle; none of a law with a formula."""
+    law = muscle.law.law
+    table = getattr(law, 'table', None)
     if not isinstance(table, LookupTable):
         return []
-    reach = max_strain_in(table)
-    return [] if reach <= muscle.max_strain + _WORTH_A_REMARK else [
-        f'The table goes to {100.0 * reach:.4g} % contraction, but max_strain ends the muscle at '
-        f'{100.0 * muscle.max_strain:.4g} %. If the muscle contracts further, state max_strain: '
-        f'{reach:g}.']
+    found, reach = vented_remarks(law, table), max_strain_in(table)
+    if reach > muscle.max_strain + _WORTH_A_REMARK:
+        found.append(
+            f'The table goes to {100.0 * reach:.4g} % contraction, but max_strain ends the muscle '
+            f'at {100.0 * muscle.max_strain:.4g} %. If the muscle contracts further, state '
+            f'max_strain: {reach:g}.')
+    return found

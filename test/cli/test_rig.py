@@ -312,36 +312,6 @@ def test_a_table_of_pam_characterise_tells_the_size_of_its_muscle(folder):
             0.3 if name == 'max_strain' else math.radians(25.0))
 
 
-def forces_of(folder, begin_kpa=0):
-    """Write a force map of 20 mm by 180 mm up to 30 % contraction, from a pressure on."""
-    lines = ['pressure_kPa,length_mm,force_N']
-    for kpa in range(begin_kpa, 601, 100):
-        lines += [f'{kpa},{180.0 * (1.0 - 0.01 * percent):.2f},'
-                  f'{max(0.0, 1.5 * kpa * (1.0 - percent / 30.0)):.3f}'
-                  for percent in range(0, 31, 3)]
-    (folder / 'forces.csv').write_text('\n'.join(lines) + '\n')
-    return '--force-map', 'forces.csv', '--length-mm', '180', '--bore-mm', '20'
-
-
-def test_a_table_beyond_25_percent_moves_the_end_of_the_muscle(folder, capsys):
-    options = forces_of(folder)
-    rig = new(*options, '--known', 'mass_kg=0.1')
-    assert 0.29 < rig.muscle.max_strain <= 0.301
-    assert 'the largest contraction of the force map' in open('made.yaml', encoding='utf-8').read()
-    assert 'max_strain' not in capsys.readouterr().out
-    assert main(['rig', 'check', 'made.yaml']) == 0
-    assert 'max_strain' not in capsys.readouterr().out
-    # What the braid allows is more.
-    rig = new(*options, '--angle-deg', '25', '--overwrite')
-    assert rig.muscle.max_strain == pytest.approx(0.363)
-    capsys.readouterr()
-    assert new(*options, '--max-strain', '0.2', '--overwrite').muscle.max_strain == 0.2
-    assert main(['rig', 'check', 'made.yaml']) == 0
-    said = re.findall(r'The table goes to (.+) % contraction, but max_strain ends the muscle at '
-                      r'(.+) %\.', capsys.readouterr().out)
-    assert said == [said[0]] * 2 and 29.0 < float(said[0][0]) <= 30.1 and said[0][1] == '20'
-
-
 @pytest.mark.parametrize('name', regulator_names())
 def test_a_data_sheet_gives_the_pressures_and_asks_for_what_it_lacks(name, capsys):
     sheet = get_regulator(name)

@@ -1,0 +1,82 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""``pam rig`` with a table: what the file takes from it, and what a reader is told of it."""
+
+import re
+
+from pam_actuation.cli.main import main
+from pam_sim.muscle.law import ExtrapolationWarning
+import pytest
+from test_rig import new
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def forces_of(folder, begin_kpa=0):
+    """Write a force map of 20 mm by 180 mm up to 30 % contraction, from a pressure on."""
+    lines = ['pressure_kPa,length_mm,force_N']
+    for kpa in range(begin_kpa, 601, 100):
+        lines += [f'{kpa},{180.0 * (1.0 - 0.01 * percent):.2f},'
+                  f'{max(0.0, 1.5 * kpa * (1.0 - percent / 30.0)):.3f}'
+                  for percent in range(0, 31, 3)]
+    (folder / 'forces.csv').write_text('\n'.join(lines) + '\n')
+    return '--force-map', 'forces.csv', '--length-mm', '180', '--bore-mm', '20'
+
+
+def test_a_table_above_0_kpa_says_what_a_vented_muscle_would_pull(folder, capsys):
+    said = ('The table begins at 100 kPa, and below that its edge is used: a vented muscle would '
+            'still pull 150 N at rest. Measure at 0 kPa as well')
+    size = ('--length-m', '0.18', '--bore-m', '0.02', '--overwrite')
+    options = forces_of(folder, begin_kpa=100)
+    assert main(['characterise', 'forces.csv', *size, '--out', 'surfaces']) == 0
+    assert capsys.readouterr().out.count(said) == 1
+    for some in (options, ('--force-map', 'surfaces/lookup.csv')):
+        rig = new(*some, '--overwrite')
+        assert capsys.readouterr().out.count(said) == 1
+        assert main(['rig', 'check', 'made.yaml']) == 0
+        assert capsys.readouterr().out.count(said) == 1
+        with pytest.warns(ExtrapolationWarning):
+            assert float(rig.muscle.law.law.force_n(0.0, 0.0)) == pytest.approx(150.0, rel=0.01)
+    # What the remark says to add is enough.
+    text = (folder / 'forces.csv').read_text()
+    (folder / 'forces.csv').write_text(text + ''.join(
+        f'0,{row.split(",")[1]},0\n' for row in text.splitlines() if row.startswith('100,')))
+    rig = new(*options, '--overwrite')
+    assert main(['rig', 'check', 'made.yaml']) == 0
+    assert 'vented' not in capsys.readouterr().out
+    assert float(rig.muscle.law.law.force_n(0.0, 0.0)) < 1.0
+
+
+def test_a_table_beyond_25_percent_moves_the_end_of_the_muscle(folder, capsys):
+    options = forces_of(folder)
+    rig = new(*options, '--known', 'mass_kg=0.1')
+    assert 0.29 < rig.muscle.max_strain <= 0.301
+    assert 'the largest contraction of the force map' in open('made.yaml', encoding='utf-8').read()
+    assert 'max_strain' not in capsys.readouterr().out
+    assert main(['rig', 'check', 'made.yaml']) == 0
+    assert 'max_strain' not in capsys.readouterr().out
+    # What the braid allows is more.
+    rig = new(*options, '--angle-deg', '25', '--overwrite')
+    assert rig.muscle.max_strain == pytest.approx(0.363)
+    capsys.readouterr()
+    assert new(*options, '--max-strain', '0.2', '--overwrite').muscle.max_strain == 0.2
+    assert main(['rig', 'check', 'made.yaml']) == 0
+    said = re.findall(r'The table goes to (.+) % contraction, but max_strain ends the muscle at '
+                      r'(.+) %\.', capsys.readouterr().out)
+    assert said == [said[0]] * 2 and 29.0 < float(said[0][0]) <= 30.1 and said[0][1] == '20'
