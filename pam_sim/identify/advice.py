@@ -14,7 +14,7 @@
 
 """Which experiment would determine what the recordings leave open: predicted, not guessed."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 import math
 from typing import Any
@@ -152,8 +152,8 @@ def where_open(numbers: Sequence[Number], intervals: Sequence[Interval], statuse
 
 def next_experiment(rig: Rig, wanted: Sequence[Number], acting: Sequence[Number],
                     information: FloatArray, offers: Sequence[Offer], has_force: bool,
-                    progress: Callable[[float], object] = lambda done: None
-                    ) -> dict[str, Any] | None:
+                    progress: Callable[[float], object] = lambda done: None,
+                    determined: Collection[str] = ()) -> dict[str, Any] | None:
     """
     Return the first experiment that determines all numbers, else the one that determines most.
 
@@ -171,6 +171,8 @@ def next_experiment(rig: Rig, wanted: Sequence[Number], acting: Sequence[Number]
         Whether there is a load cell.
     progress : callable
         Told the share that is done, 0 to 1.
+    determined : iterable of str
+        Names of the numbers that the recordings determine; no experiment is proposed for them.
 
     Returns
     -------
@@ -182,7 +184,7 @@ def next_experiment(rig: Rig, wanted: Sequence[Number], acting: Sequence[Number]
     places = [wanted.index(n) for n in acting]
     whole[np.ix_(places, places)] = information
     noise = _noise(offers)
-    known_before = _narrow(rig, wanted, whole)
+    known_before = {*_narrow(rig, wanted, whole), *determined}
     best: tuple[int, Proposal, list[str]] | None = None
     offered = proposals(rig, has_force, recorded_gauge_pa(
         one.recording.measured['pressure'] for one in offers))
@@ -192,7 +194,7 @@ def next_experiment(rig: Rig, wanted: Sequence[Number], acting: Sequence[Number]
         gained = [n for n in after if n not in known_before]
         if gained and (best is None or len(gained) > best[0]):
             best = (len(gained), proposal, gained)
-        if len(after) == len(wanted):
+        if len({*after, *determined}) == len(wanted):
             break
     if best is None:
         return None

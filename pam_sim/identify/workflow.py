@@ -168,7 +168,8 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
                                      for one in first], x, information)
         result.next_experiment = next_experiment(
             with_values(rig, numbers, weighted.values(x)), wanted, acting, information,
-            offers, with_force, _part(progress, 0.95, 1.0))
+            offers, with_force, _part(progress, 0.95, 1.0),
+            [one.number.name for one in numbers_found if one.is_narrow])
     progress(1.0)
     return result
 

@@ -76,6 +76,19 @@ def test_an_experiment_that_would_not_lift_the_load_is_not_the_next_one():
         assert 'the recordings stayed below' in found['why']
 
 
+def test_no_experiment_is_proposed_for_what_is_determined():
+    run = record(RIG, gauge_pa=(50e3, 400e3, 100e3), keep=('pressure', 'contraction'))
+    every = [MASS, MAP, SPRING]
+    given = RIG, every, [], np.zeros((0, 0)), [offer_of(run, RIG)], False
+    first = next_experiment(*given)
+    assert len(first['determines']) > 1
+    for name in first['determines']:
+        left = next_experiment(*given, determined=[name])
+        assert name not in left['determines'] and left['determines']
+        assert name not in left['why']
+    assert next_experiment(*given, determined=[n.name for n in every]) is None
+
+
 @pytest.mark.parametrize('ends, said', [
     ((False, False), '95 %: 1 to 3 kg'), ((True, False), '95 %: up to 3 kg'),
     ((False, True), '95 %: 1 kg or more'), ((True, True), 'anywhere in its range')])
