@@ -27,6 +27,10 @@ from pam_sim.rig import Rig
 
 ANOTHER_LAW = ('muscle and load leave a clear gap with the stated force law. If it was measured '
                'on another muscle, state it as unknown: pam rig new --unknown law')
+OF_A_TABLE = ('muscle and load leave a clear gap with the stated table of forces. A table has no '
+              'coefficients to find: {}let pam gap look for the effect that is missing, or '
+              'measure the table of this muscle')
+STRENGTH = 'state its strength as unknown (pam rig new --unknown force_map_gain), '
 # (problem, signal, mean square in noise floors) of every signal.
 Squares = list[tuple[SubsystemProblem, str, float]]
 
@@ -90,7 +94,9 @@ def of_another_law(rig: Rig, left: Squares) -> list[str]:
     clear = any(p.subsystem == 'muscle' and square > CRITERIA.clear_rest for p, _, square in left)
     if not clear or rig.unknown_of_law:
         return []
-    return [ANOTHER_LAW]
+    if rig.law_list:
+        return [ANOTHER_LAW]
+    return [OF_A_TABLE.format('' if 'force_map_gain' in rig.unknown else STRENGTH)]
 
 
 def _what_shows(number: Number) -> str:

@@ -81,7 +81,8 @@ def stated_names(choice: LawChoice, name: str, where: str = '') -> tuple[str, ..
     found = leading(choice)
     if not found:
         raise InputError(f'law `{choice.name}` is a table without coefficients; allowed: a law '
-                         'with a formula', where)
+                         'with a formula. The strength of a table is `force_map_gain`; state that '
+                         'as unknown', where)
     return found
 
 

@@ -138,3 +138,14 @@ def test_the_look_begins_with_all_unknown_numbers_but_the_law():
     assert not remarks and [one.number.name for one in found.found] == ['mass_kg']
     assert better.unknown == ('law.a3',)
     assert numbers_first([run], RIG.with_(tolerance={'law.a3': math.inf}), False)[1] is None
+
+
+def test_a_clear_gap_of_a_table_asks_for_what_can_be_unknown_of_it():
+    left = [(SimpleNamespace(subsystem='muscle'), 'contraction', 400.0)]
+    rig = RIG.with_(muscle=RIG.muscle.with_law('lookup'))
+    (asked,) = remarks.of_another_law(rig, left)
+    assert '--unknown law' not in asked and '--unknown force_map_gain' in asked
+    assert 'force_map_gain' in {p.name for p in rig.number_list}
+    (asked,) = remarks.of_another_law(
+        rig.with_(tolerance={'force_map_gain': math.inf}), left)
+    assert '--unknown' not in asked and 'pam gap' in asked

@@ -71,7 +71,8 @@ def test_a_value_beyond_the_range_of_its_set_widens_it():
     ('sarosi', 'dmsp_10', '{law.a9: unknown}', 'law.a'),
     ('sarosi', 'dmsp_10', '{law: sure}', '`law` is `sure`; allowed: '),
     ('sarosi', 'dmsp_10', '{law.a3: 2.0}', 'law.a3'),
-    ('lookup', 'dmsp_5_300', '{law: unknown}', 'table without coefficients')])
+    ('lookup', 'dmsp_5_300', '{law: unknown}', 'table without coefficients'),
+    ('lookup', 'dmsp_5_300', '{law: unknown}', 'is `force_map_gain`; state that as unknown')])
 def test_a_mistake_is_told(law, chosen, tolerance, said):
     with pytest.raises(InputError) as caught:
         load_rig(RIG.format(law=law, set=chosen, tolerance=tolerance))
