@@ -46,6 +46,7 @@ def run(args: argparse.Namespace) -> int:
     from pam_actuation.report.joint_page import joint_report
     from pam_actuation.report.origin import default_page, origin
     from pam_actuation.report.pages import bag_report
+    from pam_actuation.report.sections.over_seeds import same_remarks
     out = args.out or default_page(args.bag, args.overwrite)
     if args.out:
         check_outputs(args, args.out)
@@ -56,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
     summary = write(runs, out, of=origin(args.bag, out))
     remarks = [*recording_remarks(runs), *filter(None, map(full_valves, runs)), *(
         f'{title}: {said}' for title, facts in summary.items()
-        for said in facts.get('learned_worse', ()))]
+        for said in facts.get('learned_worse', ())), *same_remarks(summary.get('over_seeds', {}))]
     emit(args, {'report': out, 'remarks': remarks, **summary},
          '\n'.join([*(f'remark: {text}' for text in remarks), f'report: {out}']))
     return EXIT_DONE

@@ -21,6 +21,7 @@ from types import SimpleNamespace
 import numpy as np
 from pam_actuation.control.sofc.rule_table import linear_feedback_table, RuleBase
 from pam_actuation.report import demo_page, figures, page, pages
+from pam_actuation.report.sections.over_seeds import same_remarks
 from pam_actuation.report.sections.replay import Overlay
 from pam_sim import load_rig
 from pam_sim.errors import InputError
@@ -196,6 +197,20 @@ def test_runs_of_several_seeds_have_mean_and_standard_deviation(tmp_path):
     assert lqi['cycle_rmse_m']['mean'] == pytest.approx([3e-3 / np.sqrt(2)] * 2, rel=2e-3)
     body = markup(tmp_path / 'page.html')[0].partition('id="over-seeds"')[2]
     assert '2.000 ± 1.000 mm' in body.partition('</section>')[0]
+
+
+def test_seeds_that_change_nothing_are_told(tmp_path):
+    def told(*runs):
+        found = pages.bag_report(runs, tmp_path / 'page.html', ['a', 'b'])['over_seeds']
+        said = same_remarks(found)
+        body = markup(tmp_path / 'page.html')[0].partition('id="over-seeds"')[2]
+        assert ('same to the bit' in body.partition('</section>')[0]) == bool(said)
+        return said
+    other = seeded(1e-3, 2)
+    said, = told(seeded(1e-3, 1), other)
+    assert said.startswith('pid: a, b: the runs with seeds 1, 2 are the same to the bit')
+    other['force'].values['force_n'][7] += 1e-9
+    assert told(seeded(1e-3, 1), other) == []
 
 
 def test_runs_whose_learning_is_frozen_are_counted_apart(tmp_path):

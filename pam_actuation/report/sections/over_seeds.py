@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     Measured = tuple[str, Run, RunMetrics]
 
 _SAME = ('experiment', 'experiment_name', 'rig', 'valve', 'controller', 'preview_s')
+_MEASURED = ('pressure', 'contraction', 'force')
 _FIGURES = (
     ('Tracking RMSE', 'tracking_rmse_m', 1e3, 'mm'), ('Largest error', 'max_error_m', 1e3, 'mm'),
     ('Force tracking RMSE', 'tracking_rmse_n', 1.0, 'N'),
@@ -53,8 +54,8 @@ def over_seeds(measured: 'Sequence[Measured]') -> dict[str, dict[str, Any]]:
     Returns
     -------
     dict
-        By controller and titles: ``runs``, ``seeds``, and for each figure that all of them
-        have ``{mean, std}``, SI.
+        By controller and titles: ``runs``, ``seeds``, ``same`` where all measured the same to
+        the bit, and for each figure that all of them have ``{mean, std}``, SI.
 
     """
     groups: dict[tuple[object, ...], list[Measured]] = {}
@@ -70,10 +71,31 @@ def over_seeds(measured: 'Sequence[Measured]') -> dict[str, dict[str, Any]]:
             continue
         figures = [one.to_dict() for _, _, one in runs]
         found[f'{_kind(runs[0][1])}: {", ".join(titles)}'] = {
-            'runs': titles, 'seeds': seeds,
+            'runs': titles, 'seeds': seeds, 'same': _measured_the_same([r for _, r, _ in runs]),
             **{name: spread for _, name, _, _ in _FIGURES
                if (spread := _spread([one[name] for one in figures])) is not None}}
     return found
+
+
+def same_remarks(found: dict[str, dict[str, Any]]) -> list[str]:
+    """Return a sentence on each group of ``over_seeds`` whose seeds change nothing."""
+    return [f'{name}: the runs with seeds {", ".join(one["seeds"])} are the same to the bit, and '
+            'their standard deviation of 0 tells nothing of noise. A seed changes nothing where '
+            'the rig has no sensor noise: state it under `sensors` in the file of the rig.'
+            for name, one in found.items() if one['same']]
+
+
+def _measured_the_same(runs: 'Sequence[Run]') -> bool:
+    """Return whether runs have the same values of all that was measured."""
+    first, *others = [{name: run[name].values for name in _MEASURED if name in run}
+                      for run in runs]
+    return bool(first) and all(
+        one.keys() == first.keys() and all(
+            one[topic].keys() == values.keys() and all(
+                np.array_equal(one[topic][name], column, equal_nan=True)
+                for name, column in values.items())
+            for topic, values in first.items())
+        for one in others)
 
 
 def _learns(run: 'Run') -> bool:
@@ -112,9 +134,10 @@ def seeds_section(found: dict[str, dict[str, Any]], key: str = 'over-seeds',
     rows += [[name, *(_shown(one.get(figure), factor, unit) for one in found.values())]
              for name, figure, factor, unit in _FIGURES]
     body = table(['', *found], [row for row in rows if any(cell is not None for cell in row[1:])])
+    remarks = ''.join(map(paragraph, same_remarks(found)))
     return Section(key, title, paragraph(
         'Mean and standard deviation over runs of the same experiment, rig and controller, '
-        'whose seeds differ. Runs with frozen rules are counted apart.') + body)
+        'whose seeds differ. Runs with frozen rules are counted apart.') + body + remarks)
 
 
 def _shown(spread: dict[str, Any] | None, factor: float, unit: str) -> str | None:
