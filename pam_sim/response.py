@@ -15,10 +15,14 @@
 """What a simulation returns."""
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pam_sim.annotations import FloatArray
 from pam_sim.rollout.layout import OUTPUT
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 COLUMNS = {name: place for place, name in enumerate(OUTPUT.names or ())}
 
@@ -79,3 +83,8 @@ class Response:
         """Return name -> ndarray of all signals."""
         return {name: np.ascontiguousarray(self.outputs[:, column])
                 for name, column in self._columns.items()}
+
+    def to_dataframe(self) -> 'pd.DataFrame':
+        """Return all signals as one pandas table, a row for each sample, in SI."""
+        import pandas as pd     # takes a second to load
+        return pd.DataFrame(self.as_dict())

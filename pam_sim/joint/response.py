@@ -14,11 +14,16 @@
 
 """What a simulation of a joint returns."""
 
+from typing import TYPE_CHECKING
+
 from pam_sim.annotations import FloatArray
 from pam_sim.joint.layout import OUTPUT
 from pam_sim.joint.parameters import SIDES
 from pam_sim.records import columns
 from pam_sim.response import brief_span, Response
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 OWN = OUTPUT.names or ()
 
@@ -67,3 +72,8 @@ class JointResponse:
             signals.update({f'{side}/{name}': values
                             for name, values in getattr(self, side).as_dict().items()})
         return signals
+
+    def to_dataframe(self) -> 'pd.DataFrame':
+        """Return all signals as one pandas table, named as in ``as_dict``, a row per sample."""
+        import pandas as pd     # takes a second to load
+        return pd.DataFrame(self.as_dict())

@@ -86,6 +86,9 @@ def test_only_what_is_asked_for_is_kept():
     assert np.array_equal(response.force_n, whole.force_n[::7])
     assert np.array_equal(response.time_s, whole.time_s[::7])
     assert set(response.as_dict()) == {'force_n', 'time_s'}
+    frame = response.to_dataframe()
+    assert set(frame.columns) == {'force_n', 'time_s'} and len(frame) == len(response)
+    assert np.array_equal(frame['force_n'], response.force_n)
     with pytest.raises(AttributeError):
         response.pressure_pa
 

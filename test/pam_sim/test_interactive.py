@@ -54,6 +54,9 @@ def test_what_holds_arrays_is_told_in_a_line(run):
     assert shown['response'].startswith('Response(3001 samples, 0 to 3 s: time_s, pressure_pa')
     joint = load_joint('joint_dmsp_5_300').simulate(*(np.full(50, 1.0),) * 2)
     assert repr(joint).startswith('JointResponse(51 samples') and len(repr(joint)) < 500
+    frame = joint.to_dataframe()
+    assert len(frame) == 51 and list(frame.columns) == list(joint.as_dict())
+    assert (frame['flexor/pressure_pa'] == joint.flexor.pressure_pa).all()
 
 
 def test_a_short_text_names_what_is_there():
