@@ -192,8 +192,11 @@ class Run:
     def why_not(self, topic: str) -> str:
         """Return that a topic has no messages, and which topics have some."""
         have = sorted(name for name in self.topics if name in self)
-        known = topic.rpartition('/')[2] in (*HELD_TOPICS, *MEASURED_TOPICS)
-        hint = '' if known else did_you_mean(topic, have)
+        short = topic.rpartition('/')[2]
+        # Another quantity that is spelled alike is no help.
+        alike = have if short not in (*HELD_TOPICS, *MEASURED_TOPICS) else [
+            name for name in have if name.rpartition('/')[2] == short]
+        hint = did_you_mean(topic, alike)
         return (f'has no `{topic}` messages{hint}; topics with messages: '
                 f'{", ".join(have) or "none"}')
 
