@@ -90,12 +90,16 @@ def asked(verb, bag, folder):
     }[verb]]
 
 
-@pytest.mark.parametrize('verb, page', [
-    ('replay', ''), ('report', 'page.html'), ('rules', ''), ('gap', 'gap/report.html'),
-    ('identify', 'identify/report.html'), ('tune', 'tuned.html')])
-@pytest.mark.parametrize('how', SPOILED)
-def test_every_verb_tells_what_is_odd(bags, how, verb, page, tmp_path, capsys):
-    sentence, lost = SPOILED[how]
+VERBS = {'replay': '', 'report': 'page.html', 'rules': '', 'gap': 'gap/report.html',
+         'identify': 'identify/report.html', 'tune': 'tuned.html'}
+
+
+@pytest.mark.parametrize('how, verb', [
+    *(('damaged', verb) for verb in VERBS),
+    # All tell by the same function.
+    *((how, verb) for how in ('stepped', 'unstamped') for verb in ('replay', 'report', 'rules'))])
+def test_every_verb_tells_what_is_odd(bags, how, verb, tmp_path, capsys):
+    page, (sentence, lost) = VERBS[verb], SPOILED[how]
     for form in ([], ['--json', '--overwrite']):
         arguments = asked(verb, bags[how], tmp_path)
         code = main([*arguments, *form])

@@ -14,6 +14,7 @@
 
 """Test what the simulated plant makes of stamps and names, with the node as a process."""
 
+import re
 import time
 
 import pytest
@@ -70,7 +71,9 @@ def test_a_force_too_far_ahead_is_told_and_does_nothing(rig):
     send(rig, 'external_force', Force(now_ns + 60_000_000_000, 8.0))
     wait_for(lambda: rig.health['plant_simulator'][-1].level == LEVEL_WARN, 5.0, 'the warning')
     told = rig.health['plant_simulator'][-1]
-    assert 'an external_force was ignored: it is stamped 5' in told.message
+    # Physics may be a little behind the clock.
+    assert re.search(r'an external_force was ignored: it is stamped (59\.\d|60\.[01])\d\d s ahead',
+                     told.message)
     assert told.values['disturbances.refused'] == '1'
     assert told.values['disturbances.waiting'] == '0'
     wait_for(lambda: rig.health['plant_simulator'][-1].level == LEVEL_OK, 5.0, 'its end')
@@ -85,7 +88,8 @@ def test_a_signal_of_another_valve_is_told_until_one_that_can_be_used(rig):
         return rig.health['plant_simulator'][-1].level
 
     signal = ValveSignal(time.time_ns(), ('fill_duty', 'vent_duty'), (0.5, 0.0))
-    wait_for(lambda: level() == LEVEL_WARN, 10.0, 'the warning')
+    wait_for(lambda: level() == LEVEL_WARN and 'valve_signal' in (
+        rig.health['plant_simulator'][-1].message), 10.0, 'the warning')
     told = rig.health['plant_simulator'][-1]
     assert told.message == ('active; nothing of valve_signal can be used: it has fill_duty, '
                             'vent_duty; this PPR valve needs ppr_voltage')
