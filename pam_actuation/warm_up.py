@@ -145,7 +145,8 @@ def warm_up(jobs: int = -1) -> None:
     """
     # All share the physics, which two processes at once would both compile. So one compiles it,
     # and meanwhile the other one what is its own. It is compiled for a rollout: with physics
-    # compiled for a live plant, all later rollouts would be a tenth slower.
+    # compiled for a live plant, all later rollouts would be a tenth slower. Both parts of the
+    # second round take about as long.
     first, *laws, last = (partial(tracked, law) for law in LAWS)
     for uses in ([(first,), (search,)],
                  [(limb, last), (muscle, recording, tracked_force, *laws)]):

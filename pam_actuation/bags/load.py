@@ -175,9 +175,7 @@ def topics_of(bag: Bag, namespace: str) -> dict[str, TopicData]:
     found = {}
     for name, topic in bag.topics.items():
         parent, _, short = name.rpartition('/')
-        if parent != namespace or short not in OF_A_RUN:
-            continue
-        if is_rig_topic(topic):
+        if parent == namespace and short in OF_A_RUN and is_rig_topic(topic):
             found[short] = topic
     return found
 
@@ -231,11 +229,11 @@ def read_series(short: str, topic: TopicData, odd: Oddities) -> Series:
             keep = np.zeros_like(keep)
     stamp_ns = stamp_ns[keep]
     values = {name: column[keep] for name, column in values.items()}
-    odd.tell_stamps(topic.name, stamp_ns)
-    if (np.diff(stamp_ns) < 0).any():
+    if odd.goes_back(topic.name, stamp_ns):
         order = np.argsort(stamp_ns, kind='stable')
         stamp_ns = stamp_ns[order]
         values = {name: column[order] for name, column in values.items()}
+    odd.tell_repeated(topic.name, stamp_ns)
     if row.missing == KEPT:
         stamp_ns, values = _held(stamp_ns, values, topic.name, odd)
     elif row.missing == TOLD and not row.internals and len(stamp_ns):

@@ -75,8 +75,8 @@ class Oddities:
                 f'{"ahead" if by_s > 0.0 else "behind"}), left out.')
         return keep
 
-    def tell_stamps(self, name: str, stamp_ns: IntArray) -> None:
-        """Tell of the stamps of a topic, in the order of recording, that go back or repeat."""
+    def goes_back(self, name: str, stamp_ns: IntArray) -> bool:
+        """Tell of the stamps of a topic, in the order of recording, that go back, if some do."""
         steps_ns = np.diff(stamp_ns)
         backward = int((steps_ns < 0).sum())
         if backward:
@@ -84,7 +84,11 @@ class Oddities:
             (self.remarks if most_s > USUAL_BACK_S else self.notes).append(
                 f'{name}: the stamp goes back {backward} times, by up to {most_s:.3g} s; sorted '
                 'by stamp.')
-        same = int((np.diff(np.sort(stamp_ns) if backward else stamp_ns) == 0).sum())
+        return backward > 0
+
+    def tell_repeated(self, name: str, stamp_ns: IntArray) -> None:
+        """Tell of the stamps of a topic, in their order, that repeat."""
+        same = int((np.diff(stamp_ns) == 0).sum())
         if same:
             self.notes.append(f'{name}: {same} messages repeat the stamp before, kept.')
 

@@ -243,6 +243,13 @@ class MuscleLaw:
             warnings.warn(text, ExtrapolationWarning, stacklevel=3)
         return pressure, contraction
 
+    def outside_table_text(self) -> str:
+        """Return the end of a sentence on what lies outside the table, with its range."""
+        low_pa, high_pa = self.validity.pressure_gauge_pa
+        return (f'outside the table of law `{self.NAME}`, {low_pa / 1e3:g} to {high_pa / 1e3:g} '
+                f'kPa and up to {100.0 * self.validity.strain[1]:.3g} % contraction; its edge was '
+                'used')
+
     def formula_n(self, pressure_gauge_pa: ArrayLike, strain: ArrayLike) -> FloatArray:
         """Return the unclipped value [N] of the formula, for fits; checked, never warned."""
         return self._tension_n(*self._judged(pressure_gauge_pa, strain, 'allow'))

@@ -37,8 +37,10 @@ def max_strain_in(table: LookupTable) -> float:
 def vented_remarks(law: 'MuscleLaw', table: LookupTable) -> list[str]:
     """Return a sentence where a table begins so high that a vented muscle would still pull."""
     lowest_pa, highest_pa = table.pressure_gauge_pa[[0, -1]]
+    if lowest_pa <= 0.0:
+        return []
     pull_n, most_n = law.force_n(np.array([lowest_pa, highest_pa]), 0.0, 'allow')
-    return [] if lowest_pa <= 0.0 or pull_n <= _PULLS * most_n else [
+    return [] if pull_n <= _PULLS * most_n else [
         f'The table begins at {1e-3 * lowest_pa:.0f} kPa, and below that its edge is used: a '
         f'vented muscle would still pull {pull_n:.3g} N at rest. Measure at 0 kPa as well, or add '
         'rows of pressure 0 to the measured table: force 0 at every length, or contraction 0 '

@@ -85,12 +85,9 @@ def check_outputs(rig: 'Rig', outputs: FloatArray, unphysical: int) -> None:
         beyond = law.outside(
             seen['true_pressure_pa'] - P_ATM_PA, seen['true_contraction_m'] / rig.muscle.length_m)
         if beyond.any():
-            low, high = law.validity.pressure_gauge_pa
             warnings.warn(
-                f'{100.0 * beyond.mean():.3g} % of the simulation lies outside the table of law '
-                f'`{law.NAME}`, {low / 1e3:g} to {high / 1e3:g} kPa and up to '
-                f'{100.0 * law.validity.strain[1]:.3g} % contraction; its edge was used',
-                ExtrapolationWarning, stacklevel=4)
+                f'{100.0 * beyond.mean():.3g} % of the simulation lies '
+                f'{law.outside_table_text()}', ExtrapolationWarning, stacklevel=4)
 
 
 def input_array(rig: 'Rig', valve_signal: ArrayLike,

@@ -22,6 +22,7 @@ import numpy as np
 from pam_actuation.report.page import paragraph, Section, table
 from pam_sim.errors import InputError
 from pam_sim.located_yaml import load_yaml
+from pam_sim.run import MEASURED_TOPICS
 
 if TYPE_CHECKING:
     from pam_actuation.report.metrics import RunMetrics
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
     Measured = tuple[str, Run, RunMetrics]
 
 _SAME = ('experiment', 'experiment_name', 'rig', 'valve', 'controller', 'preview_s')
-_MEASURED = ('pressure', 'contraction', 'force')
 _FIGURES = (
     ('Tracking RMSE', 'tracking_rmse_m', 1e3, 'mm'), ('Largest error', 'max_error_m', 1e3, 'mm'),
     ('Force tracking RMSE', 'tracking_rmse_n', 1.0, 'N'),
@@ -87,7 +87,7 @@ def same_remarks(found: dict[str, dict[str, Any]]) -> list[str]:
 
 def _measured_the_same(runs: 'Sequence[Run]') -> bool:
     """Return whether runs have the same values of all that was measured."""
-    first, *others = [{name: run[name].values for name in _MEASURED if name in run}
+    first, *others = [{name: run[name].values for name in MEASURED_TOPICS if name in run}
                       for run in runs]
     return bool(first) and all(
         one.keys() == first.keys() and all(

@@ -22,9 +22,8 @@ from pam_sim.gap.data.recording import Recording
 from pam_sim.rig import Rig
 from pam_sim.units import P_ATM_PA
 
-LEAVES = ('In {:.3g} % of the recorded time pressure or contraction is outside the table of law '
-          '`{}`, {:g} to {:g} kPa and up to {:.3g} % contraction; its edge was used. What is '
-          'found there may be the table. Measure it over the whole range.')
+LEAVES = ('In {:.3g} % of the recorded time pressure or contraction is {}. What is found there '
+          'may be the table. Measure it over the whole range.')
 
 
 def beyond_table(recordings: Iterable[Recording], rig: Rig) -> list[str]:
@@ -37,9 +36,7 @@ def beyond_table(recordings: Iterable[Recording], rig: Rig) -> list[str]:
         np.maximum(_contraction_m(one) / rig.muscle.length_m, 0.0)) for one in recordings])
     if not beyond.any():
         return []
-    low, high = law.validity.pressure_gauge_pa
-    return [LEAVES.format(100.0 * beyond.mean(), law.NAME, low / 1e3, high / 1e3,
-                          100.0 * law.validity.strain[1])]
+    return [LEAVES.format(100.0 * beyond.mean(), law.outside_table_text())]
 
 
 def _contraction_m(recording: Recording) -> FloatArray:
