@@ -12,9 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Two effects that a third one looks like as long as they are tried one by one."""
+"""Effects that another one looks like as long as they are tried one by one."""
 
-from gap_runs import nominal, recorded, voltages
+from gap_runs import NOMINAL, nominal, recorded, voltages
+import numpy as np
+from pam_sim import load_rig
 from pam_sim.gap import find_gap
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.fit.estimator import Estimator
@@ -29,6 +31,12 @@ CREEP = {'name': 'creep', 'parameters': {
 BIAS = {'name': 'contraction_bias', 'parameters': {'bias_m': -6e-4}}
 SMALLER = {'name': 'contraction_bias', 'parameters': {'bias_m': -3.8e-4}}
 LOOK_ALIKES = ['creep', 'contraction_bias', 'bladder_stiffness', 'end_taper']
+
+
+def without_other_beginnings(monkeypatch):
+    """Let the search begin with the best effect only."""
+    monkeypatch.setattr(
+        'pam_sim.gap.select.search.begun_otherwise', lambda _, selected, first: selected)
 
 
 @pytest.fixture(scope='module')
@@ -50,6 +58,7 @@ def test_both_are_named_where_one_by_one_fails(run, monkeypatch):
     assert {e['name'] for e in both.effects} == {'creep', 'contraction_bias'}
     assert both.verdict == 'effects'
     monkeypatch.setattr('pam_sim.gap.select.search.pair_of', lambda search, problem: None)
+    without_other_beginnings(monkeypatch)
     alone = find_gap(run, nominal(), effects=LOOK_ALIKES, unnamed=())
     assert {e['name'] for e in alone.effects} != {'creep', 'contraction_bias'}
 
@@ -60,3 +69,32 @@ def test_what_was_dropped_does_not_keep_the_place_of_another(monkeypatch):
     monkeypatch.setattr('pam_sim.gap.select.search.pair_of', lambda search, problem: None)
     found = find_gap(run, nominal(), effects=LOOK_ALIKES)
     assert {e['name'] for e in found.effects} == {'creep', 'contraction_bias'}
+
+
+def pulses(seconds=14.0, seed=5):
+    """Return duties of both valves per millisecond: trains of short pulses, then none."""
+    random = np.random.default_rng(seed)
+    found = np.zeros((int(1000 * seconds), 2))
+    for start in range(500, len(found) - 300, 300):
+        side = int(random.integers(2)) if 1500 < start else 0
+        found[start:start + int(random.integers(60, 200)), side] = random.uniform(0.2, 0.6)
+    return found
+
+
+def test_a_wrong_number_beside_effects_is_no_further_effect(monkeypatch):
+    """A smaller orifice with slow valves looks like more air in the tube, to nine tenths."""
+    given = load_rig(NOMINAL, valve='hsv')
+    true = given.with_(parameters={'C': 1.5e-10}, effects=[
+        {'name': 'valve_dead_zone', 'parameters': {'open_time_s': 1.7e-3, 'close_time_s': 2e-3}},
+        {'name': 'valve_dead_time', 'parameters': {'delay_s': 0.035}}, CREEP])
+    run = recorded(true, pulses())
+    tried = ['valve_dead_zone', 'valve_dead_time', 'dead_volume', 'creep']
+    found = find_gap(run, given, effects=tried, unnamed=())
+    assert {e['name'] for e in found.effects} == {'valve_dead_zone', 'valve_dead_time', 'creep'}
+    number, = found.parameters
+    assert number.name == 'C' and number.ci95[0] <= 1.5e-10 <= number.ci95[1]
+    delay = next(e for e in found.effects if e['name'] == 'valve_dead_time')
+    assert delay['parameters']['delay_s']['value'] == pytest.approx(0.035, abs=0.003)
+    without_other_beginnings(monkeypatch)
+    alone = find_gap(run, given, effects=tried, unnamed=())
+    assert 'dead_volume' in {e['name'] for e in alone.effects}

@@ -17,10 +17,11 @@ Two effects that only explain a subsystem together.
 
 One effect at a time can lead astray: a third one that is like both at once looks better than
 either, and beside it neither is found. Where that search ends without a name, pairs of
-signatures are held against what the baseline leaves, and the most promising are fitted.
+signatures are held against what the baseline leaves, and the most promising are fitted. Where it
+ends with a name that explains too little, two more of the last rivals are fitted beside it.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 import itertools
 
@@ -30,7 +31,10 @@ from pam_sim.errors import InputError
 from pam_sim.gap.fit.candidate import Candidate
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
+from pam_sim.gap.select.candidates import same_as
+from pam_sim.gap.select.comparison import share
 from pam_sim.gap.select.context import SearchContext
+from pam_sim.gap.select.groups import last_of
 from pam_sim.gap.select.rival import NamedEffect, Rival
 from pam_sim.gap.select.screening import AMPLITUDE_RANGE, flat_spaces_of, free_signature, Screened
 from pam_sim.gap.subsystems.effects import acts_on
@@ -38,6 +42,7 @@ from pam_sim.gap.subsystems.parallel import parallel_map
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 
 FITTED = 4                   # effort: of the most promising pairs
+BESIDE = 5                   # effort: of so many rivals, two are fitted beside what is in
 
 # Two candidates, and the start of their normalised parameters.
 Pair = tuple[tuple[Candidate, Candidate], tuple[float, ...]]
@@ -155,36 +160,92 @@ def pair_of(context: SearchContext, problem: SubsystemProblem
         found = context.estimator.fit(Hypothesis(pair[0]), pair[1])
         return Rival(' + '.join(c.name for c in pair[0]), found, context.ranking.shares(found))
 
-    s = problem.subsystem
     fits = parallel_map(fitted, promising_pairs(
         context.estimator, context.base, context.screened, problem))
+    return _best_pair(context, fits, context.base, problem)
+
+
+def pair_beside(context: SearchContext, current: Fit, problem: SubsystemProblem,
+                rivals: Sequence[Rival]) -> tuple[Fit, list[NamedEffect]] | None:
+    """
+    Return the two of some rivals that explain together what a fit leaves, as ``pair_of`` does.
+
+    Of two that are missing beside the present effects, neither may explain enough of the rest
+    alone. None where the best pair leaves more of that rest than names may.
+
+    Parameters
+    ----------
+    context : SearchContext
+        What the search works with.
+    current : Fit
+        Where the search stands; its effects stay in.
+    problem : SubsystemProblem
+        Where a clear rest is left.
+    rivals : list of Rival
+        Fits with one effect or number more.
+
+    """
+    def fitted(pair: tuple[Rival, Rival]) -> Rival | None:
+        if context.out_of_time():
+            return None
+        h, theta = current.hypothesis, list(current.theta)
+        effects, numbers = h.effects, h.numbers
+        for r in pair:
+            if r.name in r.found.hypothesis.numbers:
+                numbers = (*numbers, r.name)
+            else:
+                effects = (*effects, r.found.hypothesis.effects[-1])
+                theta += list(r.found.theta_of(len(r.found.hypothesis.effects) - 1))
+        found = context.estimator.fit(Hypothesis(effects, numbers), theta, current, whole=False)
+        return Rival(' + '.join(r.name for r in pair), found, context.ranking.shares(found))
+
+    s, base = problem.subsystem, context.base.errors[problem.subsystem]
+    before = share(problem, base, current.errors[s])
+    least = before + context.criteria.first_gain * (1.0 - before)
+    likely = sorted((r for r in rivals if r.share[s] >= least), key=lambda r: -r.share[s])
+    pairs = [(a, b) for a, b in itertools.combinations(likely[:BESIDE], 2)
+             if same_as(a.name) != b.name and same_as(b.name) != a.name]
+    found = _best_pair(context, parallel_map(fitted, pairs), current, problem)
+    if found is None or 1.0 - share(problem, base, found[0].errors[s]) > (
+            (1.0 - context.criteria.named_share) * (1.0 - before)):
+        return None
+    return found
+
+
+def _best_pair(context: SearchContext, fits: Sequence[Rival | None], current: Fit,
+               problem: SubsystemProblem) -> tuple[Fit, list[NamedEffect]] | None:
+    """Return (fit, the two it adds) of the best pair, if it has one in common with its equals."""
     found = [r for r in fits if r is not None]
     if len(found) < len(fits):
         return None
     rivals = [r for r in found if not any(
-        Rival(c.name, r.found).at_edge for c in r.found.hypothesis.effects)]
+        Rival(name, r.found).at_edge for name in _added(r, current))]
     if not rivals:
         return None
     context.set_levels(rivals, [problem])
-    tied = context.ranking.tied(rivals, context.base, problem)
-    common = set.intersection(*(set(r.found.hypothesis.names) for r in tied)) if tied else set()
+    tied = context.ranking.tied(rivals, current, problem)
+    common = set.intersection(*(set(_added(r, current)) for r in tied)) if tied else set()
     if not common:
         return None
-    named = []
-    for name in tied[0].found.hypothesis.names:
-        other = next(n for n in tied[0].found.hypothesis.names if n != name)
-        beside = [_last(r, other) for r in rivals if other in r.found.hypothesis.names]
-        names = tuple(n for r in tied for n in r.found.hypothesis.names if n != other)
-        named.append(NamedEffect(name, s, beside, names if other in common else (name,),
-                                 [r for r in beside if r.name == name]))
+    named, both = [], _added(tied[0], current)
+    for name, other in zip(both, reversed(both)):
+        beside = [_alone(r, next(n for n in _added(r, current) if n != other))
+                  for r in rivals if other in _added(r, current)]
+        names = tuple(n for r in tied for n in _added(r, current) if n != other)
+        named.append(NamedEffect(
+            name, problem.subsystem, beside, names if other in common else (name,),
+            [r for r in beside if r.name == name]))
     return tied[0].found, named
 
 
-def _last(rival: Rival, beside: str) -> Rival:
-    """Return a rival of two effects under the name of the one that is not ``beside``, last."""
+def _added(rival: Rival, current: Fit) -> tuple[str, ...]:
+    """Return the names that a rival adds to a fit."""
+    known = current.hypothesis.names
+    return tuple(n for n in rival.found.hypothesis.names if n not in known)
+
+
+def _alone(rival: Rival, name: str) -> Rival:
+    """Return a rival of two under one of the names; an effect is the last one of its fit."""
     found = rival.found
-    places = sorted(range(2), key=lambda p: found.hypothesis.effects[p].name != beside)
-    effects = tuple(found.hypothesis.effects[p] for p in places)
-    theta = np.concatenate([found.theta_of(p) for p in places])
-    return replace(rival, name=effects[1].name, found=replace(
-        found, hypothesis=Hypothesis(effects), theta=theta))
+    places = [p for p, c in enumerate(found.hypothesis.effects) if c.name == name]
+    return replace(rival, name=name, found=last_of(found, places[0]) if places else found)

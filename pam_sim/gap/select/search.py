@@ -24,6 +24,7 @@ from dataclasses import dataclass, field, replace
 
 from pam_sim.gap.fit.hypothesis import Fit
 from pam_sim.gap.select.backward import backward_elimination, Selected
+from pam_sim.gap.select.beginnings import begun_otherwise
 from pam_sim.gap.select.context import SearchContext
 from pam_sim.gap.select.forward import forward_selection
 from pam_sim.gap.select.groups import group_of
@@ -67,7 +68,7 @@ def search(context: SearchContext) -> Outcome:
     """Search for the missing effects and return the Outcome."""
     every = context
     current, added = forward_selection(context, context.base, [])
-    selected = backward_elimination(context, current, added)
+    first, selected = added, backward_elimination(context, current, added)
     gone = {w.name for w in added} - {w.name for w in selected.named}
     if selected.named and gone and not selected.mistaken:
         # What was dropped may have kept its place from another one.
@@ -79,6 +80,7 @@ def search(context: SearchContext) -> Outcome:
     # What did not hold alone may hold in its group; long recordings had their chance.
     few = any(p.is_dealt_short for p in context.problems)
     selected = _grouped(every if few else context, selected)
+    selected = begun_otherwise(every, selected, first)
     fit, named, explained = with_wrong_numbers(
         context, selected.fit, selected.named, selected.explained)
     return Outcome(context.base, fit, named, explained, not context.out_of_time(),

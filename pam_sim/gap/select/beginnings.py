@@ -1,0 +1,93 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Other beginnings of the forward selection, where the best one leaves a clear rest.
+
+The effect that explains most alone need not be one of those that explain all together: a wrong
+number and an effect may look like a third effect. The search then begins with another of the first
+rivals, as a beam search does.
+"""
+
+from collections.abc import Sequence
+
+from pam_sim.gap.select.backward import backward_elimination, is_missed, Selected
+from pam_sim.gap.select.comparison import gap
+from pam_sim.gap.select.context import SearchContext
+from pam_sim.gap.select.forward import forward_selection
+from pam_sim.gap.select.refit import fit_without
+from pam_sim.gap.select.rival import NamedEffect, Rival
+from pam_sim.gap.subsystems.problem import SubsystemProblem
+
+BEGINNINGS = 2               # effort: so many other first effects of a subsystem
+
+
+def begun_otherwise(context: SearchContext, selected: Selected, first: Sequence[NamedEffect]
+                    ) -> Selected:
+    """
+    Return what a search finds that begins with another effect, if that leaves no clear rest.
+
+    Parameters
+    ----------
+    context : SearchContext
+        What the search works with.
+    selected : Selected
+        What the search has found.
+    first : list of NamedEffect
+        What its forward selection added, in that order, with the rivals of each.
+
+    """
+    for problem in context.problems:
+        best = next((w for w in first if w.subsystem == problem.subsystem), None)
+        if best is None or selected.mistaken:
+            continue
+        s = problem.subsystem
+        likely = sorted((r for r in best.rivals if r.name != best.name
+                         and r.share.get(s, 0.0) >= context.criteria.first_gain),
+                        key=lambda r: -r.share[s])
+        for rival in likely[:BEGINNINGS]:
+            if _leaves_clear_rest(context, problem, selected) and not context.out_of_time():
+                selected = _better(context, problem, selected, best, rival)
+    return selected
+
+
+def _leaves_clear_rest(context: SearchContext, problem: SubsystemProblem, selected: Selected
+                       ) -> bool:
+    """Return whether names leave more of a subsystem than their formulations do, for certain."""
+    rest = gap(problem, selected.fit.errors[problem.subsystem])
+    return rest > context.criteria.clear_rest and context.is_open(problem, selected.fit)
+
+
+def _better(context: SearchContext, problem: SubsystemProblem, selected: Selected,
+            best: NamedEffect, rival: Rival) -> Selected:
+    """Return what is selected from a beginning with a rival, or what was selected before."""
+    s, estimator = problem.subsystem, context.estimator
+    levels, slopes = [p.level for p in context.problems], dict(estimator.slopes)
+    without = selected.fit
+    for w in selected.named:
+        if w.subsystem == s:
+            without = fit_without(estimator, without, w.name)
+    begun = fit_without(estimator, without, best.name, rival)
+    estimator.take_slopes(begun.settings(), begun.known_z)
+    named = [*(w for w in selected.named if w.subsystem != s),
+             NamedEffect(rival.name, s, best.rivals, (rival.name,), [rival])]
+    found = backward_elimination(context, *forward_selection(context, begun, named))
+    if (any(w.subsystem == s for w in found.named)
+            and not _leaves_clear_rest(context, problem, found)
+            and is_missed(context, problem, found.fit, selected.fit)):
+        return found
+    estimator.slopes = slopes
+    for p, level in zip(context.problems, levels):
+        p.level = level
+    return selected
