@@ -17,11 +17,12 @@ Notices a measured motion that stands still although the pressure moved the musc
 
 A frozen sensor goes on sending its last value with new stamps. The pressure distinguishes it from
 a muscle at rest. A value is frozen if it stays the same to the last bit while the measured
-pressure changes by far more than friction can hold. For a joint the difference of both pressures
-counts. At its resting length, or without a force, a muscle may lie on a stop, as a joint at the
-ends of its range, and pressure moves nothing. If a muscle has left its stop before, the pressure
-at which it did limits the rise there. A force, the ends of a joint, and a muscle that has not
-moved yet are not judged.
+pressure changes by far more than friction can hold. The readings of a broken encoder may still
+have noise: their mean is frozen if it stays within a narrow band meanwhile. For a joint the
+difference of both pressures counts. At its resting length, or without a force, a muscle may lie on
+a stop, as a joint at the ends of its range, and pressure moves nothing. If a muscle has left its
+stop before, the pressure at which it did limits the rise there. A force, the ends of a joint, and
+a muscle that has not moved yet are not judged.
 """
 
 from collections import deque
@@ -37,6 +38,7 @@ STOP_SWING_PA = 200_000.0    # beyond the pressure that lifted the load the last
 LEAST_LIFT_PA = P_ATM_PA + 150_000.0     # below it a hand may have lifted it
 LIFTS = 5
 RESUME_NS = 2_000_000_000
+MEAN_S = 0.05                # of the readings whose noise is averaged
 
 
 class FrozenMeasurement:
@@ -56,12 +58,16 @@ class FrozenMeasurement:
     stop_swing_pa : float
         More pressure, beyond that at which the value rose above ``lowest``, than a muscle stays
         on its stop with [Pa]; infinite where a stop is not left by pressure alone.
+    band : float
+        The mean of the readings stands still up to so far from where it came to rest; 0: each
+        reading does, to the last bit.
 
     """
 
     def __init__(self, lowest: float, highest: float = math.inf, swing_pa: float = SWING_PA,
-                 stop_swing_pa: float = math.inf) -> None:
+                 stop_swing_pa: float = math.inf, band: float = 0.0) -> None:
         self._between = lowest, highest
+        self._band = band
         self._swing_pa, self._stop_swing_pa = swing_pa, stop_swing_pa
         self.forget()
 
@@ -70,6 +76,7 @@ class FrozenMeasurement:
         self.frozen = False
         self._value = math.nan
         self._since_ns = 0
+        self._mean, self._mean_ns = math.nan, 0
         self._noticed_ns = 0
         self._changed = False       # since it was noticed
         self._lifts_pa: deque[float] = deque(maxlen=LIFTS)
@@ -79,6 +86,7 @@ class FrozenMeasurement:
         """Forget the pressures, not what was found: what comes now is not compared with them."""
         self._lowest_pa, self._highest_pa = math.inf, -math.inf
         self._highest_on_stop_pa = -math.inf
+        self._moved_ns = -1         # stamp since when the pressure has changed enough
 
     def judge(self, now_ns: int, stamp_ns: int, value: float, pressure_pa: float) -> bool:
         """
@@ -95,7 +103,9 @@ class FrozenMeasurement:
             NaN where none is fresh: then nothing is noticed.
 
         """
-        if value != self._value or stamp_ns < self._since_ns:
+        if self._band:
+            value = self._averaged(stamp_ns, value)
+        if not abs(value - self._value) <= self._band or stamp_ns < self._since_ns:
             if self._value <= self._between[0] < value and math.isfinite(pressure_pa):
                 self._lifts_pa.append(pressure_pa)
             self._value, self._since_ns = value, stamp_ns
@@ -103,13 +113,33 @@ class FrozenMeasurement:
             self.pause()
         if math.isfinite(pressure_pa):
             self._take(value, pressure_pa)
-        if self._moved_without_it() and stamp_ns - self._since_ns >= AFTER_NS:
+        if self._moved_without_it() and stamp_ns - self._still_since_ns(stamp_ns) >= AFTER_NS:
+            # A mean leaves its band late.
+            if not (self._band and self.frozen):
+                self._noticed_ns = now_ns
             self.frozen = True
-            self._noticed_ns = now_ns
             self._changed = False
         elif self._changed and now_ns - self._noticed_ns >= RESUME_NS:
             self.frozen = False
         return self.frozen
+
+    def _averaged(self, stamp_ns: int, value: float) -> float:
+        """Return the mean of the latest readings, the newer the more weight."""
+        passed_s = (stamp_ns - self._mean_ns) * 1e-9
+        if not 0.0 <= passed_s < 1.0 or not math.isfinite(self._mean):
+            self._mean = value
+        else:
+            self._mean += (value - self._mean) * -math.expm1(-passed_s / MEAN_S)
+        self._mean_ns = stamp_ns
+        return self._mean
+
+    def _still_since_ns(self, stamp_ns: int) -> int:
+        """Return since when the value should have moved; within a band it may begin to."""
+        if not self._band:
+            return self._since_ns
+        if self._moved_ns < 0:
+            self._moved_ns = stamp_ns
+        return self._moved_ns
 
     def _take(self, value: float, pressure_pa: float) -> None:
         lowest, highest = self._between

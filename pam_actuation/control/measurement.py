@@ -19,7 +19,7 @@ A table says for each tracked quantity which topic measures it, which sentences 
 wrong with it, and when it counts as frozen. No ROS inside.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 import math
 from typing import Any, TypeGuard, TypeVar
@@ -52,7 +52,7 @@ class Sensor:
         Where it is measured: topic and field of the message.
     none, old, ahead, not_finite, implausible, frozen : int
         Codes of what may be wrong with it, see ``tick``.
-    swing_pa, stop_swing_pa : float
+    swing_pa, stop_swing_pa, band : float
         As of ``FrozenMeasurement``.
 
     """
@@ -67,13 +67,14 @@ class Sensor:
     frozen: int
     swing_pa: float = SWING_PA
     stop_swing_pa: float = math.inf
+    band: float = 0.0
 
 
 SENSORS = {
     CONTRACTION: Sensor(
         'contraction', 'contraction_m', codes.NO_CONTRACTION, codes.CONTRACTION_OLD,
         codes.CONTRACTION_AHEAD, codes.CONTRACTION_NOT_FINITE, codes.CONTRACTION_IMPLAUSIBLE,
-        codes.CONTRACTION_FROZEN, stop_swing_pa=STOP_SWING_PA),
+        codes.CONTRACTION_FROZEN, stop_swing_pa=STOP_SWING_PA, band=30e-6),
     # A muscle that has become short enough to be slack may stay without force.
     FORCE: Sensor(
         'force', 'force_n', codes.NO_FORCE, codes.FORCE_OLD, codes.FORCE_AHEAD,
@@ -108,20 +109,25 @@ class Measurement:
 
     def __init__(self, tracked: Tracked, newest: Newest, plausible: tuple[float, float],
                  between_stops: tuple[float, float]) -> None:
-        self.sensor = sensor = SENSORS[tracked]
+        self.sensor = SENSORS[tracked]
         self.stamp_ns, self.value = -1, math.nan
         self._newest = newest
         self._plausible = plausible
-        self._frozen = FrozenMeasurement(
-            *between_stops, sensor.swing_pa, sensor.stop_swing_pa)
-        # Where a pressure reading stands still too, by the pressure that should be there.
-        self._frozen_both = FrozenMeasurement(
-            *between_stops, sensor.swing_pa, sensor.stop_swing_pa)
+        # By the measured pressure; where its reading stands still too, by what should be.
+        self._frozen = self._judges(between_stops)
+        self._frozen_both = self._judges(between_stops)
+
+    def _judges(self, between_stops: tuple[float, float]) -> Sequence[FrozenMeasurement]:
+        """Return what judges each reading, and what judges their mean, but not on a stop."""
+        s = self.sensor
+        each = FrozenMeasurement(*between_stops, s.swing_pa, s.stop_swing_pa)
+        return [each] + ([FrozenMeasurement(*between_stops, s.swing_pa, band=s.band)]
+                         if s.band else [])
 
     def forget(self) -> None:
         """Begin anew, as before the first message."""
-        self._frozen.forget()
-        self._frozen_both.forget()
+        for judge in (*self._frozen, *self._frozen_both):
+            judge.forget()
 
     def reason(self, now_ns: int) -> int:
         """Look at the newest measurement; return its code, ``codes.OK`` if it is usable."""
@@ -157,13 +163,18 @@ class Measurement:
 
         """
         if expected_pa is None:
-            self._frozen_both.pause()
+            for judge in self._frozen_both:
+                judge.pause()
             expected_pa = math.nan
-        # Both are to be asked, whatever the first one says.
-        frozen = self._frozen.judge(now_ns, self.stamp_ns, self.value, measured_pa)
-        return self._frozen_both.judge(now_ns, self.stamp_ns, self.value, expected_pa) or frozen
+        # All are to be asked, whatever the first one says.
+        found = [judge.judge(now_ns, self.stamp_ns, self.value, pressure_pa)
+                 for judges, pressure_pa in ((self._frozen, measured_pa),
+                                             (self._frozen_both, expected_pa))
+                 for judge in judges]
+        return any(found)
 
     def may_stand_still(self, now_ns: int) -> None:
         """Take note of a value that may be held by force; what was found is not forgotten."""
-        self._frozen.pause()
+        for judge in self._frozen:
+            judge.pause()
         self.stands_still(now_ns, math.nan, None)

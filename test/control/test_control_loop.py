@@ -16,6 +16,7 @@
 
 import math
 
+import numpy as np
 from pam_actuation.control.loop import ControllerLoop
 from pam_actuation.control.reference_buffer import ReferenceBuffer
 from pam_actuation.control.tick import join_stamp
@@ -268,6 +269,18 @@ def test_a_frozen_contraction_vents_until_it_moves_again():
     seen = swing(loop, START + 1000 * MS, 3.0, lambda t: max(0.01 - 0.02 * t, 0.003),
                  lambda t: P_ATM_PA)
     assert next(t for t, reason, _ in seen if reason == 'ok') == pytest.approx(2.0, abs=0.01)
+
+
+def test_the_noise_of_a_broken_encoder_is_no_motion():
+    loop, random = ready(), np.random.default_rng(3)
+    seen = swing(loop, START, 1.2, lambda t: 0.01 + 1e-5 * random.standard_normal(),
+                 lambda t: 3e5 + 2e5 * t)
+    at_s, reason, command_pa = next(one for one in seen if one[1] != 'ok')
+    assert 0.9 < at_s < 1.0 and 'contraction stands still' in reason
+    assert command_pa == P_ATM_PA
+    seen = swing(loop, START + 1200 * MS, 3.0, lambda t: 0.01 + 1e-5 * random.standard_normal(),
+                 lambda t: P_ATM_PA)
+    assert all('stands still' in reason for _, reason, _ in seen)
 
 
 def test_a_contraction_that_never_moves_again_stays_frozen():
