@@ -299,6 +299,8 @@ class ControllerLoop:
                 self.reason += f'; {remark}'
         elif inputs.reason == codes.TWO_SENSORS:
             self.reason = f'{self.reason}: {self.two_sensors}'
+        elif inputs.reason == self.measurement.sensor.implausible and self.measurement.says:
+            self.reason = f'{self.reason}, {self.measurement.says}'
         elif inputs.reason == codes.MUSCLE_SLACK:
             self.reason = f'{self.reason}: ' + '; '.join(
                 f'{muscle.side}, {muscle.slack.why}' for muscle in self.muscles

@@ -27,6 +27,7 @@ from typing import Any, TypeGuard, TypeVar
 from pam_actuation.control import tick as codes
 from pam_actuation.control.frozen import (
     FrozenMeasurement, JOINT_SWING_PA, STOP_SWING_PA, SWING_PA)
+from pam_actuation.control.implausible import Implausible, SAYS
 from pam_actuation.control.inputs import MAX_AGE_NS
 from pam_actuation.control.modes.tracked import CONTRACTION, FORCE, JOINT, Tracked
 from pam_actuation.control.reference_buffer import MAX_AHEAD_NS
@@ -113,6 +114,7 @@ class Measurement:
         self.stamp_ns, self.value = -1, math.nan
         self._newest = newest
         self._plausible = plausible
+        self._implausible = Implausible()
         # By the measured pressure; where its reading stands still too, by what should be.
         self._frozen = self._judges(between_stops)
         self._frozen_both = self._judges(between_stops)
@@ -126,8 +128,14 @@ class Measurement:
 
     def forget(self) -> None:
         """Begin anew, as before the first message."""
+        self._implausible.forget()
         for judge in (*self._frozen, *self._frozen_both):
             judge.forget()
+
+    @property
+    def says(self) -> str:
+        """Return why a measurement counts as implausible that was so before, '' if it is."""
+        return SAYS if self._implausible.holds else ''
 
     def reason(self, now_ns: int) -> int:
         """Look at the newest measurement; return its code, ``codes.OK`` if it is usable."""
@@ -145,7 +153,8 @@ class Measurement:
         if not math.isfinite(value):
             return sensor.not_finite
         lowest, highest = self._plausible
-        return codes.OK if lowest <= value <= highest else sensor.implausible
+        implausible = self._implausible.judge(now_ns, not lowest <= value <= highest)
+        return sensor.implausible if implausible else codes.OK
 
     def stands_still(self, now_ns: int, measured_pa: float,
                      expected_pa: float | None) -> bool:

@@ -290,6 +290,24 @@ def test_a_contraction_that_never_moves_again_stays_frozen():
     assert all('stands still' in reason for _, reason, _ in seen)
 
 
+def test_an_encoder_with_the_wrong_sign_does_not_drop_the_load_for_ever():
+    """Filled, it reads what is impossible; vented, it reads what is possible."""
+    loop = ready()
+    seen = swing(loop, START, 60.0, lambda t: -0.02 if t % 2.0 > 1.5 else 0.01,
+                 lambda t: 2e5 + 100.0 * math.sin(t))
+    runs = [reason == 'ok' for _, reason, _ in seen]
+    drops = [t for (t, _, _), ran, runs_now in zip(seen, [True, *runs], runs)
+             if ran and not runs_now]
+    assert len(drops) == 6 and drops[5] - drops[4] > 30.0       # five times, then after 30 s
+    told = [reason for t, reason, _ in seen if drops[4] < t < drops[4] + 29.0]
+    assert {reason.partition(',')[0] for reason in told} == {
+        'contraction is outside what the muscle can do'}
+    assert all('sign, range or wiring of the sensor? Vented for 30 s' in one for one in told)
+    loop.forget()
+    assert {reason for _, reason, _ in swing(loop, START + 61_000 * MS, 1.0, lambda t: 0.01,
+                                             lambda t: 2e5)} >= {'ok'}
+
+
 def lifted(loop, duration_s=1.0):
     """Let the muscle leave its stop, at 200 kPa gauge, and lie down again; return the time."""
     swing(loop, START, duration_s, lambda t: max(0.01 * math.sin(2.0 * math.pi * t), 0.0),
