@@ -56,7 +56,7 @@ def test_an_environment_is_back_when_its_heir_cannot_be_installed(tmp_path):
     assert sorted(one.name for one in folder.iterdir()) == ['installed', 'pam']
     assert [one.name for one in tmp_path.iterdir()] == ['env']
     # One that runs is kept, whatever becomes of the installation.
-    subprocess.run([sys.executable, '-m', 'venv', tmp_path / 'new'], check=True)
+    subprocess.run([sys.executable, '-m', 'venv', '--without-pip', tmp_path / 'new'], check=True)
     (tmp_path / 'new' / 'mine').touch()
     assert make(tmp_path / 'new').returncode == 2
     assert (tmp_path / 'new' / 'mine').exists() and (tmp_path / 'new' / 'bin/python').exists()
