@@ -215,9 +215,12 @@ def tell_remarks(args: SimpleNamespace | argparse.Namespace, experiment: 'Experi
                  rig: 'Rig | None' = None,
                  controller: Any = None, model: str | None = None) -> list[str]:
     """Return what a person should read before an experiment runs; say it on stderr."""
+    from pam_actuation.drivers.vented import left_remarks
     from pam_actuation.experiments.limits import unknown_remarks
     from pam_sim.idle import idle_remarks
     remarks = [*experiment.remarks(valve, rig, controller), *unknown_remarks(rig)]
+    if rig is not None:
+        remarks += left_remarks(rig)
     if model is not None and rig is not None:
         remarks += idle_remarks(model, rig)
     say_remarks(args, remarks)

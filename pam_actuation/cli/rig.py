@@ -104,6 +104,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _new(args: argparse.Namespace) -> int:
+    from pam_actuation.drivers.vented import left_remarks
     from pam_actuation.rig_files.force_map import describe_table
     from pam_actuation.rig_files.questions import ask_description
     from pam_actuation.rig_files.text import rig_file
@@ -122,7 +123,7 @@ def _new(args: argparse.Namespace) -> int:
         described.work_out()
         text, rig = rig_file(described, args.out)
         write_text(args.out, text)
-    remarks = list(dict.fromkeys([*remarks, *table_remarks(rig.muscle)]))
+    remarks = list(dict.fromkeys([*remarks, *table_remarks(rig.muscle), *left_remarks(rig)]))
     following = _following(rig, args.out)
     lines = [f'rig file: {args.out}', *_numbers_text(rig), *_law_text(rig),
              *remarks, f'next: {following}']
@@ -229,6 +230,7 @@ def _one_of(option: str, value: str, allowed: Any) -> str:
 
 
 def _check(args: argparse.Namespace) -> int:
+    from pam_actuation.drivers.vented import left_remarks
     from pam_actuation.rig_files.by_size import nominal_beside_size
     from pam_sim import load_rig
     from pam_sim.idle import idle_remarks
@@ -236,7 +238,7 @@ def _check(args: argparse.Namespace) -> int:
     from pam_sim.rig_text import rig_title
     rig = load_rig(args.file)
     remarks = [*nominal_beside_size(rig), *table_remarks(rig.muscle),
-               *idle_remarks(args.file, rig)]
+               *left_remarks(rig), *idle_remarks(args.file, rig)]
     size = f'muscle of {1e3 * rig.muscle.bore_m:.4g} mm by {1e3 * rig.muscle.length_m:.4g} mm'
     lines = [rig_title(rig), f'{size}, load {rig.load}, valve {rig.valve}', *_numbers_text(rig),
              *_exact_text(rig), *(f'remark: {text}' for text in remarks)]

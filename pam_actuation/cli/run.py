@@ -51,10 +51,12 @@ def run(args: argparse.Namespace) -> int:
     prepare_template()
     from pam_actuation.bags.layout import METADATA_FILE
     from pam_actuation.bags.place import check_bag_target
+    from pam_actuation.drivers.vented import check_rig_vents
     from pam_actuation.rigging.session import run_experiment
     from pam_actuation.report.full_valves import full_valves_in
     from pam_sim.rig_text import rig_title
     experiment, rig, controller = load_setup(args)
+    check_rig_vents(rig)
     remarks = tell_remarks(args, experiment, rig.valve, rig, controller, args.rig)
     out = args.out or os.path.join(
         'runs', f'{experiment.name}_{rig.valve}_{time.strftime("%Y%m%d-%H%M%S")}')

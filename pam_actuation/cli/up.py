@@ -96,6 +96,7 @@ def run(args: argparse.Namespace) -> int:
         from pam_actuation.rigging.node_template import prepare_template
         prepare_template()
     from pam_actuation.bags.place import check_bag_target
+    from pam_actuation.drivers.vented import check_rig_vents
     from pam_actuation.interrupts import undisturbed
     from pam_actuation.nodes.hardware_check import check_hardware, check_users_file
     from pam_actuation.rigging.plan import RECORDER
@@ -103,7 +104,9 @@ def run(args: argparse.Namespace) -> int:
     from pam_actuation.rigging.transitions import SessionFailed, termination_as_interrupt
     if args.policy is not None:
         check_file(args.policy, args.overwrite, ours='Made from the code, as docs/')
-    args.valve = args.valve or _model(args).valve
+    model = _model(args)
+    check_rig_vents(model)
+    args.valve = args.valve or model.valve
     nodes = _nodes(args)
     check_hardware(nodes)
     if args.params_file is not None:

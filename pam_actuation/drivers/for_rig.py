@@ -21,6 +21,7 @@ leak) stay unknown to the driver.
 """
 
 from collections.abc import Mapping
+from dataclasses import asdict
 import math
 from typing import TYPE_CHECKING
 
@@ -28,6 +29,7 @@ import numpy as np
 from pam_actuation.drivers.config import DriverConfig
 from pam_actuation.drivers.hsv_config import HsvConfig
 from pam_actuation.drivers.loop import DriverLoop
+from pam_actuation.drivers.ppr import PprConfig
 from pam_sim.units import P_ATM_PA
 
 if TYPE_CHECKING:
@@ -65,11 +67,7 @@ def driver_config(rig: 'Rig', changes: Mapping[str, object] | None = None,
     values = rig.parameters
     dead_time_s = _effect(rig, 'valve_dead_time', 'delay_s')
     told = {
-        'ppr.gain_pa_per_v': values['K_m'],
-        'ppr.lowest_v': values['ppr_lowest_v'],
-        'ppr.highest_v': values['ppr_highest_v'],
-        'ppr.atmospheric_v': values['ppr_lowest_v'] - values['ppr_zero_pa'] / values['K_m'],
-        'ppr.time_constant_s': values['T_m'],
+        **{f'ppr.{name}': value for name, value in asdict(PprConfig.of_rig(values)).items()},
         'ppr.dead_time_s': dead_time_s,
         'hsv.period_s': values['pwm_period_s'],
         'hsv.conductance_m3_per_s_pa': values['C'],

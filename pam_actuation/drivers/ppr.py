@@ -21,6 +21,7 @@ slew. ``ppr_step`` is the compiled form; it shares its signature with ``hsv_step
 closed-loop rollout can hold either.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 import math
 
@@ -113,6 +114,20 @@ class PprConfig:
     period_s: float = number(0.005, 0.001, 0.01, 'time between two signals')
     time_constant_s: float = number(_RIG['T_m'], 0.001, 10.0, 'lag of the regulator')
     dead_time_s: float = number(0.030, 0.0, 1.0, 'time from voltage to pressure')
+
+    @classmethod
+    def of_rig(cls, values: Mapping[str, float]) -> 'PprConfig':
+        """Return what the parameters of a rig tell of its regulator."""
+        lowest_v, gain = values['ppr_lowest_v'], values['K_m']
+        return cls(gain_pa_per_v=gain, lowest_v=lowest_v, highest_v=values['ppr_highest_v'],
+                   atmospheric_v=lowest_v - values['ppr_zero_pa'] / gain,
+                   time_constant_s=values['T_m'])
+
+    @property
+    def left_gauge_pa(self) -> float:
+        """Return the gauge pressure [Pa] that 0 V, the signal that vents, leaves in the muscle."""
+        volts = min(max(0.0, self.lowest_v), self.highest_v)
+        return self.gain_pa_per_v * (volts - self.atmospheric_v)
 
     def par(self) -> FloatArray:
         """Return the parameter array of ``ppr_step``."""

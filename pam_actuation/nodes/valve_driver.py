@@ -22,6 +22,7 @@ from typing import Any
 from pam_actuation.drivers.config import DRIVER_PARAMETERS, DriverConfig
 from pam_actuation.drivers.limits import DEVICE_WATCHDOG_S
 from pam_actuation.drivers.parameter import node_parameter
+from pam_actuation.drivers.vented import check_vents
 from pam_actuation.hardware.back_ends import NO_DEVICE
 from pam_actuation.hardware.back_ends import open_valve
 from pam_actuation.hardware.back_ends import parameters_of
@@ -128,6 +129,9 @@ class ValveDriver(ManagedNode):
         """Build the driver, its topics and services."""
         from pam_actuation.drivers.loop import DriverLoop
         valve, config = self._valve_and_config()
+        if valve == 'ppr':
+            check_vents(config.ppr, f'rig {self.value("rig")}' if self.value('rig')
+                        else 'parameters')
         _warm_up(DriverLoop(valve, config))
         loop = DriverLoop(valve, config)
         self.output = open_valve(

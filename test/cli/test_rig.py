@@ -336,6 +336,21 @@ def test_a_regulator_is_the_exact_reference_of_an_unknown_zero(folder):
     assert new('--regulator-kpa', '0:600', '--overwrite').prior_sd('ppr_zero_pa') == 12e3
 
 
+@pytest.mark.parametrize('options, kpa, said', [
+    (['--regulator-volts=-1:6'], '85.7', 'The valve driver refuses this rig: at most 10 kPa'),
+    (['--regulator', 'smc_itv1030', '--regulator-volts', '0:10'], '5.0', 'A dump valve empties'),
+    (['--regulator-volts', '1:9'], '', '')])
+def test_a_remark_tells_what_0_v_leaves_in_the_muscle(
+        options, kpa, said, folder, capsys):
+    for words in (['new', '--out', 'made.yaml', '--known', 'mass_kg=5', *options],
+                  ['check', 'made.yaml']):
+        assert main(['rig', *words, '--json']) == 0
+        remarks = json.loads(capsys.readouterr().out)['remarks']
+        told = [one for one in remarks if 'a loss of power leaves' in one]
+        assert len(told) == bool(kpa)
+        assert all(f'keeps {kpa} kPa gauge' in one and said in one for one in told)
+
+
 @pytest.mark.parametrize('options, said', [
     (['--known', 'mass_kg=-3'], '0.1 to 500 kg'),
     (['--known', 'mass_kg=nan'], '0.1 to 500 kg'),

@@ -15,9 +15,12 @@
 """The PPR law: static inverse, clip, slew limit, compiled form."""
 
 import math
+import re
 
 import numpy as np
 from pam_actuation.drivers.ppr import OUTPUT, ppr_step, PprConfig, PprLaw, STATE
+from pam_actuation.drivers.vented import check_vents
+from pam_sim.errors import InputError
 from pam_sim.records import fields, zeros
 from pam_sim.units import P_ATM_PA
 import pytest
@@ -69,3 +72,27 @@ def test_compiled_step_is_the_law():
         command = P_ATM_PA + 3e5 * math.sin(0.3 * k)
         ppr_step(state, config.par(), command, math.nan, math.nan, out)
         assert law.step(command) == fields(out, OUTPUT).signal_v
+
+
+@pytest.mark.parametrize('numbers, left_kpa, words', [
+    ({'lowest_v': -1.0, 'atmospheric_v': -1.0}, 100.0, (
+        '0 V, the signal that vents, leaves 100 kPa gauge in the muscle, since ppr.atmospheric_v '
+        'is -1 V; at most 10 kPa are allowed, which is a ppr.atmospheric_v of -0.1 V')),
+    ({'atmospheric_v': -0.2}, 20.0, 'leaves 20 kPa gauge in the muscle'),
+    ({'lowest_v': 2.0}, 200.0, (
+        'ppr.lowest_v of 2 V is above ppr.atmospheric_v of 0 V and leaves 200 kPa gauge in a '
+        'vented muscle; at most 10 kPa are allowed, which is a ppr.lowest_v of 0.1 V')),
+    ({'lowest_v': 1.0, 'atmospheric_v': 0.85}, 15.0, 'which is a ppr.lowest_v of 0.95 V')])
+def test_a_regulator_that_0_v_does_not_vent_is_refused(numbers, left_kpa, words):
+    config = PprConfig(**numbers)
+    assert config.left_gauge_pa == pytest.approx(1e3 * left_kpa)
+    with pytest.raises(InputError, match=re.escape(words)):
+        check_vents(config, 'here')
+
+
+@pytest.mark.parametrize('numbers', [
+    {}, {'lowest_v': 1.0, 'atmospheric_v': 1.0}, {'lowest_v': -5.0}, {'atmospheric_v': -0.1},
+    {'lowest_v': 1.0, 'atmospheric_v': 1.0 - 10e3 / 75e3, 'gain_pa_per_v': 75e3},
+    {'lowest_v': 1.0, 'atmospheric_v': 3.0}])
+def test_a_regulator_that_0_v_vents_is_taken(numbers):
+    check_vents(PprConfig(**numbers), 'here')

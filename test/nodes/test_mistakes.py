@@ -21,7 +21,8 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from pam_actuation.rigging.domain import DomainLock                         # noqa: E402, I100
+from pam_actuation.cli.main import main                                    # noqa: E402, I100
+from pam_actuation.rigging.domain import DomainLock                         # noqa: E402
 from pam_actuation.rigging.node_template import NodeTemplate                # noqa: E402
 from pam_actuation.rigging.processes import node_environment                # noqa: E402
 
@@ -44,6 +45,11 @@ MISTAKES = {
     'valve_driver limit': (
         'valve_driver', ['max_pressure_gauge_pa:=5e7'], 'max_pressure_gauge_pa: 5e+07',
         '1000 to 1e+06'),
+    'valve_driver lowest': (
+        'valve_driver', ['ppr.lowest_v:=2.0'], 'ppr.lowest_v of 2 V', 'at most 10 kPa'),
+    'valve_driver safe signal': (
+        'valve_driver', ['ppr.atmospheric_v:=-1.0', 'ppr.lowest_v:=-1.0'],
+        '0 V, the signal that vents, leaves 100 kPa', 'of -0.1 V'),
     'plant_simulator rig': (
         'plant_simulator', ['rig:=dmsp_99'], 'dmsp_99', 'dmsp_5_300_realistic'),
     'plant_simulator rate': (
@@ -102,6 +108,15 @@ def test_one_sentence_and_exit_code_2(outcomes, case):
     assert problem in errors and allowed in errors
     assert 'Traceback' not in errors
     assert len(errors.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize('words', [['run', 'short_sine', '--rig'], ['up', 'rig', '--model']])
+def test_a_rig_that_0_v_does_not_vent_is_refused_before_any_node_starts(words, tmp_path, capsys):
+    rig = tmp_path / 'low.yaml'
+    rig.write_text('{rig: dmsp_5_300_realistic, valve: ppr, parameters: {ppr_lowest_v: -1.0}}')
+    assert main([*words, str(rig)]) == 2
+    assert capsys.readouterr().err.startswith(
+        f'pam {words[0]}: rig low: 0 V, the signal that vents, leaves 100 kPa gauge')
 
 
 @pytest.mark.parametrize('arguments, words', [
