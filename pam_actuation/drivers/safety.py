@@ -326,18 +326,19 @@ class SafetySupervisor:
     def _pressure_fault(self, now_ns: int, grace_s: float) -> Fault | None:
         lim = self.limits
         channel = self.pressure
+        why = f'; the last one {channel.problem}' if channel.problem else ''
         if not self._seen_pressure:
             # A sensor that has not been discovered yet is not the same as none.
-            if self.needs_pressure or (
-                    0 <= now_ns - self._first_tick_ns < lim.first_pressure_wait_s * NS_PER_S):
-                why = f'; the last one {channel.problem}' if channel.problem else ''
+            if 0 <= now_ns - self._first_tick_ns < lim.first_pressure_wait_s * NS_PER_S or (
+                    self.needs_pressure and not channel.received):
                 return 'no_pressure', 'waiting for the first measured pressure' + why
+            if channel.received:        # nor is one that is broken
+                return 'pressure_timeout', 'no valid measured pressure since the start' + why
             self._warn('no_pressure_ppr',
                        'no measured pressure, so over-pressure is not supervised', now_ns)
             return None
         age_s = channel.age_s(now_ns)
         if age_s > lim.measurement_timeout_s + grace_s:
-            why = f'; the last one {channel.problem}' if channel.problem else ''
             return 'pressure_timeout', (
                 f'no valid measured pressure for {age_s * 1e3:.0f} ms '
                 f'(limit {lim.measurement_timeout_s * 1e3:.0f} ms){why}')

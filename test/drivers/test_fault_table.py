@@ -35,7 +35,7 @@ def changed_rows():
 @pytest.mark.parametrize('name, value, rows', [
     ('command_timeout_s', 0.2, {'command_timeout', 'command_stamp'}),
     ('measurement_timeout_s', 0.2, {'pressure_timeout'}),
-    ('first_pressure_wait_s', 3.0, {'no_pressure', 'no_pressure_ppr'}),
+    ('first_pressure_wait_s', 3.0, {'no_pressure', 'no_pressure_ppr', 'pressure_timeout'}),
     ('supply_timeout_s', 0.7, {'supply_stale'}),
     ('stamp_ahead_s', 0.03, {'command_stamp', 'pressure_timeout'}),
     ('lowest_plausible_gauge_pa', -10e3, {'pressure_timeout'}),
