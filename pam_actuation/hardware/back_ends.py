@@ -92,8 +92,8 @@ def open_valve(name: str, valve_type: str, values: dict[str, Any], config: 'Driv
             device.vent()
             writes = device.safe_writes() if watchdog_s else ()
             return GuardedOutput(device, DeviceWatchdog(writes, watchdog_s) if writes else None)
-        except Exception:
-            with suppress(Exception):
+        except BaseException:
+            with suppress(BaseException):
                 device.close()
             device.release()
             raise
@@ -120,7 +120,9 @@ def close_sensors(sensors: SensorInput) -> str:
     """Close the sensors of a back end; return what is wrong, '' if nothing."""
     try:
         sensors.close()
-    except Exception as error:      # of a back end of somebody else
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:      # of a back end of somebody else
         return str(device_error(error, type(sensors), sensors.values))
     return ''
 
@@ -129,6 +131,8 @@ def _tell(action: Callable[[], Told], back_end: BackEnd, values: Mapping[str, An
     """Return what an action returns; a device that is not usable is a mistake of the user."""
     try:
         return action()
-    except Exception as raised:
+    except KeyboardInterrupt:
+        raise
+    except BaseException as raised:
         error = device_error(raised, back_end, values)
         raise InputError(error.problem, error.where) from None

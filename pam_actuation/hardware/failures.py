@@ -26,13 +26,15 @@ if TYPE_CHECKING:
     from pam_actuation.hardware.valve_output import ValveOutput
 
 
-def device_error(error: Exception, back_end: 'type[ValveOutput] | type[SensorInput]',
+def device_error(error: BaseException, back_end: 'type[ValveOutput] | type[SensorInput]',
                  values: Mapping[str, Any]) -> DeviceError:
     """
     Return an error of a back end as a ``DeviceError``, with the parameters that were given.
 
     A serial line raises an OSError, an answer that is no number a ValueError. What is no OSError
-    may be a mistake in the code of the back end: its line is told.
+    may be a mistake in the code of the back end: its line is told. A library may also raise what
+    is no ``Exception``, such as ``asyncio.CancelledError`` or ``SystemExit``; a back end that
+    ended the driver by it would leave the valve as it was.
     """
     if isinstance(error, DeviceError):
         return error

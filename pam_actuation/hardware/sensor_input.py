@@ -124,7 +124,9 @@ class NewReadings:
             reading = self._sensors.read(topic)
             read, stamp_ns = reading if isinstance(reading, tuple) else (reading, now_ns)
             value = None if read is None else float(read)
-        except Exception as error:      # of a back end of somebody else
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:      # of a back end of somebody else
             raise device_error(error, type(self._sensors), self._sensors.values) from None
         last = self._last.get(topic)
         known = isinstance(reading, tuple) and last is not None and stamp_ns == last[1]

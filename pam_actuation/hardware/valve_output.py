@@ -137,7 +137,8 @@ class GuardedOutput:
     A valve output that vents when a write fails, and when nobody holds it any more.
 
     An output that was not closed vents when it is collected or when the interpreter
-    ends, whatever came before. ``failures`` counts.
+    ends, whatever came before. ``failures`` counts; ``unvented`` is what is wrong with the newest
+    safe signal, '' if nothing.
 
     Parameters
     ----------
@@ -154,6 +155,7 @@ class GuardedOutput:
         self._watchdog = watchdog
         self._last_resort = weakref.finalize(self, _vent_quietly, device)
         self.failures = 0
+        self.unvented = ''
 
     def send(self, efforts: tuple[float, ...]) -> str:
         """
@@ -185,6 +187,7 @@ class GuardedOutput:
                 break
             time.sleep(BETWEEN_TRIES_S)
             problem = self._try(self._vent)
+        self.unvented = problem
         return problem
 
     def _vent(self) -> None:
@@ -212,7 +215,9 @@ class GuardedOutput:
     def _try(self, action: Callable[..., Any]) -> str:
         try:
             action()
-        except Exception as error:      # of a back end of somebody else
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:      # of a back end of somebody else
             self.failures += 1
             return str(device_error(error, type(self._device), self._device.values))
         return ''
@@ -221,5 +226,5 @@ class GuardedOutput:
 def _vent_quietly(device: ValveOutput) -> None:
     """Vent and close at the very end, where nobody is left to be told of a failure."""
     for action in (device.vent, device.close):
-        with suppress(Exception):
+        with suppress(BaseException):
             action()

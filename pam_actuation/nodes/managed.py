@@ -290,7 +290,9 @@ class ManagedNode(LifecycleNode):
         """Return what a part of the loop returns; if it fails, the node fails safely."""
         try:
             return action()
-        except Exception as error:
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:      # SystemExit too: the output is made safe first
             self.fail(f'the loop of this node failed: {error}', traceback.format_exc())
             return None
 

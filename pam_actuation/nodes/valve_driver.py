@@ -279,6 +279,9 @@ class ValveDriver(ManagedNode):
         self._latencies['command'].used(safety.command_stamp_ns, now_ns)
         self._latencies['pressure'].used(safety.pressure.stamp_ns, now_ns)
         level, message = self.loop.state()
+        if self.output.unvented:
+            level = ERROR
+            message += f'; the device may not be vented: {self.output.unvented}'
         self.diagnostics.update(level, message, self.loop.values)
 
     def safe_stop(self, why: str) -> None:

@@ -14,6 +14,7 @@
 
 """A valve output of another package that has ``write`` alone, as behind a serial line."""
 
+import asyncio
 from pathlib import Path
 import time
 
@@ -21,7 +22,8 @@ from fake_sysfs import put
 from pam_actuation.drivers.parameter import node_parameter
 from pam_actuation.hardware.valve_output import ValveOutput
 
-BLOCKED, TIMED_OUT = 'blocked', 'timed out'
+BLOCKED, TIMED_OUT, CANCELLED, EXITS = 'blocked', 'timed out', 'cancelled', 'exits'
+OPENINGS = ' openings'      # behind one of these: only signals other than 0 V go wrong
 
 
 class WriteOnly(ValveOutput):
@@ -36,8 +38,12 @@ class WriteOnly(ValveOutput):
 
     def write(self, efforts):
         """Write the signal."""
-        if self._told() == TIMED_OUT:
-            raise TimeoutError(TIMED_OUT)
+        told = self._told()
+        if not told.endswith(OPENINGS) or efforts != (0.0,):
+            for how, error in ((TIMED_OUT, TimeoutError(TIMED_OUT)), (EXITS, SystemExit(3)),
+                               (CANCELLED, asyncio.CancelledError())):
+                if told.startswith(how):
+                    raise error
         while self._told() == BLOCKED:
             time.sleep(0.01)
         put(self._file, ' '.join(f'{effort:g}' for effort in efforts))

@@ -18,7 +18,7 @@ import gc
 import signal
 import time
 
-from own_dac import BLOCKED, installed, TIMED_OUT, WriteOnly
+from own_dac import BLOCKED, CANCELLED, EXITS, installed, OPENINGS, TIMED_OUT, WriteOnly
 from pam_actuation.drivers.config import DriverConfig
 from pam_actuation.hardware import back_ends
 from pam_actuation.messages import SAFE_EFFORTS
@@ -101,6 +101,36 @@ def test_what_it_raises_is_told_with_its_parameters_and_vents(bench, opened):
     assert output.send((0.0,)) == '' and bench.signal() == (0.0,)
 
 
+@pytest.mark.parametrize('how, words', [(CANCELLED, 'CancelledError'), (EXITS, 'SystemExit: 3')])
+def test_what_is_no_exception_is_a_fault_of_the_device(bench, opened, how, words):
+    output = opened()
+    assert output.send((3.0,)) == ''
+    bench.breaks(how + OPENINGS)
+    assert words in output.send((2.0,)) and output.unvented == ''
+    assert bench.signal() == (0.0,)
+    bench.breaks(how)
+    assert words in output.send((2.0,)) and words in output.unvented
+    assert words in output.vent() and words in output.close()
+    with pytest.raises(InputError, match=words[:6]):
+        opened()
+    bench.file.write_text('5')
+    bench.is_well()
+    del output
+    gc.collect()
+    assert bench.signal() == (0.0,)
+
+
+def test_ctrl_c_within_a_write_is_no_fault_of_the_device(opened, monkeypatch):
+    def interrupted(device, efforts):
+        raise KeyboardInterrupt
+    output = opened()
+    with monkeypatch.context() as patch:
+        patch.setattr(WriteOnly, 'write', interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            output.send((2.0,))
+    assert output.close() == ''
+
+
 def test_its_port_is_closed_after_the_last_signal(bench, opened, monkeypatch):
     gc.collect()            # outputs of other tests
     closed = []
@@ -168,6 +198,21 @@ def test_a_device_that_times_out_is_a_fault_and_is_vented_when_it_answers(bench,
     rig.wait_for(lambda: bench.signal() == (0.0,), 5.0, 'the safe voltage')
     assert rig.call(Trigger, 'valve_driver/reset').success
     rig.follows()
+
+
+@pytest.mark.ros
+def test_a_library_that_cancels_every_write_is_told_as_not_vented(bench, rig):
+    bench.breaks(CANCELLED)
+    rig.wait_for(lambda: rig.health['valve_driver'][-1].level == 2, 10.0, 'the fault')
+    rig.wait_for(lambda: rig.heard['valve_signal'][-1].plain.efforts == (0.0,), 5.0, '0 V')
+    rig.wait_for(lambda: 'the device may not be vented: back end WriteOnly' in
+                 rig.health['valve_driver'][-1].message, 5.0, 'the word')
+    driver = rig.processes['valve_driver']
+    driver.send_signal(signal.SIGTERM)
+    assert driver.wait(10.0) and driver.exit_code == 1
+    rig.wait_for(lambda: 'not vented: back end WriteOnly' in
+                 rig.health['valve_driver'][-1].message, 5.0, 'the last word')
+    assert 'CancelledError' in rig.health['valve_driver'][-1].message
 
 
 @pytest.mark.ros

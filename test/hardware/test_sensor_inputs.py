@@ -93,7 +93,7 @@ class SlowCell(SensorInput):
 
     def read(self, topic):
         reading = self.values['next'].pop(0)
-        if isinstance(reading, Exception):
+        if isinstance(reading, BaseException):
             raise reading
         return reading
 
@@ -101,12 +101,12 @@ class SlowCell(SensorInput):
 def test_only_what_is_new_is_taken_with_the_time_it_was_measured():
     begin_ns, ms = 1_700_000_000 * 10 ** 9, 10 ** 6
     given = [None, (5.0, begin_ns + ms), (5.0, begin_ns + ms), (5.0, begin_ns + 9 * ms),
-             OSError('gone'), ValueError('no number'), 'text', 7]
+             OSError('gone'), SystemExit(3), 'text', 7]
     readings = NewReadings(SlowCell({'next': given}), begin_ns)
     now_ns = [begin_ns + k * 4 * ms for k in range(1, 9)]
     assert [readings.take('force', now_ns[k]) for k in range(4)] == [
         None, (5.0, begin_ns + ms), None, (5.0, begin_ns + 9 * ms)]
-    for k, words in ((4, 'back end SlowCell: OSError: gone'), (5, 'ValueError: no number'),
+    for k, words in ((4, 'back end SlowCell: OSError: gone'), (5, 'SystemExit: 3'),
                      (6, 'could not convert')):
         with pytest.raises(DeviceError, match=words):
             readings.take('force', now_ns[k])
