@@ -57,6 +57,9 @@ class SignalWatchdog:
     silent, as after a restart; another one where it ended in order before that one began. Who
     else speaks is a second sender: the valve is vented until it is silent for 1 s.
 
+    Times [ns] are those of a clock that nobody sets: once it was set back, a driver that died
+    would seem to be heard from the future. Only the stamps of messages are of another clock.
+
     Attributes
     ----------
     state : str
@@ -148,28 +151,37 @@ class SignalWatchdog:
             return True
         return False
 
-    def tick(self, now_ns: int) -> ValveSignal | None:
-        """Return the safe ValveSignal to send, None while there is nothing to say."""
+    def tick(self, now_ns: int, stamp_ns: int | None = None) -> ValveSignal | None:
+        """
+        Return the safe ValveSignal to send, None while there is nothing to say.
+
+        ``stamp_ns`` is its stamp, where that is of another clock.
+        """
+        if not self._speaks(now_ns):
+            return None
+        return self.safe_signal(now_ns if stamp_ns is None else stamp_ns)
+
+    def _speaks(self, now_ns: int) -> bool:
         self._note_delay(now_ns)
         foreign = [one.name for one in self._others.values() if one.counts(now_ns)]
         if foreign:
             self._why = f'valve_signal is sent by {told([self._driver_name, *foreign])}'
             return self._vent(now_ns, CONTESTED)
         if self._last is None:
-            return None
+            return False
         silent_ns = now_ns - self._heard_ns
         if silent_ns <= self._timeout_ns:
             self.state = HEARS
-            return None
+            return False
         if self.state not in (VENTS, CONTESTED) and self._ended_in_order():
             self.state = RESTS
-            return None
+            return False
         if self.state != VENTS:
             self._why = (f'(limit {self._timeout_ns * 1e-6:.0f} ms): driver killed or stopped, '
                          f'or the machine too busy{self._known_of_load(now_ns)}')
         return self._vent(now_ns, VENTS)
 
-    def _vent(self, now_ns: int, state: str) -> ValveSignal:
+    def _vent(self, now_ns: int, state: str) -> bool:
         if self.state not in (VENTS, CONTESTED):
             self.vents += 1
         silent_ns = now_ns - self._heard_ns
@@ -178,12 +190,12 @@ class SignalWatchdog:
             self._silent_ms = (
                 silent_ns // _MS if silent_ns < NS_PER_S else silent_ns // NS_PER_S * 1000)
         self.state = state
-        return self.safe_signal(now_ns)
+        return True
 
-    def safe_signal(self, now_ns: int) -> ValveSignal:
+    def safe_signal(self, stamp_ns: int) -> ValveSignal:
         """Return the ValveSignal that vents, to be sent now."""
-        self._own_stamps.add(now_ns)
-        return ValveSignal(now_ns, VALVE_NAMES[self.valve_type], SAFE_EFFORTS[self.valve_type])
+        self._own_stamps.add(stamp_ns)
+        return ValveSignal(stamp_ns, VALVE_NAMES[self.valve_type], SAFE_EFFORTS[self.valve_type])
 
     @property
     def text(self) -> str:

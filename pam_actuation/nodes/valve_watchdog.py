@@ -16,6 +16,7 @@
 
 from collections.abc import Sequence
 import sys
+import time
 from typing import Any
 
 from pam_actuation.drivers.limits import WATCHDOG_S
@@ -71,11 +72,15 @@ class ValveWatchdog(ManagedNode):
         self.add_loop(PERIOD_S)
         self._answering = self.add_extra_loop(IDLE_PERIOD_S, self._answer)
 
+    def _judged_ns(self) -> int:
+        """Return the time [ns] that silence is judged by: that of a clock that nobody sets."""
+        return self.now_ns() if self.uses_simulated_time else time.monotonic_ns()
+
     def _listen(self) -> tuple[int, bool]:
         """Take what was said; return the time after and whether a second sender opens."""
         opens, taken = False, self.signals.take()
         # Only now: what arrived while this node waited for the processor is not from the future.
-        now_ns = self.now_ns()
+        now_ns = self._judged_ns()
         for message, info in taken:
             writer = info['writer']
             name = '' if writer is None else self._name_of(self.signals.topic, writer)
@@ -85,14 +90,14 @@ class ValveWatchdog(ManagedNode):
     def _answer(self) -> None:
         """Send the safe signal right after each opening of a second sender."""
         if self.watchdog.state == CONTESTED:
-            now_ns, opens = self._listen()
+            _, opens = self._listen()
             if opens:
-                self.send('valve_signal', self.watchdog.safe_signal(now_ns))
+                self.send('valve_signal', self.watchdog.safe_signal(self.now_ns()))
 
     def tick(self) -> None:
         """Take what was said; if the driver is silent or not alone, vent."""
         now_ns, _ = self._listen()
-        signal = self.watchdog.tick(now_ns)
+        signal = self.watchdog.tick(now_ns, self.now_ns())
         if signal is not None:
             self.send('valve_signal', signal)
         contested = self.watchdog.state == CONTESTED

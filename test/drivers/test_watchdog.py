@@ -60,6 +60,15 @@ def test_it_vents_after_the_timeout_and_goes_on_although_it_hears_itself(valve):
     assert watchdog.state == VENTS and watchdog.vents == 1
 
 
+def test_the_stamp_of_its_signal_may_be_of_another_clock(valve):
+    watchdog = driven(valve, 100)
+    signal = watchdog.tick(200 * MS, 7)
+    assert signal.stamp_ns == 7 and signal.efforts == SAFE[valve]
+    watchdog.on_signal(signal, 201 * MS)
+    # It did not take its own for the driver's.
+    assert watchdog.tick(202 * MS, 8).stamp_ns == 8
+
+
 def test_it_falls_silent_when_the_driver_speaks_again(valve):
     watchdog = driven(valve, 100)
     for now_ms in range(150, 200, 10):
