@@ -140,12 +140,13 @@ FAULT_TABLE = (
     Fault('pressure_frozen_ppr', 'Measured pressure frozen (PPR)',
           'as above, from the lag of the regulator', IGNORE, False,
           'warning: the regulator closes its own loop; ends with a reading that differs'),
-    Fault('air_missing', 'No air at the regulator (PPR)',
+    Fault('air_missing', 'Measured pressure does not rise (PPR)',
           f'measured pressure more than {AirMonitor.MISSING_PA * 1e-3:g} kPa below all that was '
           f'commanded within lag and dead time, and falling for {AirMonitor.FALLS_S:g} s, or '
           f'below {AirMonitor.EMPTY_GAUGE_PA * 1e-3:g} kPa gauge for {AirMonitor.EMPTY_S:g} s',
           IGNORE, False,
-          'warning; the pressure rises slowly from atmospheric pressure as the air returns'),
+          'warning that names sensor, air supply and gain; the pressure rises slowly from '
+          'atmospheric pressure, as the air returns'),
     Fault('supply_low', 'Supply loss',
           f'measured supply pressure less than {_LIMITS.supply_margin_pa * 1e-3:g} kPa above the '
           'command', IGNORE, False,

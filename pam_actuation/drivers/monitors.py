@@ -275,7 +275,7 @@ class CommandOrder:
 
 class AirMonitor:
     """
-    Notices that a regulator gets no air: the pressure falls although more is commanded.
+    Notices that a regulator seems to get no air: the pressure falls although more is commanded.
 
     A pressure that rises is only late. Lowest of what was commanded within lag and dead time is
     what the muscle must have at least.

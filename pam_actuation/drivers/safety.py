@@ -44,6 +44,7 @@ _LATE_TICK_NS = 50_000_000   # after a tick this late, queued messages get one c
 _GRACE_NS = 20_000_000
 _HIGHEST_SUPPLY_PA = 5e6     # that is believed
 _QUEUE = 256
+_CAUSES = 'sensor, air supply or gain'      # why a measured pressure does not rise
 _TO_GO_ON = '; call the service reset to go on'      # said of what is latched
 
 Fault = tuple[str, str]      # key in ``FAULTS``, sentence
@@ -427,8 +428,9 @@ class SafetySupervisor:
         target = self._rise.limited(target, self._dt_s, measured)
         if not self.needs_pressure and self.air.missing(target, measured, self._dt_s):
             self._warn('air_missing', (
-                f'the pressure does not follow: {gauge_kpa(measured):.0f} kPa gauge measured at '
-                f'a command of {gauge_kpa(target):.0f} kPa, no air supply?'), now_ns)
+                f'the measured pressure does not rise: {_CAUSES}? {gauge_kpa(measured):.0f} kPa '
+                f'gauge measured at a command of {gauge_kpa(target):.0f} kPa; with a faulty '
+                'sensor the muscle is under pressure'), now_ns)
             if not self._rise.active:
                 self._rise.begin()
                 target = self._rise.limited(target, 0.0, measured)
@@ -448,8 +450,8 @@ class SafetySupervisor:
         if target is not None and self._rise.limiting:
             texts.append('resuming, pressure rises at no more than '
                          f'{lim.resume_rate_pa_per_s * 1e-3:.0f} kPa/s' + (
-                             ' and waits for the measured pressure, which stays behind (air '
-                             'supply, another node that vents, gain of the regulator?)'
+                             ' and waits for the measured pressure, which stays behind '
+                             f'({_CAUSES}, another node that vents?)'
                              if self._rise.waited_s > WAITS_LONG_S else ''))
         if self._warnings:
             self._warnings = {key: item for key, item in self._warnings.items()

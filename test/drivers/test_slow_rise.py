@@ -197,7 +197,19 @@ def test_a_long_wait_for_the_muscle_is_told():
     bench.pressure = P_ATM_PA
     bench.command = P_ATM_PA + 300e3
     assert 'waits' not in bench.last(300).message
-    assert 'waits for the measured pressure, which stays behind' in bench.last(2000).message
+    assert ('waits for the measured pressure, which stays behind (sensor, air supply or gain, '
+            'another node that vents?)') in bench.last(2000).message
+
+
+def test_the_sensor_is_the_first_to_be_named_where_the_measured_pressure_does_not_rise():
+    bench = Bench(needs_pressure=False)
+    bench.run(100)
+    bench.pressure = P_ATM_PA
+    decision = bench.last(1000)
+    assert decision.warnings == ('air_missing',)
+    assert ('the measured pressure does not rise: sensor, air supply or gain? 0 kPa gauge '
+            'measured at a command of 300 kPa; with a faulty sensor the muscle is under pressure'
+            ) in decision.message
 
 
 def test_a_command_with_noise_is_met_although_every_rise_of_it_is_limited():
