@@ -16,8 +16,9 @@
 What a valve driver is told of a rig: the data sheet of its model file.
 
 The law then knows valves, line, volume and load as the rig states them; a lab does the
-same with its own rig's model file. Effects that no data sheet lists (hysteresis, creep,
-leak) stay unknown to the driver.
+same with its own rig's model file. Dead time and switching times count in every formulation
+of their effects, such as those that ``pam gap`` writes. Effects that no data sheet lists
+(hysteresis, creep, leak) stay unknown to the driver.
 """
 
 from collections.abc import Mapping
@@ -30,6 +31,7 @@ from pam_actuation.drivers.config import DriverConfig
 from pam_actuation.drivers.hsv_config import HsvConfig
 from pam_actuation.drivers.loop import DriverLoop
 from pam_actuation.drivers.ppr import PprConfig
+from pam_sim.effects.setting import equivalent
 from pam_sim.units import P_ATM_PA
 
 if TYPE_CHECKING:
@@ -65,7 +67,7 @@ def driver_config(rig: 'Rig', changes: Mapping[str, object] | None = None,
 
     """
     values = rig.parameters
-    dead_time_s = _effect(rig, 'valve_dead_time', 'delay_s')
+    dead_time_s = equivalent(rig, 'valve_dead_time', 'delay_s')
     told = {
         **{f'ppr.{name}': value for name, value in asdict(PprConfig.of_rig(values)).items()},
         'ppr.dead_time_s': dead_time_s,
@@ -74,8 +76,8 @@ def driver_config(rig: 'Rig', changes: Mapping[str, object] | None = None,
         'hsv.critical_ratio': values['b'],
         'hsv.supply_pa': values['supply_pa'],
         'hsv.dead_time_s': dead_time_s + (_DEAD_TIME_MARGIN_S if dead_time_s > 0.0 else 0.0),
-        'hsv.open_time_s': _effect(rig, 'valve_dead_zone', 'open_time_s'),
-        'hsv.close_time_s': _effect(rig, 'valve_dead_zone', 'close_time_s'),
+        'hsv.open_time_s': equivalent(rig, 'valve_dead_zone', 'open_time_s'),
+        'hsv.close_time_s': equivalent(rig, 'valve_dead_zone', 'close_time_s'),
     }
     # Without a dead time to wait for, the loop can remove more of the error per period.
     told['hsv.gain'] = _GAIN + (_GAIN_AT_ONCE - _GAIN) * max(0.0, 1.0 - dead_time_s / 0.02)
@@ -93,11 +95,6 @@ def driver_loops(rig: 'Rig | JointRig',
     """
     return {place: DriverLoop(muscle.valve, driver_config(muscle, changes))
             for place, muscle in rig.muscles.items()}
-
-
-def _effect(rig: 'Rig', name: str, parameter: str) -> float:
-    setting = rig.effect(name)
-    return 0.0 if setting is None else setting.parameters[parameter]
 
 
 def _load(rig: 'Rig') -> dict[str, float]:

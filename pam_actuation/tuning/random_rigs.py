@@ -33,17 +33,15 @@ Both muscles of a joint are drawn each by itself.
 The ranges are design values. Each is drawn evenly, independently of the others.
 """
 
-from typing import Any, TYPE_CHECKING, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from pam_sim.annotations import FloatArray
 from pam_sim.effects.registry import get_effect
+from pam_sim.effects.setting import EffectSetting, forms_of
 from pam_sim.joint.rig import JointRig
 from pam_sim.rig import Rig
 from pam_sim.units import P_ATM_PA
-
-if TYPE_CHECKING:
-    from pam_sim.effects.setting import EffectSetting
 
 FRICTION_FACTOR = (0.5, 2.0)
 VALVE_FACTOR = (0.7, 1.3)
@@ -106,8 +104,9 @@ def _drawn(rig: Rig, part: FloatArray) -> Rig:
         changed['supply_pa'] = P_ATM_PA + gauge_pa * _between(SUPPLY_FACTOR, part[3])
     if 'mass_kg' in values:
         changed['mass_kg'] = _between(MASS_KG, part[4])
+    delays = forms_of(rig.effects, 'valve_dead_time')
     effects = [_with_friction(setting, friction) for setting in rig.effects
-               if setting.name != 'valve_dead_time']
+               if setting not in delays]
     effects.append({'name': 'valve_dead_time',
                     'parameters': {'delay_s': _between(DEAD_TIME_S, part[2])}})
     return rig.with_(parameters=changed, effects=effects)
@@ -117,7 +116,7 @@ def _between(ends: tuple[float, float], part: float) -> float:
     return float(ends[0] + (ends[1] - ends[0]) * part)
 
 
-def _with_friction(setting: 'EffectSetting', factor: float) -> 'EffectSetting | dict[str, Any]':
+def _with_friction(setting: EffectSetting, factor: float) -> EffectSetting | dict[str, Any]:
     """Return an effect of dry friction with its level scaled, any other as it is."""
     effect = get_effect(setting.name)
     if effect.family != 'friction':

@@ -21,6 +21,7 @@ import numpy as np
 from pam_actuation.valves import measure
 from pam_actuation.valves.chain import Bench
 from pam_actuation.valves.energy import power_values
+from pam_sim.effects.setting import forms_of
 from pam_sim.errors import InputError
 from pam_sim.load import LOADS
 
@@ -97,8 +98,9 @@ def _measure(rig: 'Rig', seed: int, power: dict[str, float], hold_s: float,
     done()
     hold = measure.measure_hold(bench, hold_s, power)
     done()
+    leaks = forms_of(rig.effects, 'leakage')
     leaking = rig.with_(effects=[
-        *(item for item in rig.effects if not item.name.startswith('leakage')), measure.LEAK])
+        *(item for item in rig.effects if item not in leaks), measure.LEAK])
     leak = measure.measure_hold(Bench(leaking, seed), hold_s, power)
     done()
     loss = measure.measure_power_loss(bench)

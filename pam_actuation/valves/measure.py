@@ -26,6 +26,7 @@ from pam_actuation.valves import figures
 from pam_actuation.valves.chain import Bench, STEP_S
 from pam_actuation.valves.energy import normal_litres, pulse_energy_j, supplied_kg
 from pam_sim.annotations import FloatArray
+from pam_sim.effects.setting import equivalent
 from pam_sim.units import P_ATM_PA
 from pam_sim.valve.ppr import voltage_v
 
@@ -181,8 +182,7 @@ def measure_flow(rig: 'Rig') -> dict[str, Any]:
 
 def _rate(rig: 'Rig', start_pa: float, duties: tuple[float, float]) -> float:
     """Return the pressure rate [Pa/s] over a few periods, after the dead time of the valve."""
-    delay = rig.effect('valve_dead_time')
-    wait = _steps(0.0 if delay is None else delay.parameters['delay_s'])
+    wait = _steps(equivalent(rig, 'valve_dead_time', 'delay_s'))
     signal = np.tile(duties, (wait + _steps(OPEN_LOOP_TIME_S), 1))
     pressure = rig.simulate(signal, initial_pressure_pa=P_ATM_PA + start_pa).true_pressure_pa
     return float(pressure[-1] - pressure[wait]) / OPEN_LOOP_TIME_S

@@ -16,10 +16,13 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 from pam_sim.effects.registry import get_effect
 from pam_sim.errors import InputError
+
+if TYPE_CHECKING:
+    from pam_sim.rig import Rig
 
 
 @dataclass(frozen=True)
@@ -78,3 +81,32 @@ def settings_of(items: Iterable[EffectSetting | Mapping[str, Any] | str],
             raise InputError(f'effect `{setting.name}` is listed twice', 'effects')
         seen.add(setting.name)
     return settings
+
+
+def forms_of(settings: Iterable[EffectSetting], name: str) -> list[EffectSetting]:
+    """Return the settings of an effect, in its own form or in other formulations of it."""
+    return [one for one in settings if name in (one.name, get_effect(one.name).variant_of)]
+
+
+def equivalent(rig: 'Rig', name: str, quantity: str) -> float:
+    """
+    Return a number that an effect of a rig is equivalent to, whatever its formulation.
+
+    Parameters
+    ----------
+    rig : pam_sim.Rig
+        With effects and a valve.
+    name : str
+        The effect; its other formulations count as well.
+    quantity : str
+        One that the effect reports, as under ``equivalent`` in gap.json.
+
+    Returns
+    -------
+    float
+        0 where none acts with the valve of the rig; the sum where several do.
+
+    """
+    acting = [(get_effect(one.name), one.parameters) for one in forms_of(rig.effects, name)]
+    return sum((effect.report(values, rig).get(quantity, (0.0, ''))[0]
+                for effect, values in acting if rig.valve in effect.valves), 0.0)

@@ -19,6 +19,7 @@ from pam_actuation.tuning.random_rigs import (
     DEAD_TIME_S, FORCE_MAP_FACTOR, FRICTION_FACTOR, MASS_KG, random_rigs, SUPPLY_FACTOR,
     VALVE_FACTOR)
 from pam_sim import load_rig
+from pam_sim.effects.setting import forms_of
 from pam_sim.units import P_ATM_PA
 import pytest
 
@@ -59,3 +60,9 @@ def test_same_seed_same_rigs_and_the_first_ones_do_not_depend_on_the_count():
 def test_a_rig_without_dead_time_or_friction_gets_the_first_and_no_friction():
     rig = random_rigs(load_rig('dmsp_5_300_hanging_mass'), 1)[0]
     assert [setting.name for setting in rig.effects] == ['valve_dead_time']
+
+
+def test_a_dead_time_in_another_formulation_does_not_stay_beside_the_drawn_one():
+    nominal = load_rig('dmsp_5_300_hanging_mass').with_(effects=['valve_dead_time_by_direction'])
+    drawn = random_rigs(nominal, 1)[0]
+    assert len(forms_of(drawn.effects, 'valve_dead_time')) == 1

@@ -1,0 +1,46 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What a driver is told of a rig does not depend on the formulation of an effect."""
+
+from pam_actuation.drivers.for_rig import driver_config
+from pam_sim import load_rig
+import pytest
+
+SWITCHING = {'open_time_s': 3.5e-3, 'close_time_s': 2.5e-3}
+DEAD_TIME = {'name': 'valve_dead_time', 'parameters': {'delay_s': 0.018}}
+
+
+@pytest.mark.parametrize('form, own', [
+    ('valve_dead_zone_gradual', {'ramp_s': 1e-4}),
+    ('valve_dead_zone_two_ramps', {'rise_s': 1e-4, 'fall_s': 1e-4})])
+def test_switching_times_of_every_formulation_reach_the_driver(form, own):
+    rig = load_rig('dmsp_20_300_hanging_mass', valve='hsv')
+    plain, other = (driver_config(rig.with_(effects=[DEAD_TIME, dead_zone])) for dead_zone in (
+        {'name': 'valve_dead_zone', 'parameters': SWITCHING},
+        {'name': form, 'parameters': {**SWITCHING, **own}}))
+    assert other == plain
+    assert plain.hsv.open_time_s == 3.5e-3 and plain.hsv.close_time_s == 2.5e-3
+
+
+def test_a_dead_time_by_direction_reaches_the_driver_of_a_regulator_as_its_mean():
+    rig = load_rig('dmsp_5_300_hanging_mass')
+    by_direction = {'name': 'valve_dead_time_by_direction',
+                    'parameters': {'delay_s': 0.018, 'vent_later_s': 0.01}}
+    plain, other = (driver_config(rig.with_(effects=[one])) for one in (DEAD_TIME, by_direction))
+    assert other == plain and plain.ppr.dead_time_s == 0.018
+    # It acts on no pair of valves, so their driver has nothing to wait for.
+    pair = rig.with_(valve='hsv', effects=[by_direction])
+    assert driver_config(pair).hsv == driver_config(pair.with_(effects=[])).hsv
