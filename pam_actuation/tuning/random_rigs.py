@@ -20,10 +20,11 @@ what              drawn                                       valve
 ================  ==========================================  ==================
 dry friction      factor 0.5 to 2, logarithmic                both
 valve speed       T_m, or C, times 0.7 to 1.3                 PPR, or HSV
-dead time         20 to 45 ms                                 both
+dead time         times 2/3 to 1.5; 20 to 45 ms where the     both
+                  rig has none
 supply            0 to 10 % less gauge pressure               HSV (a PPR's model
                                                               has no supply)
-load              4 to 5.5 kg                                 both
+load              mass times 0.8 to 1.1                       both
 limb of a joint   mass and inertia times 0.8 to 1.1           both
 force map         gain times 0.85 to 1.15                     both
 ================  ==========================================  ==================
@@ -33,21 +34,25 @@ Both muscles of a joint are drawn each by itself.
 The ranges are design values. Each is drawn evenly, independently of the others.
 """
 
+from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numpy as np
 from pam_sim.annotations import FloatArray
 from pam_sim.effects.registry import get_effect
-from pam_sim.effects.setting import EffectSetting, forms_of
+from pam_sim.effects.setting import EffectSetting, equivalent, forms_of
 from pam_sim.joint.rig import JointRig
+from pam_sim.parameters import Parameter
 from pam_sim.rig import Rig
 from pam_sim.units import P_ATM_PA
 
 FRICTION_FACTOR = (0.5, 2.0)
 VALVE_FACTOR = (0.7, 1.3)
-DEAD_TIME_S = (0.020, 0.045)
+DEAD_TIME_S = (0.020, 0.045)        # of a rig with NOMINAL_DEAD_TIME_S
+NOMINAL_DEAD_TIME_S = 0.030
 SUPPLY_FACTOR = (0.9, 1.0)          # of the gauge pressure
-MASS_KG = (4.0, 5.5)
+MASS_KG = (4.0, 5.5)                # of a rig with NOMINAL_KG
+NOMINAL_KG = 5.0
 FORCE_MAP_FACTOR = (0.85, 1.15)
 LIMB_FACTOR = (0.8, 1.1)
 _DRAWS = 6                          # numbers for one muscle
@@ -103,24 +108,32 @@ def _drawn(rig: Rig, part: FloatArray) -> Rig:
         gauge_pa = values['supply_pa'] - P_ATM_PA
         changed['supply_pa'] = P_ATM_PA + gauge_pa * _between(SUPPLY_FACTOR, part[3])
     if 'mass_kg' in values:
-        changed['mass_kg'] = _between(MASS_KG, part[4])
-    delays = forms_of(rig.effects, 'valve_dead_time')
-    effects = [_with_friction(setting, friction) for setting in rig.effects
-               if setting not in delays]
-    effects.append({'name': 'valve_dead_time',
-                    'parameters': {'delay_s': _between(DEAD_TIME_S, part[2])}})
-    return rig.with_(parameters=changed, effects=effects)
+        mass = next(p for p in rig.parameter_list if p.name == 'mass_kg')
+        changed['mass_kg'] = _within(
+            mass, _between(MASS_KG, part[4]) * (values['mass_kg'] / NOMINAL_KG))
+    delay_s = _between(DEAD_TIME_S, part[2])
+    stated = forms_of(rig.effects, 'valve_dead_time')
+    has_one = equivalent(rig, 'valve_dead_time', 'delay_s') > 0.0
+    delays = stated if has_one else [EffectSetting.of('valve_dead_time')]
+    return rig.with_(parameters=changed, effects=[
+        *(_resized(one, lambda value: value * friction)
+          if get_effect(one.name).family == 'friction' else one
+          for one in rig.effects if one not in stated),
+        *(_resized(one, lambda value: delay_s * (value / NOMINAL_DEAD_TIME_S))
+          for one in delays)])
 
 
 def _between(ends: tuple[float, float], part: float) -> float:
     return float(ends[0] + (ends[1] - ends[0]) * part)
 
 
-def _with_friction(setting: EffectSetting, factor: float) -> EffectSetting | dict[str, Any]:
-    """Return an effect of dry friction with its level scaled, any other as it is."""
+def _within(parameter: Parameter, value: float) -> float:
+    return min(max(value, parameter.lower), parameter.upper)
+
+
+def _resized(setting: EffectSetting, change: Callable[[float], float]) -> dict[str, Any]:
+    """Return an effect with its amplitudes changed, within their ranges."""
     effect = get_effect(setting.name)
-    if effect.family != 'friction':
-        return setting
     return {'name': setting.name, 'parameters': {
-        name: value * factor if name in effect.amplitude else value
-        for name, value in setting.parameters.items()}}
+        p.name: _within(p, change(setting.parameters[p.name])) if p.name in effect.amplitude
+        else setting.parameters[p.name] for p in effect.parameters}}

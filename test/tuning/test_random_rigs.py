@@ -62,7 +62,32 @@ def test_a_rig_without_dead_time_or_friction_gets_the_first_and_no_friction():
     assert [setting.name for setting in rig.effects] == ['valve_dead_time']
 
 
-def test_a_dead_time_in_another_formulation_does_not_stay_beside_the_drawn_one():
+def test_load_and_dead_time_are_drawn_about_those_of_the_rig():
+    rig = load_rig('dmsp_20_300_hanging_mass', valve='hsv').with_(
+        parameters={'mass_kg': 24.0},
+        effects=[{'name': 'valve_dead_time', 'parameters': {'delay_s': 0.012}}])
+    rigs = random_rigs(rig, 200, seed=1)
+    kg = [one.parameters['mass_kg'] for one in rigs]
+    delays_s = [one.effect('valve_dead_time').parameters['delay_s'] for one in rigs]
+    assert min(kg) >= 0.8 * 24.0 and max(kg) <= 1.1 * 24.0
+    assert min(delays_s) >= 0.008 and max(delays_s) <= 0.018
+    assert np.ptp(kg) > 0.9 * 0.3 * 24.0 and np.ptp(delays_s) > 0.9 * 0.010
+
+
+def test_a_dead_time_in_another_formulation_is_drawn_in_this_one():
     nominal = load_rig('dmsp_5_300_hanging_mass').with_(effects=['valve_dead_time_by_direction'])
     drawn = random_rigs(nominal, 1)[0]
-    assert len(forms_of(drawn.effects, 'valve_dead_time')) == 1
+    delay, = forms_of(drawn.effects, 'valve_dead_time')
+    assert delay.name == 'valve_dead_time_by_direction'
+    nominal_s, drawn_s = nominal.effects[0].parameters, delay.parameters
+    assert drawn_s['vent_later_s'] / nominal_s['vent_later_s'] == pytest.approx(
+        drawn_s['delay_s'] / nominal_s['delay_s']) != 1.0
+
+
+def test_a_number_at_the_end_of_its_range_stays_in_it():
+    rig = load_rig('dmsp_40_300_hanging_mass').with_(
+        parameters={'mass_kg': 500.0},
+        effects=[{'name': 'valve_dead_time', 'parameters': {'delay_s': 0.5}}])
+    for one in random_rigs(rig, 20, seed=1):
+        assert one.parameters['mass_kg'] <= 500.0
+        assert one.effect('valve_dead_time').parameters['delay_s'] <= 0.5
