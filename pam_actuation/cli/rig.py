@@ -78,7 +78,8 @@ def add_arguments(parser: Parser) -> None:
                         help='gauge pressures at the ends of that range, kPa')
     parser.add_argument('--known', action='extend', nargs='+', default=[],
                         metavar='NAME=VALUE',
-                        help='numbers, SI, that are exact; may be repeated')
+                        help='numbers, SI, that are exact; EFFECT.PARAMETER is one of an effect, '
+                        'such as valve_dead_zone.open_time_s=0.0035; may be repeated')
     parser.add_argument('--about', action='extend', nargs='+', default=[],
                         metavar='NAME=VALUE±SD',
                         help='numbers with one standard deviation: mass_kg=1.2±0.3, 1.2±10%% or '
@@ -104,13 +105,11 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _new(args: argparse.Namespace) -> int:
-    from pam_actuation.drivers.vented import left_remarks
     from pam_actuation.rig_files.force_map import describe_table
     from pam_actuation.rig_files.questions import ask_description
     from pam_actuation.rig_files.text import rig_file
     from pam_sim.errors import InputError
     from pam_sim.files import write_text
-    from pam_sim.muscle.table_remarks import table_remarks
     if not args.out.endswith(('.yaml', '.yml')):
         raise InputError('a rig file ends in .yaml', f'--out {args.out}')
     check_outputs(args, args.out)
@@ -123,7 +122,7 @@ def _new(args: argparse.Namespace) -> int:
         described.work_out()
         text, rig = rig_file(described, args.out)
         write_text(args.out, text)
-    remarks = list(dict.fromkeys([*remarks, *table_remarks(rig.muscle), *left_remarks(rig)]))
+    remarks = list(dict.fromkeys([*remarks, *_remarks(rig, args.out)]))
     following = _following(rig, args.out)
     lines = [f'rig file: {args.out}', *_numbers_text(rig), *_law_text(rig),
              *remarks, f'next: {following}']
@@ -186,7 +185,9 @@ def _described(args: argparse.Namespace) -> 'Description':
 
 
 def _state_numbers(args: argparse.Namespace, found: 'Description') -> None:
+    from dataclasses import replace
     from pam_actuation.rig_files.numbers import FORMS, read_stated, split_statement, Stated
+    from pam_sim.effects.registry import effect_parameter
     from pam_sim.errors import InputError
     from pam_sim.muscle.coefficients import ALL, PREFIX
     from pam_sim.sensors import SENSOR_PARAMETERS
@@ -201,8 +202,16 @@ def _state_numbers(args: argparse.Namespace, found: 'Description') -> None:
                 found.unknown_law.append(text)
                 continue
             names = {**known, **sensors} if option == '--known' else known
+            named = text.partition('=')[0].strip()
+            of_effect = '.' in named and not named.startswith(PREFIX)
+            if of_effect:
+                _, parameter = effect_parameter(named, where, where)
+                names = {named: replace(parameter, name=named)}
+                if option == '--unknown':
+                    raise InputError(f'a file states no unknown number of an effect; pam identify '
+                                     f'RUN --unknown {named} finds it', where)
             name, rest = split_statement(text, names, where)
-            if name in found.numbers or name in found.sensors:
+            if name in found.numbers or name in found.sensors or name in found.effects:
                 raise InputError(f'`{name}` is stated twice', where)
             if not rest and option != '--unknown':
                 raise InputError(f'`{name}` has no value; allowed {names[name].allowed}', where)
@@ -213,6 +222,9 @@ def _state_numbers(args: argparse.Namespace, found: 'Description') -> None:
                 wanted = {'--known': 'a number alone', '--about': 'a number with ±',
                           '--unknown': 'a number to begin with, or nothing'}[option]
                 raise InputError(f'`{rest}` is not {wanted}; numbers are {FORMS}', where)
+            if of_effect:
+                found.effects[name] = said
+                continue
             if name in sensors:
                 assert said.value is not None
                 found.sensors[name] = said.value
@@ -229,16 +241,22 @@ def _one_of(option: str, value: str, allowed: Any) -> str:
     return value
 
 
-def _check(args: argparse.Namespace) -> int:
+def _remarks(rig: 'Rig', path: str) -> list[str]:
+    """Return what a person should know of a rig that a file holds."""
     from pam_actuation.drivers.vented import left_remarks
-    from pam_actuation.rig_files.by_size import nominal_beside_size
-    from pam_sim import load_rig
+    from pam_actuation.rig_files.effects import unstated_valve_data
     from pam_sim.idle import idle_remarks
     from pam_sim.muscle.table_remarks import table_remarks
+    return [*table_remarks(rig.muscle), *left_remarks(rig), *idle_remarks(path, rig),
+            *unstated_valve_data(rig)]
+
+
+def _check(args: argparse.Namespace) -> int:
+    from pam_actuation.rig_files.by_size import nominal_beside_size
+    from pam_sim import load_rig
     from pam_sim.rig_text import rig_title
     rig = load_rig(args.file)
-    remarks = [*nominal_beside_size(rig), *table_remarks(rig.muscle),
-               *left_remarks(rig), *idle_remarks(args.file, rig)]
+    remarks = [*nominal_beside_size(rig), *_remarks(rig, args.file)]
     size = f'muscle of {1e3 * rig.muscle.bore_m:.4g} mm by {1e3 * rig.muscle.length_m:.4g} mm'
     lines = [rig_title(rig), f'{size}, load {rig.load}, valve {rig.valve}', *_numbers_text(rig),
              *_exact_text(rig), *(f'remark: {text}' for text in remarks)]

@@ -66,6 +66,8 @@ class Description:
         Range of the input [V] and of the pressure [Pa gauge] of the regulator.
     numbers : dict
         Parameter name -> Stated.
+    effects : dict
+        ``EFFECT.PARAMETER`` -> Stated.
     sensors : dict
         Sensor setting -> value.
     unknown_law : list of str
@@ -88,6 +90,7 @@ class Description:
     volts: tuple[float, float] | None = None
     gauge_pa: tuple[float, float] | None = None
     numbers: dict[str, Stated] = field(default_factory=dict)
+    effects: dict[str, Stated] = field(default_factory=dict)
     sensors: dict[str, float] = field(default_factory=dict)
     unknown_law: list[str] = field(default_factory=list)
     notes: dict[str, str] = field(default_factory=dict)

@@ -90,7 +90,7 @@ def split_statement(text: str, known: Iterable[str], where: str) -> tuple[str, s
     names = list(known)
     if name not in names:
         raise InputError(f'unknown parameter `{name}`{did_you_mean(name, names)}; allowed: '
-                         f'{", ".join(names)}', where)
+                         f'{", ".join(names)}, or EFFECT.PARAMETER', where)
     return name, rest
 
 

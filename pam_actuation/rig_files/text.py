@@ -21,6 +21,7 @@ import warnings
 
 import numpy as np
 from pam_actuation.rig_files.description import Description
+from pam_actuation.rig_files.effects import effect_lines
 from pam_sim.load import LOADS
 from pam_sim.located_yaml import load_yaml
 from pam_sim.model_file import load_rig
@@ -102,6 +103,7 @@ def _text(described: Description, force_map: str) -> str:
         value = described.sensors.get(parameter.name)
         lines.append(_line(parameter, parameter.default if value is None else value,
                            value is None))
+    lines += effect_lines(described.effects, described.valve)
     return '\n'.join(lines) + '\n'
 
 

@@ -22,7 +22,8 @@ from types import FunctionType, ModuleType
 from pam_sim.compiled import is_compiled
 from pam_sim.effects.declaration import check_names
 from pam_sim.effects.effect import Effect
-from pam_sim.errors import InputError
+from pam_sim.errors import did_you_mean, InputError
+from pam_sim.parameters import Parameter
 from pam_sim.plugins import check_name, pick, plugin_files, plugin_module
 from pam_sim.rollout.hooks import check_hook, HOOKS
 
@@ -135,3 +136,32 @@ def get_effect(name: str, where: str = '') -> Effect:
 
     """
     return all_effects().get(name) or pick(effects(), name, 'effect', where, VARIABLE)
+
+
+def effect_parameter(name: str, what: str, where: str = '') -> tuple[Effect, Parameter]:
+    """
+    Return effect and parameter of a name ``EFFECT.PARAMETER``.
+
+    Parameters
+    ----------
+    name : str
+        With a dot.
+    what : str
+        What the name stands for, for the message.
+    where : str
+        Place of the name, for the message; by default the name.
+
+    Raises
+    ------
+    InputError
+        Unknown effect or parameter; the message lists the names there are.
+
+    """
+    effect_name, _, key = name.partition('.')
+    effect = get_effect(effect_name, what)
+    by_name = {p.name: p for p in effect.parameters}
+    if key not in by_name:
+        raise InputError(f'`{key}` is no parameter of {effect_name}'
+                         f'{did_you_mean(key, by_name)}; allowed: {", ".join(by_name)}',
+                         where or name)
+    return effect, by_name[key]

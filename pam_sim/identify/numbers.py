@@ -18,14 +18,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 import math
 
-from pam_sim.effects.registry import get_effect
+from pam_sim.effects.registry import effect_parameter, get_effect
 from pam_sim.effects.setting import EffectSetting
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.gap.data.noise import SMALLEST
 from pam_sim.gap.subsystems.effects import acts_on
 from pam_sim.gap.subsystems.problem import SubsystemProblem
-from pam_sim.muscle.coefficients import ALL, PREFIX
-from pam_sim.parameters import Parameter
+from pam_sim.muscle.coefficients import PREFIX
 from pam_sim.rig import Rig
 from pam_sim.sensors.zeros import ZEROS
 
@@ -191,26 +190,20 @@ def unknown_numbers(rig: Rig, names: Sequence[str] = ()) -> list[Number]:
             found[name] = Number(name, '', name, p.unit, value if value > 0.0 or p.lower <= 0.0
                                  else p.default, p.lower, p.upper, description=p.description)
             continue
-        effect_name, dot, key = name.partition('.')
-        if not dot or effect_name == ALL:
+        if '.' not in name or name.startswith(PREFIX):
             raise InputError(
                 f'`{name}` is no number of the rig{did_you_mean(name, parameters)}; allowed: '
                 f'{", ".join(parameters)}, or EFFECT.PARAMETER', 'unknown number')
-        found[name] = _of_effect(rig, name, effect_name, key)
+        found[name] = _of_effect(rig, name)
     return list(found.values())
 
 
-def _of_effect(rig: Rig, name: str, effect_name: str, key: str) -> Number:
-    effect = get_effect(effect_name, 'unknown number')
-    by_name = {p.name: p for p in effect.parameters}
-    if key not in by_name:
-        raise InputError(f'`{key}` is no parameter of {effect_name}'
-                         f'{did_you_mean(key, by_name)}; allowed: {", ".join(by_name)}', name)
-    p: Parameter = by_name[key]
-    here = next((e for e in rig.effects if e.name == effect_name), None)
-    start = here.parameters.get(key, p.default) if here is not None else (
-        max(0.0, p.lower) if key in effect.amplitude else p.default)
-    return Number(name, effect_name, key, p.unit, float(start), p.lower, p.upper,
+def _of_effect(rig: Rig, name: str) -> Number:
+    effect, p = effect_parameter(name, 'unknown number')
+    here = rig.effect(effect.name)
+    start = here.parameters.get(p.name, p.default) if here is not None else (
+        max(0.0, p.lower) if p.name in effect.amplitude else p.default)
+    return Number(name, effect.name, p.name, p.unit, float(start), p.lower, p.upper,
                   description=p.description)
 
 

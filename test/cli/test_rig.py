@@ -372,6 +372,12 @@ def test_a_remark_tells_what_0_v_leaves_in_the_muscle(
     (['--valve', 'hsv', '--regulator-volts', '0:10'], 'no regulator'),
     (['--muscle', 'dsmp'], 'dmsp_5_300'), (['--load', 'hung'], 'hanging_mass'),
     (['--bore-mm', '90'], '17.9 to 89.4 mm'), (['--force-map', 'none.csv'], 'none.csv'),
+    (['--known', 'valve_dead_zone.open_time_s=0.3'], '0 to 0.02 s'),
+    (['--known', 'valve_dead_zone.open_time=0.003'], 'did you mean `open_time_s`'),
+    (['--known', 'valve_ded_zone.open_time_s=0.003'], 'did you mean `valve_dead_zone`'),
+    (['--known', 'valve_dead_zone.open_time_s=0.001', 'valve_dead_zone.open_time_s=0.002'],
+     'stated twice'),
+    (['--unknown', 'valve_dead_zone.open_time_s'], 'pam identify'),
     (['--out', 'rig.txt'], '.yaml'), (['rig.yaml'], 'rig.yaml')])
 def test_a_mistake_is_one_sentence_and_nothing_is_written(options, said, folder, capsys):
     assert main(['rig', 'new', '--out', 'x.yaml', *options]) == 2
