@@ -71,7 +71,8 @@ def effect_lines(said: Mapping[str, Stated], valve: str) -> list[str]:
 
 def _entry(effect: Effect, stated: Mapping[str, Stated], valve: str, sign: str) -> list[str]:
     """Return the lines of one effect, behind a sign that makes comments of them or none."""
-    lines = [f'  # {row}' for row in textwrap.wrap(effect.sentence, WIDTH - 2)]
+    lines = [f'  # {row}' for row in textwrap.wrap(
+        effect.sentence_for({n: one.value or 0.0 for n, one in stated.items()}), WIDTH - 2)]
     lines += [f'  {sign}- name: {effect.name}', f'  {sign}  parameters:']
     of_others = {free.name for free in effect.fitting.free if valve not in free.valves}
     known = {}

@@ -123,6 +123,8 @@ class Effect:
         ``subsystem`` is one of :data:`pam_sim.effects.declaration.SUBSYSTEMS`.
     sentence : str
         What it is, for people.
+    opposite : str
+        What it is where its first amplitude is negative; by default the same.
     source : str
         Where the equation comes from.
     equation : str
@@ -165,6 +167,7 @@ class Effect:
     amplitude: tuple[str, ...]
     reported: tuple[Reported, ...] = ()
     equation: str = ''
+    opposite: str = ''
     variant_of: str = ''
     relative_of: tuple[str, ...] = ()
     states: np.dtype[Any] | None = None
@@ -199,6 +202,11 @@ class Effect:
     def sensor_parameter(self) -> str:
         """Return the parameter that is the bias, the gain error or the lag of a sensor."""
         return self.fitting.sensor_parameter or self.amplitude[0]
+
+    def sentence_for(self, values: Mapping[str, float]) -> str:
+        """Return what it is, for people, with these parameters; some may be left out."""
+        return self.opposite if self.opposite and values.get(
+            self.amplitude[0], 0.0) < 0.0 else self.sentence
 
     def free_parameters(self, valve: str) -> tuple[FreeParameter, ...]:
         """Return what is fitted with a type of valve; by default every amplitude."""

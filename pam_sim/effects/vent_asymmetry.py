@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Venting is slower than filling by a ratio.
+Venting is slower than filling by a ratio, or quicker where it is below 1.
 
 PPR: the time constant is longer by the ratio while the pressure falls towards
 its set point. HSV: the flow through the vent valve is smaller by the ratio.
@@ -41,6 +41,7 @@ EFFECT = Effect(
     family='valve_nonlinearity',
     subsystem='valve',
     sentence='Venting takes longer than filling.',
+    opposite='Venting is quicker than filling.',
     source='Design choice of form; measured on proportional valves with muscles: falling steps '
            '1.5 to 2 times slower than rising ones.',
     equation='PPR: T_m -> r T_m while p > p_set; HSV: mdot_vent -> mdot_vent / r; '

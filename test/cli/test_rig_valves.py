@@ -44,6 +44,7 @@ def test_data_of_valves_are_stated_as_parameters_of_effects(capsys):
         'leakage': {'conductance_m3_per_s_pa': 1e-13},
         'supply_droop': {'reservoir_volume_m3': 0.003, 'band_pa': 1e5,
                          'compressor_flow_kg_per_s': 2e-4}}
+    assert '  # Venting is quicker than filling.' in open('made.yaml', encoding='utf-8').read()
     assert rig.effect('valve_dead_time').source == {'sd': {'delay_s': 0.0018}}
     driver = driver_config(rig).hsv
     assert (driver.open_time_s, driver.close_time_s) == (0.0035, 0.0025)

@@ -177,6 +177,17 @@ def test_a_wrong_number_is_a_sentence_of_its_own():
                     'falls from 8 to 0.4 kPa.')
 
 
+@pytest.mark.parametrize('ratio_minus_1, sentence', [
+    (-0.27, 'Venting is quicker than filling'), (0.4, 'Venting takes longer than filling')])
+def test_the_sentence_on_venting_says_what_the_ratio_says(ratio_minus_1, sentence):
+    vent = effect('vent_asymmetry', 'vent_to_fill_time_ratio', '-')
+    vent['parameters'] = {'ratio_minus_1': {'value': ratio_minus_1, 'unit': '-', 'ci95': [0, 0]}}
+    named = NamedEffect('vent_asymmetry', 'valve', [], ('vent_asymmetry',))
+    found = GapResult('effects', '', signals={'pressure': PRESSURE}, effects=[vent])
+    text = explain(found, SimpleNamespace(named=[named], share={}, mistaken={}, complete=True))
+    assert text.startswith(f'{sentence} (vent_asymmetry: ')
+
+
 def test_a_number_that_was_0_has_no_change_in_percent():
     spring = Calibrated('spring_n_per_m', 'N/m', 0.0, 400.0, (390.0, 410.0), 8.0)
     text = said('parameter', {'pressure': PRESSURE}, parameters=[spring])

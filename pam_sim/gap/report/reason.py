@@ -76,7 +76,7 @@ def _told(result: GapResult, outcome: Outcome) -> str:
 
 def _found(result: GapResult, chosen: Callable[[str], bool]) -> list[str]:
     """Return a sentence for each effect, and one for the numbers, whose names are chosen."""
-    parts = [f'{_sentence(e["name"])} ({e["name"]}: {_quantity(e["equivalent"])}'
+    parts = [f'{_sentence(e["name"], e["parameters"])} ({e["name"]}: {_quantity(e["equivalent"])}'
              f'{_together(e["together"])}).' for e in result.effects if chosen(e['name'])]
     numbers = [c for c in result.parameters if chosen(c.name)]
     return [*parts, *([_numbers(numbers) + '.'] if numbers else [])]
@@ -88,8 +88,9 @@ def join(parts: Iterable[str]) -> str:
     return parts[0] if len(parts) == 1 else ', '.join(parts[:-1]) + ' and ' + parts[-1]
 
 
-def _sentence(name: str) -> str:
-    return effects()[name].sentence.rstrip('.')
+def _sentence(name: str, parameters: Mapping[str, Mapping[str, Any]] | None = None) -> str:
+    values = {key: one['value'] for key, one in (parameters or {}).items()}
+    return effects()[name].sentence_for(values).rstrip('.')
 
 
 def _quantity(equivalent: Mapping[str, Mapping[str, Any]]) -> str:
