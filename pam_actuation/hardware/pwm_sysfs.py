@@ -65,7 +65,7 @@ class PwmChannel:
             time.sleep(0.01)
 
     def start(self, period_ns: int, opening: float) -> None:
-        """Run with a period [ns] and a mean opening of the valve of 0..1."""
+        """Run with a period [ns] and a duty of the valve of 0..1."""
         polarity = self.folder / 'polarity'
         if polarity.exists() and sysfs.read_text(polarity) != 'normal':
             sysfs.write(self.folder / 'enable', 0)      # else the kernel refuses the change
@@ -78,11 +78,11 @@ class PwmChannel:
         sysfs.write(self.folder / 'enable', 1)
 
     def set(self, opening: float) -> None:  # noqa: A003
-        """Set the mean opening of the valve, 0..1, from the next period on."""
+        """Set the duty of the valve, 0..1, from the next period on."""
         sysfs.write(*self.write_of(opening))
 
     def write_of(self, opening: float) -> tuple[Path, int]:
-        """Return the attribute and the value that give a mean opening of the valve of 0..1."""
+        """Return the attribute and the value that give a duty of the valve of 0..1."""
         share = min(max(opening, 0.0), 1.0)
         share = 1.0 - share if self._inverted else share
         return self.folder / 'duty_cycle', round(share * self._period_ns)

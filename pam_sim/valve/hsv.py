@@ -15,9 +15,12 @@
 """
 Pair of high-speed on/off valves (HSV): fill from the supply, vent to atmosphere.
 
-There are two fidelities. Averaged: the mean opening equals the duty. Switching: each valve is open
-or shut. A PWM period latches the duty at its start. The share of a 0.1 ms step in which a valve is
-open is exact.
+A duty is the share of a PWM period for which the coil is on. The opening follows with the opening
+and closing times of ``valve_dead_zone``; without them it equals the duty.
+
+There are two fidelities. Averaged: the mean opening of a period acts. Switching: each valve is
+open or shut. A PWM period latches the duty at its start. The share of a 0.1 ms step in which a
+valve is open is exact.
 """
 
 from pam_sim.compiled import inlined

@@ -16,6 +16,7 @@
 
 from dataclasses import asdict, replace
 import math
+from pathlib import Path
 
 import numba
 import numpy as np
@@ -24,6 +25,7 @@ from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.drivers.hsv import HsvLaw, initial_state
 from pam_actuation.drivers.hsv_config import HsvConfig, PARAMETERS
 import pam_sim
+from pam_sim.effects import valve_dead_zone
 from pam_sim.errors import InputError
 from pam_sim.records import fields, size_of
 from pam_sim.rollout.kernel import step as plant_step
@@ -166,6 +168,20 @@ def test_duty_and_opening_are_inverse():
         assert opening_of(duty, 0.17, 0.2) == pytest.approx(opening)
     assert duty_of(0.05, 0.17, 0.2, 0.01) == pytest.approx(0.18)
     assert opening_of(0.0, 0.0, 0.0) == 0.0 and opening_of(0.3, 0.0, 0.0) == 0.3
+
+
+@pytest.mark.parametrize('page', ['valve_signal', 'valve_command'])
+def test_the_pages_of_the_topics_say_that_a_duty_is_the_time_of_the_coil(page):
+    """Driver and model take it so: the driver sends more for a valve that opens late."""
+    opens_s, shuts_s, period_s, opening = 3.5e-3, 2.5e-3, 10e-3, 0.26
+    duty = opening + (opens_s - shuts_s) / period_s         # as valve_signal.md says
+    assert pulses.duty_of_opening(opening, opens_s / period_s, shuts_s / period_s, 0.01) == (
+        pytest.approx(duty))
+    assert valve_dead_zone.mean_opening(duty, period_s, opens_s, shuts_s) == (
+        pytest.approx(opening))
+    text = (Path(__file__).resolve().parents[2] / 'msg_docs' / f'{page}.md').read_text('utf-8')
+    row = next(line for line in text.splitlines() if line.startswith('| `effort[i]` of `fill_'))
+    assert 'for which the coil is on' in row and 'mean opening' not in row
 
 
 @pytest.mark.parametrize('wanted_pa', [-3000.0, -1.0, 0.0, 700.0, 3000.0])
