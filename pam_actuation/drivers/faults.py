@@ -66,6 +66,9 @@ FAULT_TABLE = (
           'writing to the analog output or the PWM failed (hardware back ends)', VENT, True,
           'the safe signal is tried again with every tick; service ~/reset, refused while '
           'that fails; ' + _RAMP),
+    Fault('signal_not_finite', 'Signal is not a number',
+          'the driver calculated a voltage or duty that is not finite', VENT, True,
+          'service ~/reset; ' + _RAMP),
     Fault('no_command', 'No command yet',
           'no valid pressure_command since start or reset', VENT, False,
           'first valid command, ' + _RAMP),

@@ -86,4 +86,6 @@ def joined_opening(fill: float, vent: float, fill_rate_pa: float, vent_rate_pa: 
     ``more_pa`` is what they are known to fill more than their rates say.
     """
     net_pa = fill * fill_rate_pa - vent * vent_rate_pa + more_pa
+    if net_pa == 0.0:       # nothing flows where supply, muscle and atmosphere are at one pressure
+        return 0.0
     return net_pa / (fill_rate_pa if net_pa > 0.0 else vent_rate_pa)

@@ -201,6 +201,9 @@ class DriverLoop:
             efforts = self._hsv(self.law, decision, now_ns)
         else:
             efforts = self._ppr(self.law, decision, now_ns)
+        if not all(math.isfinite(effort) for effort in efforts):
+            decision = self._decision = self.safety.law_failed(efforts)
+            self.law, efforts = self._new_law(), self._safe_efforts()
         self._efforts = efforts
         self._followed_pa = _followed_pa(decision)
         if decision.pressure_pa is not None and self.law.saturated:

@@ -172,6 +172,11 @@ class SafetySupervisor:
         if problem and self._latched is None:
             self._latch('device_refuses', f'the valve did not take its signal: {problem}')
 
+    def law_failed(self, efforts: tuple[float, ...]) -> Decision:
+        """Tell of a signal [V or duty] that is not finite; return the decision, which vents."""
+        return self._vent(self._latch('signal_not_finite', (
+            f'the driver calculated a signal that is not a number {efforts}')))
+
     def reset(self) -> tuple[bool, str]:
         """
         End a latched stop; return (done, sentence).

@@ -83,6 +83,11 @@ def _device_refuses(rig, side):
     rig.drivers[side].on_device('no such device')
 
 
+def _not_a_number(rig, side):
+    driver = rig.drivers[side]
+    driver.law.step = lambda *inputs: (math.nan, math.nan) if driver.is_hsv else math.nan
+
+
 def _second_driver(rig, side):
     rig.drivers[side].set_sender_fault(('second_driver', 'two nodes send'))
 
@@ -174,6 +179,7 @@ ROWS = {
     'emergency_stop': _latched(_emergency_stop),
     'over_pressure': _latched(_over_pressure),
     'device_refuses': _latched(_device_refuses),
+    'signal_not_finite': _latched(_not_a_number),
     'no_command': (_no_command, _silent('')[1]),
     'command_timeout': _silent('pressure_command'),
     'command_clock': (_command_clock, _silent('')[1]),

@@ -225,6 +225,23 @@ def test_a_driver_that_was_stopped_knows_that_the_valves_vented_meanwhile():
     assert loop.safety.frozen.expected_pa < 0.0
 
 
+@pytest.mark.parametrize('valve', ['ppr', 'hsv'])
+def test_a_signal_that_is_not_a_number_is_never_sent(valve):
+    """It vents, latched, and begins with a new law after the reset."""
+    chain = Chain(valve)
+    chain.run(1000)
+    broken = math.nan if valve == 'ppr' else (0.0, math.nan)
+    chain.loop.law.step = lambda *inputs: broken
+    status = chain.run(100)
+    assert all(math.isfinite(effort) for signal in chain.signals for effort in signal.efforts)
+    assert chain.signals[-1].efforts == SAFE[valve]
+    assert status.level == 2 and dict(status.values)['fault'] == 'signal_not_finite'
+    assert 'calculated a signal that is not a number' in status.message
+    assert chain.loop.reset()[0]
+    assert chain.run(1500).level == 0
+    assert chain.pressures_kpa[-1] == pytest.approx(300.0, abs=3.0)
+
+
 def test_safe_signal():
     """PPR 0 V; HSV fill 0, vent 1."""
     for valve, efforts in SAFE.items():

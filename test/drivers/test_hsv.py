@@ -196,6 +196,16 @@ def test_two_pulses_make_a_small_dose(wanted_pa):
     assert pulses.joined_opening(0.0, 0.3, 16e3, 12e3) == pytest.approx(-0.3)
 
 
+def test_two_pulses_where_nothing_flows_are_no_opening():
+    """Supply, muscle and atmosphere at one pressure: a compressor that is off."""
+    assert pulses.joined_opening(0.3, 0.2, 0.0, 0.0) == 0.0
+    law = HsvLaw()
+    law.step(P_ATM_PA + 3e5, P_ATM_PA)
+    law.hold(0.3, 0.3, P_ATM_PA, P_ATM_PA)
+    assert np.isfinite(law.state.view(kernel.STATE)[0]['sent']).all()
+    assert all(math.isfinite(duty) for duty in law.step(P_ATM_PA + 3e5, P_ATM_PA, 8e5))
+
+
 @pytest.mark.parametrize('fidelity', ['averaged', 'switching'])
 def test_small_steps_of_the_command(rig, fidelity):
     """Steps of 1.2 kPa, a third of the shortest pulse, are followed; single pulses cannot."""

@@ -484,5 +484,5 @@ def test_fault_table_is_complete():
     assert all(fault.title in text for fault in FAULT_TABLE)
     assert {fault.key for fault in FAULT_TABLE if fault.latched} == {
         'emergency_stop', 'over_pressure', 'valve_command_interrupted', 'device_refuses',
-        'pressure_relapses'}
+        'pressure_relapses', 'signal_not_finite'}
     assert text.count('\n') == len(FAULT_TABLE) + 2
