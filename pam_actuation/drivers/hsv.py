@@ -101,6 +101,12 @@ class HsvLaw:
         return int(self._out.saturated.item())
 
     @property
+    def sound(self) -> bool:
+        """Return whether the model is finite; a law of another plant may run away."""
+        state = self._state
+        return math.isfinite(state.model_pa.item() + state.flow_pa.item() + self.dead_time_s)
+
+    @property
     def predicted_pa(self) -> float:
         """Return the pressure [Pa] predicted for when the newest opening begins to act."""
         return self._out.predicted_pa.item()

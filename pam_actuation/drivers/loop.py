@@ -264,7 +264,11 @@ class DriverLoop:
                 law.hold(fill, vent, measured, supply_pa, age_s, *motion)
         else:
             fill, vent = law.step(decision.pressure_pa, measured, supply_pa, age_s, *motion)
-        if elapsed != 0:
+        if not law.sound:       # on a rig unlike the model: begin anew with the next reading
+            self.law = self._new_law()
+            if decision.pressure_pa is not None:
+                fill = vent = 0.0
+        elif elapsed != 0:
             self._law_ns = now_ns
             self.safety.flow(law.flow_pa)
         self._used_stamp_ns = self.safety.pressure.stamp_ns

@@ -21,6 +21,7 @@ import numpy as np
 from pam_actuation.drivers.config import DRIVER_PARAMETERS, DriverConfig
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.drivers.hsv import HsvLaw
+from pam_actuation.drivers.hsv_model import STATE
 from pam_actuation.drivers.loop import DriverLoop
 from pam_actuation.loops.bus import Bus
 from pam_actuation.loops.wiring import attach_plant, driver_tick
@@ -239,6 +240,16 @@ def test_a_signal_that_is_not_a_number_is_never_sent(valve):
     assert 'calculated a signal that is not a number' in status.message
     assert chain.loop.reset()[0]
     assert chain.run(1500).level == 0
+    assert chain.pressures_kpa[-1] == pytest.approx(300.0, abs=3.0)
+
+
+def test_a_law_whose_model_runs_away_begins_anew():
+    """As on a rig unlike the model: shut for one period, then the pressure is held again."""
+    chain = Chain('hsv')
+    chain.run(1500)
+    chain.loop.law.state.view(STATE)['model_pa'] = math.nan
+    assert chain.run(10).level == 0 and chain.signals[-1].efforts == (0.0, 0.0)
+    assert chain.run(500).level == 0
     assert chain.pressures_kpa[-1] == pytest.approx(300.0, abs=3.0)
 
 
