@@ -21,7 +21,7 @@ documentation prints them (``fault_table_markdown``).
 
 from dataclasses import dataclass
 
-from pam_actuation.drivers import limits, monitors
+from pam_actuation.drivers import limits, monitors, unmoved
 from pam_actuation.drivers.monitors import AirMonitor, MOST_RELAPSES, RELAPSES_WITHIN_S
 from pam_actuation.drivers.senders import CLEAR_S
 from pam_sim.units import P_ATM_PA
@@ -131,7 +131,7 @@ FAULT_TABLE = (
           f'than {_LIMITS.stamp_ahead_s:g} s ahead)', VENT, False, 'next valid reading, ' + _RAMP),
     Fault('pressure_relapses', 'Measured pressure lost again and again',
           f'{MOST_RELAPSES} vents within {RELAPSES_WITHIN_S:g} s for readings that are NaN or not '
-          'believable, as of a sensor with the wrong sign', VENT, True,
+          'believable, as of a sensor with the wrong sign, or that do not rise (HSV)', VENT, True,
           'service ~/reset, ' + _RAMP),
     Fault('pressure_frozen', 'Measured pressure frozen (HSV)',
           f'reading unchanged to the last bit for {_LIMITS.frozen_after_s:g} s or longer while '
@@ -140,6 +140,12 @@ FAULT_TABLE = (
           f'{monitors.SHORTEST * _LIMITS.frozen_after_s:g} s and '
           f'{monitors.LEAST_CHANGE * _LIMITS.frozen_change_pa * 1e-3:g} kPa', VENT, False,
           'first reading that differs, ' + _RAMP),
+    Fault('pressure_unmoved', 'Measured pressure does not follow (HSV)',
+          f'smoothed reading rises by less than {unmoved.LEAST_SHARE * 100:g} % of what the valve '
+          f'flow should have added, {unmoved.MISSED_PA * 1e-3:g} kPa or more within '
+          f'{unmoved.WINDOW_S:g} s (sensor dead but noisy, no air supply, valve without effect)',
+          VENT, False,
+          f'after {unmoved.UNMOVED_VENTS_S:g} s of venting the pressure is tried again, ' + _RAMP),
     Fault('pressure_frozen_ppr', 'Measured pressure frozen (PPR)',
           'as above, from the lag of the regulator', IGNORE, False,
           'warning: the regulator closes its own loop; ends with a reading that differs'),

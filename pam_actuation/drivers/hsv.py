@@ -21,9 +21,10 @@ and muscle is an ``HsvConfig``; it learns flow gain and drift while it runs.
 
 import math
 
-from pam_actuation.drivers.hsv_config import HsvConfig, PARAMETERS
+from pam_actuation.drivers.hsv_config import HsvConfig, PARAMETERS, SENT_SIZE
 from pam_actuation.drivers.hsv_kernel import hsv_hold, hsv_step, OUTPUT
 from pam_actuation.drivers.hsv_model import STATE
+from pam_actuation.drivers.unmoved import SWALLOWED
 from pam_sim.annotations import FloatArray
 from pam_sim.records import cells, fields, zeros
 from pam_sim.units import P_ATM_PA
@@ -103,8 +104,10 @@ class HsvLaw:
     @property
     def sound(self) -> bool:
         """Return whether the model is finite; a law of another plant may run away."""
-        state = self._state
-        return math.isfinite(state.model_pa.item() + state.flow_pa.item() + self.dead_time_s)
+        state, out = self._state, self._out
+        return math.isfinite(
+            state.model_pa.item() + state.flow_pa.item() + state.volume_m3.item()
+            + self.dead_time_s + out.fill_duty.item() + out.vent_duty.item())
 
     @property
     def predicted_pa(self) -> float:
@@ -122,3 +125,21 @@ class HsvLaw:
     def flow_pa(self) -> float:
         """Return the pressure change [Pa] the valves made in the last period (model)."""
         return self._state.flow_pa.item()
+
+    @property
+    def long_share(self) -> float:
+        """Return what share of that flow is of openings beyond what a valve may swallow."""
+        if not self.sound:
+            return 0.0
+        delay = self.dead_time_s / self.config.period_s
+        first = min(int(delay), SENT_SIZE - 3) + 1      # the newest opening came after the flow
+        part = delay % 1.0
+        late, early = self._state.sent[first].item(), self._state.sent[first + 1].item()
+        opening = part * early + (1.0 - part) * late
+        if opening == 0.0:
+            return 0.0
+        return (part * _beyond(early) + (1.0 - part) * _beyond(late)) / opening
+
+
+def _beyond(opening: float) -> float:
+    return math.copysign(max(abs(opening) - SWALLOWED, 0.0), opening)

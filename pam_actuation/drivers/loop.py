@@ -257,9 +257,13 @@ class DriverLoop:
         fill, vent = self._efforts
         for _ in range(min(elapsed - 1, _MOST_MISSED)):
             law.hold(fill, vent, supply_pa=supply_pa)
-            self.safety.flow(law.flow_pa)
+            self.safety.flow(law.flow_pa, law.long_share)
         if decision.pressure_pa is None:
             fill, vent = self._imposed(decision.duty)
+            if elapsed != 0:
+                law.hold(fill, vent, measured, supply_pa, age_s, *motion)
+        elif (probe := self.safety.unmoved.probe(now_ns, decision.pressure_pa)) is not None:
+            fill, vent = probe, 0.0
             if elapsed != 0:
                 law.hold(fill, vent, measured, supply_pa, age_s, *motion)
         else:
@@ -270,7 +274,7 @@ class DriverLoop:
                 fill = vent = 0.0
         elif elapsed != 0:
             self._law_ns = now_ns
-            self.safety.flow(law.flow_pa)
+            self.safety.flow(law.flow_pa, law.long_share)
         self._used_stamp_ns = self.safety.pressure.stamp_ns
         return float(fill), float(vent)
 

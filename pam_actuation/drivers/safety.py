@@ -22,9 +22,7 @@ held or ignored is in ``faults.FAULT_TABLE``. This is ordinary software, not a
 certified safety function.
 """
 
-from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
 import math
 import re
 
@@ -34,7 +32,9 @@ from pam_actuation.drivers.limits import SafetyLimits
 from pam_actuation.drivers.monitors import (
     AirMonitor, Channel, ClockMonitor, CommandOrder, FrozenMonitor, MOST_RELAPSES, Relapses,
     RELAPSES_WITHIN_S, stamp_problem, WARNING_HOLD_S)
+from pam_actuation.drivers.pending import Pending
 from pam_actuation.drivers.steady_age import SteadyAge
+from pam_actuation.drivers.unmoved import UnmovedMonitor
 from pam_actuation.messages import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN
 from pam_actuation.slow_rise import SlowRise, WAITS_LONG_S
 from pam_sim.units import gauge_kpa, NS_PER_S, P_ATM_PA
@@ -43,7 +43,6 @@ _WARNING_HOLD_NS = WARNING_HOLD_S * NS_PER_S
 _LATE_TICK_NS = 50_000_000   # after a tick this late, queued messages get one chance to arrive
 _GRACE_NS = 20_000_000
 _HIGHEST_SUPPLY_PA = 5e6     # that is believed
-_QUEUE = 256
 _CAUSES = 'sensor, air supply or gain'      # why a measured pressure does not rise
 _TO_GO_ON = '; call the service reset to go on'      # said of what is latched
 
@@ -52,19 +51,6 @@ Fault = tuple[str, str]      # key in ``FAULTS``, sentence
 
 def _without_figures(fault: Fault) -> tuple[str, str]:
     return fault[0], re.sub(r'[-\d.]', '', fault[1])
-
-
-Reading = tuple[int, float]                         # stamp [ns], pressure [Pa]
-Command = tuple[int, float, int | None, bool]       # and number, whether it is a duty
-
-
-@dataclass
-class _Pending:
-    """What arrived since the tick before, by topic; the oldest is lost where it is too much."""
-
-    command: deque[Command] = field(default_factory=lambda: deque(maxlen=_QUEUE))
-    pressure: deque[Reading] = field(default_factory=lambda: deque(maxlen=_QUEUE))
-    supply: deque[Reading] = field(default_factory=lambda: deque(maxlen=_QUEUE))
 
 
 class SafetySupervisor:
@@ -90,6 +76,7 @@ class SafetySupervisor:
         self.supply = Channel(lim.supply_timeout_s, lim.stamp_ahead_s, lowest,
                               _HIGHEST_SUPPLY_PA)
         self.frozen = FrozenMonitor(lim.frozen_after_s, lim.frozen_change_pa)
+        self.unmoved = UnmovedMonitor()
         self.air = AirMonitor(lag_s, dead_time_s)
         self.clock = ClockMonitor(lim.pause_s)
         self.order = CommandOrder(lim.two_publishers_window_s, lim.two_publishers_clear_s)
@@ -110,7 +97,7 @@ class SafetySupervisor:
         self.commands_ignored = 0
         self.commands_clamped = 0
         self.vents = 0
-        self._pending = _Pending()
+        self._pending = Pending()
         self._latched: Fault | None = None
         self._device_problem = ''
         self._seen_command = False
@@ -146,9 +133,10 @@ class SafetySupervisor:
         """Queue a measured absolute supply pressure [Pa] for the next tick."""
         self._pending.supply.append((stamp_ns, pressure_pa))
 
-    def flow(self, change_pa: float) -> None:
-        """Tell the pressure change [Pa] the valve should have made in the last tick."""
+    def flow(self, change_pa: float, long_share: float = 0.0) -> None:
+        """Tell the change [Pa] the valve should have made, and what share long pulses did."""
         self.frozen.flow(change_pa)
+        self.unmoved.flow(change_pa, long_share)
 
     def emergency_stop(self, why: str = 'requested') -> None:
         """Latch the emergency stop: vent at the next tick and until ``reset``."""
@@ -242,8 +230,9 @@ class SafetySupervisor:
         return fault
 
     def _forget(self) -> None:
-        self._pending = _Pending()
-        for part in (self.pressure, self.supply, self.frozen, self.air, self.order, self.ages):
+        self._pending = Pending()
+        for part in (self.pressure, self.supply, self.frozen, self.unmoved, self.air, self.order,
+                     self.ages):
             part.forget()
         self.command_stamp_ns = None
         self.command_pa = math.nan
@@ -255,6 +244,7 @@ class SafetySupervisor:
             if self.pressure.offer(stamp_ns, value, now_ns):
                 self._seen_pressure = True
                 self.frozen.reading(stamp_ns, value)
+                self.unmoved.reading(stamp_ns, value)
                 self._check_over_pressure(value)
         while pending.supply:
             self.supply.offer(*pending.supply.popleft(), now_ns)
@@ -356,6 +346,9 @@ class SafetySupervisor:
             if self.needs_pressure:
                 return 'pressure_frozen', text
             self._warn('pressure_frozen_ppr', text, now_ns)
+        why = self.unmoved.problem(now_ns, channel.pressure_pa, self._fault is None)
+        if why and self.needs_pressure:
+            return 'pressure_unmoved', why
         return None
 
     def _command_fault(self, now_ns: int, grace_s: float) -> Fault | None:
@@ -400,8 +393,9 @@ class SafetySupervisor:
 
     def _relapsed(self, fault: Fault) -> Fault:
         assert self._now_ns is not None
-        if fault[0] != 'pressure_timeout' or not self.pressure.implausible or (
-                not self._relapses.too_often(self._now_ns)):
+        again = fault[0] == 'pressure_unmoved' or (
+            fault[0] == 'pressure_timeout' and self.pressure.implausible)
+        if not again or not self._relapses.too_often(self._now_ns):
             return fault
         return self._latch('pressure_relapses', (
             f'{fault[1]}; for the {self._relapses.most}th time in '

@@ -188,6 +188,8 @@ ROWS = {
     'valve_command_interrupted': _latched(_interrupted),
     'pressure_timeout': _silent('pressure'),
     'pressure_frozen': _readings(lambda sound: Pressure(sound.stamp_ns, P_ATM_PA + 3e5)),
+    'pressure_unmoved': _readings(lambda sound: Pressure(
+        sound.stamp_ns, P_ATM_PA + 5e4 + 100.0 * (sound.stamp_ns // MS_NS % 7))),
     'driver_paused': (_paused, _nothing),
     'clock_back': (_clock_back, _clock_right),
     'clock_ahead': (_clock_ahead, _nothing),
@@ -196,7 +198,8 @@ ROWS = {
     'driver_killed': (_stopped, _go_on)}
 # What ends by itself.
 BRIEF = ('driver_paused', 'clock_ahead')
-OF_PAIRS_OF_VALVES = ('valve_command_interrupted', 'pressure_frozen', 'no_pressure')
+OF_PAIRS_OF_VALVES = (
+    'valve_command_interrupted', 'pressure_frozen', 'pressure_unmoved', 'no_pressure')
 # What the driver tells, where that is not the key.
 TELLS = {'two_senders': TWO_SENDERS, 'driver_ends': (), 'driver_killed': ()}
 FROM_THE_START = {

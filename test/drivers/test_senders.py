@@ -143,7 +143,7 @@ def test_the_driver_vents_for_a_second_sender_and_rises_slowly_afterwards(valve)
     driver = DriverLoop(valve)
 
     def tick(now_ms, fault=None):
-        driver.on_pressure(Pressure(now_ms * MS, P_ATM_PA + now_ms))
+        driver.on_pressure(Pressure(now_ms * MS, P_ATM_PA + min(250.0 * now_ms, 390e3)))
         driver.on_command(Pressure(now_ms * MS, P_ATM_PA + 4e5))
         driver.set_sender_fault(fault)
         return driver.tick(now_ms * MS)

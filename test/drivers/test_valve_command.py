@@ -69,7 +69,7 @@ def test_an_exact_duplicate_is_no_fault_and_an_older_command_is_told(valve, effo
     bench.efforts = efforts
     send = bench.loop.on_valve_command
     bench.loop.on_valve_command = lambda message: (send(message), send(message))
-    _, status = bench.run(300)
+    _, status = bench.run(100)
     assert bench.loop.safety.commands_ignored == 0 and status.level == 0
     bench.loop.on_valve_command = lambda message: (
         send(message), send(replace(message, stamp_ns=message.stamp_ns - MS)))
