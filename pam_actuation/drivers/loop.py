@@ -34,6 +34,7 @@ from pam_sim.units import gauge_kpa, NS_PER_S, P_ATM_PA
 
 _MOST_MISSED = 20        # periods the model catches up after a late tick
 _READING_AGE_S = 0.01    # of a pressure, when it is used
+_EMPTIES_AFTER_S = 0.1   # on/off valves: a command of the atmosphere this long opens the vent
 _PPR_MOVE_PA = 20_000.0  # a regulator this far from its command should move
 
 
@@ -83,6 +84,7 @@ class DriverLoop:
         self._decision: Decision | None = None
         self._law_ns: int | None = None
         self._used_stamp_ns: int | None = None
+        self._under_pressure_ns: int | None = None    # more than the atmosphere was followed
         self._contraction: Contraction | None = None        # not used yet
         self._efforts = self._safe_efforts()
         self._followed_pa: float | None = P_ATM_PA
@@ -258,7 +260,7 @@ class DriverLoop:
         for _ in range(min(elapsed - 1, _MOST_MISSED)):
             law.hold(fill, vent, supply_pa=supply_pa)
             self.safety.flow(law.flow_pa, law.long_share)
-        if decision.pressure_pa is None:
+        if decision.pressure_pa is None or self._empties(decision.pressure_pa, now_ns):
             fill, vent = self._imposed(decision.duty)
             if elapsed != 0:
                 law.hold(fill, vent, measured, supply_pa, age_s, *motion)
@@ -277,6 +279,17 @@ class DriverLoop:
             self.safety.flow(law.flow_pa, law.long_share)
         self._used_stamp_ns = self.safety.pressure.stamp_ns
         return float(fill), float(vent)
+
+    def _empties(self, target_pa: float, now_ns: int) -> bool:
+        """
+        Tell whether the vent is to be open, whatever is measured.
+
+        It is where more than the atmosphere was followed before and the atmosphere is by now.
+        """
+        if target_pa > P_ATM_PA:
+            self._under_pressure_ns = now_ns
+        since = self._under_pressure_ns
+        return since is not None and not 0 <= now_ns - since < _EMPTIES_AFTER_S * NS_PER_S
 
     def _imposed(self, duty: float | None) -> tuple[float, ...]:
         if duty is None:

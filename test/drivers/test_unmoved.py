@@ -164,3 +164,26 @@ def test_valves_that_swallow_short_pulses_are_tried_with_long_ones():
     bench = Bench(open_s=3.2e-3)
     assert bench.run(4.0).level == 0
     assert bench.faults() == set() and bench.kpa[-1] > 150.0
+
+
+def test_a_command_of_the_atmosphere_opens_the_vent_whatever_is_measured():
+    """A controller vents by it. With a dead sensor both valves stayed shut, at 600 kPa."""
+    bench = Bench()
+    bench.run(2.0)
+    bench.command_kpa = lambda time_s: 0.0
+    bench.reads = lambda sound_pa: P_ATM_PA
+    bench.run(0.15)
+    assert bench.efforts == SAFE and dict(bench.statuses[-1].values)['state'] == 'ok'
+    bench.run(1.5)
+    assert bench.efforts == SAFE and bench.kpa[-1] < 5.0
+    bench.command_kpa, bench.reads = lambda time_s: 150.0, lambda sound_pa: sound_pa
+    bench.run(2.0)
+    assert bench.faults() == set() and bench.kpa[-1] == pytest.approx(150.0, abs=3.0)
+
+
+def test_a_sensor_that_reads_too_little_leaves_nothing_behind():
+    bench = Bench()
+    bench.reads = lambda sound_pa: sound_pa - 15e3
+    bench.command_kpa = lambda time_s: 200.0 if time_s < 3.0 else 0.0
+    bench.run(6.0)
+    assert bench.kpa[-1] < 2.0
