@@ -78,7 +78,7 @@ class Case:
 
 NO_COMMAND, NO_PRESSURE = 'no valid pressure command', 'no valid measured pressure'
 SILENT, PAUSED = 'fell silent|ended with the signal that vents', 'itself was stopped'
-VENTED_REFERENCE = 'muscle vented'
+VENTED_REFERENCE = 'asks for the atmosphere'
 CASES = {
     'kill_controller': Case('SIGKILL of the controller', 'kill', CONTROLLER, DRIVER, NO_COMMAND),
     'kill_driver': Case('SIGKILL of the driver', 'kill', DRIVER, WATCHDOG, SILENT),

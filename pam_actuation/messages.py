@@ -205,7 +205,8 @@ LEVEL_OK, LEVEL_WARN, LEVEL_ERROR, LEVEL_STALE = 0, 1, 2, 3      # of a status
 # Of a status: a node that waits to be activated, and one that has not ticked since.
 CONFIGURED, ACTIVE, DEACTIVATED = 'configured, not active', 'active', 'deactivated'
 # Of a controller that followed somebody who fell silent.
-REFERENCE_LOST, EFFORT_LOST = 'reference lost, muscle vented', 'wanted torque lost, muscles vented'
+REFERENCE_LOST = 'reference lost, asks for the atmosphere'
+EFFORT_LOST = 'wanted torque lost, asks for the atmosphere'
 
 
 def is_fault(level: int, message: str) -> bool:

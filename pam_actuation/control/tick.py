@@ -67,9 +67,9 @@ REASONS = (
     'contraction stands still although the pressure changed: sensor frozen or muscle blocked',
     'force stands still although the pressure changed: sensor frozen',
     'joint angle stands still although the pressures changed: sensor frozen or joint blocked',
-    'one muscle is at fault, both vented',
-    'what is tracked is measured twice, vented',
-    'the controller estimated or commanded what is impossible, vented',
+    'one muscle is at fault, asks both for the atmosphere',
+    'what is tracked is measured twice, asks for the atmosphere',
+    'the controller estimated or commanded what is impossible, asks for the atmosphere',
     'the driver vented or fell silent, so what was wanted before is dropped; send a new reference')
 RUNNING = (OK, REFERENCE_HELD)      # reasons with which the controller runs
 

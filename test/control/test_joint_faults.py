@@ -309,7 +309,8 @@ def test_a_joint_says_which_muscle_is_at_fault_and_of_what(key, why, side):
     assert {*rig.control.values()} >= {('flexor.fault', ''), ('extensor.fault', '')}
     begin(rig, side)
     rig.run(0.5)
-    assert rig.reasons[-1] == f'one muscle is at fault, both vented: {side}, {why}'
+    assert rig.reasons[-1] == (
+        f'one muscle is at fault, asks both for the atmosphere: {side}, {why}')
     assert {*rig.control.values()} >= {(f'{side}.fault', why), (f'{other(side)}.fault', '')}
     end(rig, side)
     comes_back(rig)

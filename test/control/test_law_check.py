@@ -28,7 +28,7 @@ from test_ilc_mpc import INVERSE, model_of_lag_and_mass, Muscle
 from test_observer import mpc
 
 TICK_NS = 5_000_000
-SAYS = 'the controller estimated or commanded what is impossible, vented'
+SAYS = 'the controller estimated or commanded what is impossible, asks for the atmosphere'
 
 
 def ticks(loop, muscle, count, begin=0):

@@ -101,8 +101,8 @@ def test_a_node_without_a_status_is_named(domain, capsys):
 
 
 @pytest.mark.parametrize('level, message, code', [
-    ('WARN', 'reference lost, muscle vented', 1), ('WARN', 'no reference yet', 0), ('ok', '', 0),
-    ('ERROR', 'vented because', 1), ('STALE', '', 1)])
+    ('WARN', 'reference lost, asks for the atmosphere', 1), ('WARN', 'no reference yet', 0),
+    ('ok', '', 0), ('ERROR', 'vented because', 1), ('STALE', '', 1)])
 def test_a_lost_reference_that_vents_is_a_finding_of_the_status(
         capsys, monkeypatch, level, message, code):
     row = {'node': '/left/sofc_controller', 'domain_id': 0, 'level': level, 'message': message,

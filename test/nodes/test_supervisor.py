@@ -80,9 +80,9 @@ def test_faults_of_other_benches_are_neither_told_nor_findings(rig):
 
 
 @pytest.mark.parametrize('name, lost, held', [
-    ('/left/sofc_controller', 'reference lost, muscle vented',
+    ('/left/sofc_controller', 'reference lost, asks for the atmosphere',
      'reference lost, holding its last position'),
-    ('/left/joint_controller', 'wanted torque lost, muscles vented', 'following')])
+    ('/left/joint_controller', 'wanted torque lost, asks for the atmosphere', 'following')])
 def test_a_lost_reference_that_vents_is_told_and_a_finding(rig, name, lost, held):
     rig.hear(name, 1, held)
     assert rig.tell() == []
