@@ -14,7 +14,7 @@
 
 """Bring nodes up, watch them, take them down safely; no ``ros2 launch`` needed."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 import os
 import tempfile
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from pam_actuation.rigging.processes import NodeProcess
 
 SILENT_S = 3.0            # without a status, which comes twice in a second
+HEARD_S = 1.5             # a watchdog that sent a status within this time vents
 SETTLED_S = 1.0           # from the last node active to the first command and reading of all
 
 
@@ -127,8 +128,10 @@ class Supervisor:
             started.spin(0.05)
             self._hear(tell, time.monotonic() > begun + SETTLED_S)
             looked, before = time.monotonic(), looked
+            self._tell_silence({
+                name: silence.of(name, looked - before) for kind in (DRIVER, WATCHDOG)
+                for name in self._group.of_kind(kind)}, tell)
             for name in self._group.of_kind(DRIVER):
-                self._tell_silence(name, silence.of(name, looked - before), tell)
                 self._tell_unwatched(name, tell)
             ended = self._group.ended()
             if ended is not None:
@@ -162,22 +165,34 @@ class Supervisor:
                 self._faulty.discard(name)
                 tell(f'{name} is well again: {message}')
 
-    def _tell_silence(self, name: str, silent_s: float, tell: Callable[[str], None]) -> None:
-        """Tell of a driver that fell silent, as where its device blocks, and is heard again."""
-        if silent_s > SILENT_S and name not in self._silent and self.processes[name].running:
-            self._silent.add(name)
-            self.faults.append(
-                f'{name}: sent no status for {SILENT_S:g} s: {self._by_watchdog(name)}')
-            tell(self.faults[-1])
-        elif silent_s == 0.0 and name in self._silent:
-            self._silent.remove(name)
-            tell(f'{name} is heard again')
+    def _tell_silence(self, silent_s: Mapping[str, float], tell: Callable[[str], None]) -> None:
+        """
+        Tell of a driver or watchdog that fell silent, or is heard again.
 
-    def _by_watchdog(self, name: str) -> str:
-        """Return what happens to the muscle of a driver that is silent."""
+        ``silent_s`` has for how long each of them sent no status [s].
+        """
+        for name in silent_s:
+            if (silent_s[name] > SILENT_S and name not in self._silent
+                    and self.processes[name].running):
+                self._silent.add(name)
+                self.faults.append(f'{name}: sent no status for {SILENT_S:g} s: '
+                                   f'{self._without(name, silent_s)}')
+                tell(self.faults[-1])
+            elif silent_s[name] == 0.0 and name in self._silent:
+                self._silent.remove(name)
+                tell(f'{name} is heard again')
+
+    def _without(self, name: str, silent_s: Mapping[str, float]) -> str:
+        """Return what it means for the muscle that a driver or watchdog is silent."""
+        if name.endswith(f'/{WATCHDOG}'):
+            driver = f'{name.removesuffix(WATCHDOG)}{DRIVER}'
+            return (f'its driver is silent too, {MAY_HOLD}' if driver in self._silent
+                    else 'nothing vents if the driver stops')
         values = self._group.started.statuses.get(name, (0, '', {}))[2]
-        watched = 'device_watchdog_vents' in values or _watchdog(name) in self.processes
-        return 'its watchdog vents' if watched else f'its valve holds the last signal, {MAY_HOLD}'
+        if ('device_watchdog_vents' in values
+                or silent_s.get(_watchdog(name), SILENT_S) <= HEARD_S):
+            return 'its watchdog vents'
+        return f'its valve holds the last signal, {MAY_HOLD}'
 
     def _tell_unwatched(self, name: str, tell: Callable[[str], None]) -> None:
         """Tell once of a driver whose device no watchdog process vents."""

@@ -16,6 +16,7 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -30,7 +31,8 @@ from pam_actuation.topics import codec                                      # no
 
 pytestmark = [pytest.mark.ros, pytest.mark.shared]
 
-DRIVER = '/left/valve_driver'
+DRIVER, WATCHDOG = '/left/valve_driver', '/left/valve_watchdog'
+BY_HAND = 'the muscle may still be under pressure: shut the supply and open the dump valve'
 
 
 class Rig:
@@ -96,6 +98,41 @@ def test_a_lost_reference_that_vents_is_told_and_a_finding(rig, name, lost, held
 def test_a_rig_that_waits_for_its_first_reference_is_well(rig):
     rig.hear('/left/sofc_controller', 1, 'no reference yet')
     assert rig.tell() == [] == rig.supervisor.faults
+
+
+HOLDS = f'{DRIVER}: sent no status for 3 s: its valve holds the last signal, {BY_HAND}'
+VENTS = f'{DRIVER}: sent no status for 3 s: its watchdog vents'
+UNWATCHED = f'{WATCHDOG}: sent no status for 3 s: nothing vents if the driver stops'
+BOTH = f'{WATCHDOG}: sent no status for 3 s: its driver is silent too, {BY_HAND}'
+
+
+@pytest.mark.parametrize('silent_s, told', [
+    ([{DRIVER: 3.1}], [HOLDS]),                             # there is no watchdog
+    ([{DRIVER: 3.1, WATCHDOG: 0.4}], [VENTS]),
+    ([{DRIVER: 3.1, WATCHDOG: 2.6}, {DRIVER: 3.6, WATCHDOG: 3.1}], [HOLDS, BOTH]),
+    ([{DRIVER: 0.0, WATCHDOG: 3.1}, {DRIVER: 3.1, WATCHDOG: 9.0}], [UNWATCHED, HOLDS]),
+    ([{DRIVER: 3.1, WATCHDOG: 0.4}, {DRIVER: 6.0, WATCHDOG: 3.1}], [VENTS, BOTH]),
+    ([{DRIVER: 0.2, WATCHDOG: 3.1}, {DRIVER: 0.2, WATCHDOG: 0.0}],
+     [UNWATCHED, f'{WATCHDOG} is heard again'])])
+def test_a_watchdog_is_said_to_vent_only_where_it_is_heard(rig, silent_s, told):
+    for name in (DRIVER, WATCHDOG):
+        rig.group.processes[name] = SimpleNamespace(running=True)
+    said = []
+    for moment in silent_s:
+        rig.supervisor._tell_silence(moment, said.append)
+        rig.supervisor._tell_silence(moment, said.append)       # once is enough
+    rig.group.processes.clear()
+    assert said == told
+    assert rig.supervisor.faults == [one for one in told if 'heard again' not in one]
+
+
+def test_drivers_and_watchdogs_are_listened_for(rig, monkeypatch):
+    rig.group._nodes[WATCHDOG] = NodeSpec('valve_watchdog', '/left', {})
+    looked = []
+    monkeypatch.setattr(rig.supervisor, '_tell_silence',
+                        lambda silent_s, tell: looked.append(set(silent_s)))
+    rig.supervisor.watch(until=lambda: True)
+    assert looked == [{DRIVER, WATCHDOG}]
 
 
 def test_messages_of_other_benches_are_not_counted(rig):
