@@ -28,8 +28,9 @@ HELP = """Emergency stop: every valve driver that is found vents, and stays so u
 
 Each driver is called at once when it is found, and says itself whether its valve took the signal
 that vents. The search goes on until no further driver is found for 3.5 s. Exit code 0: every
-driver vents. 1: not every one said so. 2: there is no driver. A hardware dump valve comes first:
-this verb needs a computer, a network and a driver that answers."""
+driver vents. 1: not every one said so, or a plant, sensors or a watchdog run and no driver of
+theirs is heard. 2: there is no driver. A hardware dump valve comes first: this verb needs a
+computer, a network and a driver that answers."""
 EXAMPLE = 'pam estop --namespace /left_knee'
 
 
@@ -56,12 +57,18 @@ def run(args: argparse.Namespace) -> int:
         silent = [(one.domain_id, name) for one in opened for name in one.nodes()
                   if name.endswith('/valve_driver')
                   and (one.domain_id, name) not in answered]
-        if not answers and not silent:
+        from pam_actuation.nodes.driverless import unheard_drivers
+        unheard = {place(one.domain_id, name, opened): known for one in opened
+                   for name, known in unheard_drivers(
+                       one, [name for domain_id, name in (*answered, *silent)
+                             if domain_id == one.domain_id]).items()}
+        if not answers and not silent and not unheard:
             raise InputError(nobody(opened, 'valve driver'))
         names = [place(*one, opened) for one in silent]
     failed = [one for one in answers if not one.done]
     findings = [f'{name} is not configured: it drives no valve and cannot vent one'
                 for name in names]
+    findings += [f'{name} is not heard; {known}' for name, known in unheard.items()]
     if failed:
         findings.append(
             f'{len(failed)} of {len(answers)} drivers did not say that they vent: {BY_HAND}')

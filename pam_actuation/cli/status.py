@@ -28,7 +28,8 @@ if TYPE_CHECKING:
 HELP = """Show how the running nodes are: level, reason, lost messages; of one node, all values.
 
 Exit code 1: a node reports an error (a driver that vents, for instance), a controller vented since
-its reference is lost, a node lost a message or sent no status."""
+its reference is lost, a node lost a message or sent no status, or a plant, sensors or a watchdog
+run and no driver of theirs is heard."""
 EXAMPLE = 'pam status valve_driver'
 LEVELS = ('ok', 'WARN', 'ERROR', 'STALE', 'silent')
 SILENT: tuple[int, str, dict[str, str]] = (
@@ -72,6 +73,7 @@ def run(args: argparse.Namespace) -> int:
 def _rows(opened: 'list[Operator]', wait_s: float, asked: str | None) -> list[dict[str, Any]]:
     """Return the status of each node, or of those that are asked for, and who sent none."""
     from pam_actuation.cli.completion import nodes as executables
+    from pam_actuation.nodes.driverless import drivers_heard, unheard_drivers
     from pam_actuation.nodes.operator import watch
     known = set(executables())
 
@@ -85,8 +87,12 @@ def _rows(opened: 'list[Operator]', wait_s: float, asked: str | None) -> list[di
         wait_s)
     rows = []
     for operator in opened:
-        for name in sorted(there(operator)):
+        unheard = {name: known for name, known in unheard_drivers(
+            operator, drivers_heard(operator)).items() if asked is None or _is_called(name, asked)}
+        for name in sorted(there(operator) | unheard.keys()):
             level, message, values = operator.statuses.get(name, SILENT)
+            if name in unheard:
+                message = f'{message}; {unheard[name]}'
             lost = sum(int(value) for key, value in values.items()
                        if key.startswith('lost.') and value.isdigit())
             rows.append({'node': name, 'domain_id': operator.domain_id,

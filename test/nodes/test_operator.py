@@ -25,7 +25,8 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from pam_actuation.cli import status                                        # noqa: E402, I100
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus           # noqa: E402, I100
+from pam_actuation.cli import status                                        # noqa: E402
 from pam_actuation.cli.main import main                                     # noqa: E402
 from pam_actuation.nodes import operator                                    # noqa: E402
 from pam_actuation.rigging import node_group                                # noqa: E402
@@ -74,9 +75,9 @@ def domain():
     lock.release()
 
 
-def _pam(capsys, *words):
+def _pam(capsys, *words, wait_s='60'):
     # Long: of low priority on a busy machine, even an announcement may take seconds.
-    code = main([*words, '--wait', '60', '--json'])
+    code = main([*words, '--wait', wait_s, '--json'])
     return code, json.loads(capsys.readouterr().out)
 
 
@@ -120,6 +121,78 @@ def test_where_nobody_is_there_it_is_one_sentence(domain, capsys, words):
     said = capsys.readouterr().err
     assert f'found in or below /nowhere in ROS domain {domain}' in said
     assert said.count('\n') == 1
+
+
+@pytest.fixture
+def bench():
+    """Return what adds nodes to a domain of its own, and that domain."""
+    lock = DomainLock()
+    context = local_context(lock.domain_id)
+    nodes = []
+
+    def add(full_name, level=None, message=''):
+        namespace, _, name = full_name.rpartition('/')
+        node = Node(name, namespace=namespace, context=context)
+        nodes.append(node)
+        if level is not None:
+            publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
+            status = DiagnosticArray(status=[DiagnosticStatus(
+                name=full_name, level=bytes([level]), message=message)])
+            thread = threading.Thread(target=lambda: [
+                publisher.publish(status) for _ in iter(lambda: ended.wait(0.2), True)])
+            thread.start()
+            threads.append(thread)
+
+    ended, threads = threading.Event(), []
+    yield add, str(lock.domain_id)
+    ended.set()
+    for thread in threads:
+        thread.join()
+    for node in nodes:
+        node.destroy_node()
+    rclpy.try_shutdown(context=context)
+    lock.release()
+
+
+BY_HAND = 'the muscle may still be under pressure: shut the supply and open the dump valve'
+FELL_SILENT = 'vented because the valve signal fell silent for 300 ms'
+HEARS = f'its watchdog reports: hears the driver; {BY_HAND}'
+
+
+@pytest.mark.parametrize('running, unheard', [
+    ([('/muscle/plant_simulator', 0, 'ok')], {'/muscle/valve_driver': BY_HAND}),
+    ([('/muscle/hardware_sensors',)], {'/muscle/valve_driver': BY_HAND}),
+    ([('/muscle/valve_watchdog', 0, 'hears the driver')], {'/muscle/valve_driver': HEARS}),
+    ([('/muscle/valve_watchdog', 2, FELL_SILENT), ('/muscle/plant_simulator', 0, 'ok')],
+     {'/muscle/valve_driver': f'its watchdog reports: {FELL_SILENT}'}),
+    ([('/knee/joint_simulator', 0, 'ok'), ('/knee/flexor/valve_driver', 0, 'ok')],
+     {'/knee/extensor/valve_driver': BY_HAND}),
+    ([('/knee/hardware_sensors', 0, 'ok'), ('/knee/flexor/hardware_sensors', 0, 'ok')],
+     {'/knee/extensor/valve_driver': BY_HAND, '/knee/flexor/valve_driver': BY_HAND})])
+def test_a_rig_whose_driver_is_not_heard_is_a_finding(bench, capsys, running, unheard):
+    add, domain = bench
+    for node in running:
+        add(*node)
+    code, said = _pam(capsys, 'status', '--domain-id', domain)
+    assert code == 1
+    assert {one['node']: one['message'] for one in said['nodes'] if 'stopped; ' in one['message']
+            } == {name: f'sent no status: not active yet, or stopped; {known}'
+                  for name, known in unheard.items()}
+    # What is not there is waited for.
+    code, said = _pam(capsys, 'status', 'valve_driver', '--domain-id', domain, wait_s='2')
+    assert code == 1 and set(unheard) <= {one['node'] for one in said['nodes']}
+    code, said = _pam(capsys, 'estop', '--domain-id', domain, wait_s='2')
+    assert code == 1 and not said['all_vent'] and said['drivers'] == []
+    assert set(said['findings']) >= {
+        f'{name} is not heard; {known}' for name, known in unheard.items()}
+
+
+def test_a_rig_whose_driver_is_heard_is_well(bench, capsys):
+    add, domain = bench
+    for name in ('plant_simulator', 'valve_watchdog', 'valve_driver'):
+        add(f'/muscle/{name}', 0, 'ok')
+    code, said = _pam(capsys, 'status', '--domain-id', domain)
+    assert code == 0 and len(said['nodes']) == 3
 
 
 def test_a_node_nearly_right_is_told_with_the_right_one(domain, capsys):
