@@ -25,9 +25,9 @@ ROOT = Path(__file__).resolve().parent.parent
 # From the bottom: a room imports from its own row and from those above it in this table.
 LAYERS = (
     ('messages', 'topics', 'namespaces', 'resources', 'interrupts', 'exit_timer', 'kept_folders',
-     'parallel', 'priority', 'random_levels', 'ros_missing', 'slow_rise', 'transport', 'control',
-     'disturbance', 'drivers', 'held_signal', 'loops', 'bags', 'hardware', 'plant_loop',
-     'workers'),
+     'parallel', 'priority', 'random_levels', 'ros_log', 'ros_missing', 'slow_rise', 'transport',
+     'control', 'disturbance', 'drivers', 'held_signal', 'loops', 'bags', 'hardware',
+     'plant_loop', 'workers'),
     ('experiments', 'replay', 'tuning', 'valves', 'rules', 'tables', 'rig_files'),
     ('report', 'models', 'view'),
     ('campaign',),

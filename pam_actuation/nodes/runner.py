@@ -37,6 +37,7 @@ from pam_actuation.nodes import arguments
 from pam_actuation.nodes.diagnostics import WARN
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.rigging.processes import end_with_parent
+from pam_actuation.ros_log import name_log_folder
 from pam_actuation.transport import prepare_middleware
 from pam_sim.errors import InputError
 import rclpy
@@ -133,6 +134,7 @@ def _run(node_class: type[ManagedNode], args: Sequence[str] | None, stopper: '_S
         if args is None:
             args = [sys.argv[0], *arguments.in_order(sys.argv[1:])]
         prepare_middleware()
+        name_log_folder()
         rclpy.init(args=list(args), signal_handler_options=SignalHandlerOptions.NO)
         node = node_class()
     except InputError as error:

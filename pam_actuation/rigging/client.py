@@ -27,6 +27,7 @@ from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from pam_actuation.interrupts import closing
 from pam_actuation.messages import is_fault
+from pam_actuation.ros_log import name_log_folder
 from pam_actuation.topics.codec import Reader
 from pam_actuation.topics.quality import USUAL
 from pam_actuation.topics.table import DIAGNOSTICS
@@ -79,6 +80,7 @@ def context_by_environment(domain_id: int, arguments: Sequence[str] = ()) -> rcl
 
 def _open(context: rclpy.Context, domain_id: int, arguments: Sequence[str]) -> None:
     prepare_middleware()
+    name_log_folder()
     try:
         rclpy.init(context=context, domain_id=domain_id, args=list(arguments),
                    signal_handler_options=SignalHandlerOptions.NO)

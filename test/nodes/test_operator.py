@@ -220,6 +220,20 @@ def test_a_home_folder_that_cannot_be_written_is_one_sentence():
         'folder in ROS_LOG_DIR or ROS_HOME\n')
 
 
+@pytest.mark.parametrize('home', [{}, {'HOME': ''}])
+@pytest.mark.parametrize('words, said', [
+    (['pam_actuation.cli.main', 'status', '--wait', '0.1', '--namespace', '/nowhere'],
+     'pam status: no node of a rig found in or below /nowhere'),
+    (['pam_actuation.nodes.valve_watchdog', '--ros-args', '-p', 'timeout_s:=9.0'],
+     'parameter timeout_s: ')])
+def test_without_a_home_folder_ros_still_has_one_for_its_log(words, said, home):
+    environment = {name: text for name, text in os.environ.items()
+                   if name not in ('ROS_LOG_DIR', 'ROS_HOME', 'HOME')}
+    done = subprocess.run([sys.executable, '-m', *words], env={**environment, **home},
+                          capture_output=True, text=True, timeout=120)
+    assert done.returncode == 2 and said in done.stderr and 'Traceback' not in done.stderr
+
+
 def test_words_that_are_missing_are_told(capsys):
     assert main(['param', 'set', 'valve_driver', 'backend']) == 2
     assert 'pam param set: takes NODE NAME VALUE, 2 of them are given' in capsys.readouterr().err
