@@ -19,8 +19,12 @@ Sensors and valve of your own: measured values out, valve signal in.
 """
 
 import math
+import signal
 
 from geometry_msgs.msg import WrenchStamped
+from pam_actuation.held_signal import HeldSignal
+from pam_actuation.nodes.endpoints import PolledSubscription
+from pam_actuation.topics.codec import Reader
 import rclpy
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
@@ -52,27 +56,31 @@ class Converter:
 class OwnHardware(Node):
     """Publishes what the converter reads; gives it what the driver sends, or nothing."""
 
-    def __init__(self, **options):
+    def __init__(self, converter, **options):
         super().__init__('own_hardware', **options)
-        self.converter, self.silent_s = Converter(), math.inf
-        self.create_subscription(JointState, 'valve_signal', self.on_signal, 10)
+        self.converter, self.silent_s = converter, math.inf
+        self.held = HeldSignal('ppr')
+        self.signals = PolledSubscription(self, JointState, 'valve_signal', raw=True,
+                                          read=Reader('valve_signal'), writers=True)
         self.pressure = self.create_publisher(FluidPressure, 'pressure', 10)
         self.contraction = self.create_publisher(JointState, 'contraction', 10)
         self.force = self.create_publisher(WrenchStamped, 'force', 10)
         self.create_timer(PERIOD_S, self.tick)
 
-    def on_signal(self, message):
-        """Take a voltage of the driver, or of the watchdog."""
-        volts = message.effort[message.name.index('ppr_voltage')]
-        if math.isfinite(volts):            # else: as before
-            self.converter.write(volts)
-        self.silent_s = 0.0
+    def listen(self):
+        """Take the signals of driver and watchdog; one that vents is enough."""
+        now_ns = self.get_clock().now().nanoseconds
+        self.silent_s += PERIOD_S
+        for message, info in self.signals.take():
+            unusable = self.held.unusable
+            self.held.take(message, info['writer'], now_ns)
+            if self.held.unusable == unusable:      # else: of another valve, or not finite
+                self.silent_s = 0.0
 
     def tick(self):
-        """Read and publish, with the time of the reading; vent where nobody speaks."""
-        self.silent_s += PERIOD_S
-        if self.silent_s > SILENT_S:
-            self.converter.write(0.0)
+        """Drive the valve, vent where nobody speaks; read and publish, with the time of it."""
+        self.listen()
+        self.converter.write(self.held.efforts[0] if self.silent_s <= SILENT_S else 0.0)
         stamp = self.get_clock().now().to_msg()
         pressure_pa, contraction_m, force_n = self.converter.read()
         pressure = FluidPressure(fluid_pressure=pressure_pa)
@@ -85,10 +93,18 @@ class OwnHardware(Node):
             publisher.publish(message)
 
 
-if __name__ == '__main__':
-    rclpy.init()
-    node = OwnHardware()
+def main():
+    """Run the node; whatever ends it, the regulator gets 0 V."""
+    converter = Converter()
     try:
-        rclpy.spin(node)
+        rclpy.init()
+        signal.signal(signal.SIGHUP, signal.default_int_handler)
+        rclpy.spin(OwnHardware(converter))
     except (KeyboardInterrupt, ExternalShutdownException):
-        node.converter.write(0.0)
+        pass
+    finally:
+        converter.write(0.0)
+
+
+if __name__ == '__main__':
+    main()
