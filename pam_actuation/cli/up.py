@@ -138,7 +138,7 @@ def run(args: argparse.Namespace) -> int:
             faults = list(dict.fromkeys(supervisor.faults))
             codes = {name: process.exit_code for name, process in supervisor.processes.items()}
     if not is_up and not failure:
-        raise KeyboardInterrupt('stopped while the nodes started')
+        raise KeyboardInterrupt('; '.join(['stopped while the nodes started', *problems]))
     findings = list(dict.fromkeys(filter(None, [failure, *faults, *problems])))
     text = '\n'.join(f'finding: {one}' for one in findings) or 'vented, all nodes ended in order'
     emit(args, {'failure': failure, 'faults': faults, 'problems': problems,

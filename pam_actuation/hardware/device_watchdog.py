@@ -44,6 +44,7 @@ END_TIMEOUT_S = 1.0
 TRY_AGAIN_S = 0.01
 LONGEST_TRY_S = 60.0
 WHERE = 'watchdog of the device'
+OPENED = 'the device of the valve is open and vents'
 GONE = f'{WHERE}: the valve driver is gone: vented'
 # What ends the driver must not end this: it goes when the driver has gone.
 OUTLIVED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)

@@ -14,10 +14,14 @@
 
 """Parameter files of real hardware: found, and checked to be one before a node reads them."""
 
+from collections.abc import Iterator
+import re
+
 from pam_actuation.resources import find_config
 from pam_sim.located_yaml import load_yaml, Located
 
-PARAMETERS = 'ros__parameters'
+PARAMETERS, BACK_END = 'ros__parameters', 'backend'
+WILDCARDS = {'**': '(/[^/]+)*', '*': '/[^/]+'}
 _DEPTH = 8                  # namespaces above the parameters
 # A key that only another kind of file has, what that is, and where it is given.
 _OTHERS = (
@@ -58,3 +62,20 @@ def holds_parameters(tree: Located, depth: int = _DEPTH) -> bool:
     return bool(tree) and depth > 0 and all(
         isinstance(value, Located) and (key == PARAMETERS or holds_parameters(value, depth - 1))
         for key, value in tree.items())
+
+
+def entries(tree: Located, above: tuple[str, ...] = ()) -> Iterator[
+        tuple[tuple[str, ...], Located, str]]:
+    """Return the words of the name of each node, the mapping that holds it, and its key there."""
+    for key, value in tree.items():
+        words = (*above, *filter(None, key.split('/')))
+        if PARAMETERS in value:
+            yield words, tree, key
+        else:
+            yield from entries(value, words)
+
+
+def matches(words: tuple[str, ...], full_name: str) -> bool:
+    """Tell whether a name with wildcards, as ROS reads them, is that of a node."""
+    pattern = ''.join(WILDCARDS.get(word) or f'/{re.escape(word)}' for word in words)
+    return re.fullmatch(pattern, full_name) is not None

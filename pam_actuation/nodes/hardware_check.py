@@ -20,9 +20,9 @@ run. With a wrong name a pressure limit would not be the one that is stated.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
-import re
 
-from pam_actuation.hardware.files import holds_parameters, PARAMETERS
+from pam_actuation.hardware.files import (
+    BACK_END, entries, holds_parameters, matches, PARAMETERS, WILDCARDS)
 from pam_actuation.namespaces import node_name_of
 from pam_actuation.rigging.node_spec import NodeSpec, ORDER
 from pam_actuation.rigging.plan import DRIVER
@@ -30,8 +30,6 @@ from pam_actuation.ros_missing import ros_missing
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.located_yaml import load_yaml, Located
 
-BACK_END = 'backend'
-WILDCARDS = {'**': '(/[^/]+)*', '*': '/[^/]+'}
 OF_ROS = ('use_sim_time', 'qos_overrides.')
 BRINGING_UP = ('autostart', 'notes_folder')     # set by what starts the nodes
 
@@ -76,8 +74,8 @@ def check_users_file(file: str, nodes: Iterable[NodeSpec],
     named = {node_name_of(node.name, node.namespace): node for node in nodes}
     kinds = sorted({node.name for node in named.values()})
     none = True
-    for words, holder, key in _entries(tree):
-        reached = {name: node for name, node in named.items() if _matches(words, name)}
+    for words, holder, key in entries(tree):
+        reached = {name: node for name, node in named.items() if matches(words, name)}
         if reached:
             none, given = False, holder[key][PARAMETERS]
             _check_names(given, sorted({node.name for node in reached.values()}))
@@ -119,13 +117,13 @@ def _check_values(given: Located, reached: Mapping[str, NodeSpec],
 def _check_file(tree: Located, readers: list[NodeSpec]) -> None:
     names = {node_name_of(node.name, node.namespace): node.name for node in readers}
     without = {full_name for full_name, kind in names.items() if kind == DRIVER}
-    for words, holder, key in _entries(tree):
+    for words, holder, key in entries(tree):
         kind, given = words[-1], holder[key][PARAMETERS]
         if kind not in WILDCARDS and kind not in ORDER:
             raise holder.error(
                 f'unknown node `{kind}`{did_you_mean(kind, names.values())}; this file is for '
                 f'{" and ".join(sorted({*names.values()}))}', key)
-        reached = {name for name in names if _matches(words, name)}
+        reached = {name for name in names if matches(words, name)}
         kinds = sorted({names[name] for name in reached} or {kind} - {*WILDCARDS})
         _check_names(given, kinds)
         if BACK_END in given:
@@ -133,23 +131,6 @@ def _check_file(tree: Located, readers: list[NodeSpec]) -> None:
     if without:
         raise tree.error(f'`{BACK_END}` is missing for {" and ".join(sorted(without))}: nothing '
                          'would drive the valve')
-
-
-def _entries(tree: Located, above: tuple[str, ...] = ()) -> Iterator[
-        tuple[tuple[str, ...], Located, str]]:
-    """Return the words of the name of each node, the mapping that holds it, and its key there."""
-    for key, value in tree.items():
-        words = (*above, *filter(None, key.split('/')))
-        if PARAMETERS in value:
-            yield words, tree, key
-        else:
-            yield from _entries(value, words)
-
-
-def _matches(words: tuple[str, ...], full_name: str) -> bool:
-    """Tell whether a name with wildcards, as ROS reads them, is that of a node."""
-    pattern = ''.join(WILDCARDS.get(word) or f'/{re.escape(word)}' for word in words)
-    return re.fullmatch(pattern, full_name) is not None
 
 
 def _check_names(given: Located, kinds: list[str]) -> None:

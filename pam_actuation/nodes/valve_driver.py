@@ -27,6 +27,7 @@ from pam_actuation.hardware.back_ends import NO_DEVICE
 from pam_actuation.hardware.back_ends import open_valve
 from pam_actuation.hardware.back_ends import parameters_of
 from pam_actuation.hardware.back_ends import VALVE_OUTPUTS
+from pam_actuation.hardware.device_watchdog import OPENED
 from pam_actuation.hardware.valve_output import TRIES
 from pam_actuation.messages import DEACTIVATED
 from pam_actuation.messages import Pressure
@@ -138,6 +139,8 @@ class ValveDriver(ManagedNode):
             self.value('backend'), valve,
             {p.name: self.value(p.name) for p in parameters_of(VALVE_OUTPUTS)}, config,
             loop.safe_signal(0).efforts, self.value('device_watchdog_s'))
+        if self.value('backend') not in NO_DEVICE:
+            self.get_logger().info(OPENED)
         if self._is_unwatched():
             self.get_logger().warning(': '.join(NO_WATCHDOG))
         if self._stopped is not None:

@@ -28,7 +28,8 @@ from pam_actuation.namespaces import node_name_of
 from pam_actuation.rigging.node_group import NodeGroup
 from pam_actuation.rigging.plan import DRIVER, RECORDER, REFERENCE, WATCHDOG
 from pam_actuation.rigging.transitions import SessionFailed
-from pam_actuation.rigging.venting import has_vented, MAY_HOLD, NOT_KNOWN, Silence
+from pam_actuation.rigging.venting import (
+    drives_device, has_opened, has_vented, MAY_HOLD, NOT_KNOWN, Silence, UNTOUCHED)
 
 if TYPE_CHECKING:
     from pam_actuation.rigging.node_spec import NodeSpec
@@ -58,6 +59,9 @@ class Supervisor:
         if domain_id is None:
             domain_id = int(os.environ.get('ROS_DOMAIN_ID', '0'))
         self._notes = tempfile.TemporaryDirectory(prefix='pam_notes_')
+        nodes = list(nodes)
+        self._on_device = {node_name_of(node.name, node.namespace) for node in nodes
+                           if node.name == DRIVER and drives_device(node)}
         self._group = NodeGroup({
             node_name_of(node.name, node.namespace): replace(node, parameters={
                 **({'realtime_priority': realtime_priority} if realtime_priority else {}),
@@ -222,7 +226,9 @@ class Supervisor:
             self._how_it_ended(name) for name, one in self.processes.items()
             if one.exit_code != 0] + [
             f'{name}: {NOT_KNOWN}' for name in self._group.of_kind(DRIVER)
-            if self._group.was_asked(name) and not self._has_vented(name)]
+            if self._group.was_asked(name) and not self._has_vented(name)] + [
+            f'{name}: {UNTOUCHED}' for name in self._group.of_kind(DRIVER)
+            if name in self._on_device and not has_opened(self.processes.get(name))]
 
     def _tell_recorder(self, failure: str) -> None:
         """Say why the run ended early; not where the experiment is over."""

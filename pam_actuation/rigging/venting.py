@@ -19,12 +19,18 @@ from collections.abc import Mapping
 from pam_actuation.drivers.decision import OK
 from pam_actuation.drivers.faults import BY_HAND
 from pam_actuation.drivers.watchdog import RESTS, VENTS
-from pam_actuation.hardware.device_watchdog import GONE
+from pam_actuation.hardware.device_watchdog import GONE, OPENED
+from pam_actuation.hardware.files import BACK_END, entries, matches, PARAMETERS
 from pam_actuation.messages import DEACTIVATED
+from pam_actuation.namespaces import node_name_of
+from pam_actuation.rigging.node_spec import NodeSpec
 from pam_actuation.rigging.processes import NodeProcess
+from pam_sim.located_yaml import load_yaml
 
 MAY_HOLD = f'the muscle may still be under pressure: {BY_HAND}'
 NOT_KNOWN = f'NOT KNOWN TO HAVE VENTED, {MAY_HOLD}'
+UNTOUCHED = ('ended before it opened and vented its device, which may hold an old signal: '
+             f'{BY_HAND}')
 LONGEST_STEP_S = 0.2        # that counts as silence; for longer this process itself stood still
 
 Status = tuple[int, str, dict[str, str]]
@@ -54,6 +60,22 @@ def has_vented(process: NodeProcess, last: Status, watchdog: str) -> bool:
     if 'device_watchdog_vents' not in values:
         return False
     return values.get('state') != OK or GONE in process.printed()
+
+
+def drives_device(driver: NodeSpec) -> bool:
+    """Tell whether a driver is given a back end with a device."""
+    from pam_actuation.hardware.back_ends import NO_DEVICE
+    full_name = node_name_of(driver.name, driver.namespace)
+    given = [driver.parameters.get(BACK_END)]
+    for file in filter(None, (driver.parameter_file, driver.users_file)):
+        given += [holder[key][PARAMETERS].get(BACK_END)
+                  for words, holder, key in entries(load_yaml(file)) if matches(words, full_name)]
+    return bool({*given} - {None, *NO_DEVICE})
+
+
+def has_opened(process: NodeProcess | None) -> bool:
+    """Tell whether a driver that has a device is known to have opened it."""
+    return process is not None and OPENED in process.printed()
 
 
 class Silence:

@@ -22,7 +22,8 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from pam_actuation.messages import START_NS, Status                         # noqa: E402, I100
+from pam_actuation.hardware.device_watchdog import OPENED                   # noqa: E402, I100
+from pam_actuation.messages import START_NS, Status                         # noqa: E402
 from pam_actuation.rigging.client import MOST_CHANGES, MOST_FAULTS, RigClient   # noqa: E402
 from pam_actuation.rigging.domain import DomainLock                         # noqa: E402
 from pam_actuation.rigging.node_spec import NodeSpec                        # noqa: E402
@@ -38,12 +39,12 @@ BY_HAND = 'the muscle may still be under pressure: shut the supply and open the 
 class Rig:
     """A supervisor of nodes that were never started, and what it says."""
 
-    def __init__(self):
+    def __init__(self, nodes=None):
         lock = DomainLock()
         domain_id = lock.domain_id
         lock.release()
-        self.supervisor = Supervisor(
-            [NodeSpec(name, '/left', {}) for name in (
+        self.supervisor = Supervisor(nodes or [
+            NodeSpec(name, '/left', {}) for name in (
                 'experiment_recorder', 'valve_driver', 'sofc_controller', 'reference_generator')],
             domain_id)
         self.group = self.supervisor._group
@@ -168,6 +169,31 @@ def test_a_client_of_no_namespaces_listens_to_all():
     finally:
         client.close()
         lock.release()
+
+
+@pytest.mark.parametrize('backend, printed, told', [
+    ('iio_dac', '', True), ('iio_dac', f'[INFO] [left.valve_driver]: {OPENED}', False),
+    ('sim', '', False), ('dummy', '', False)])
+@pytest.mark.parametrize('by', ['parameter', 'file', 'users_file'])
+def test_a_driver_that_ends_before_it_opens_its_device_is_told(
+        tmp_path, monkeypatch, backend, printed, told, by):
+    file = tmp_path / 'hardware.yaml'
+    file.write_text(f'/**/valve_driver:\n  ros__parameters: {{backend: {backend}}}\n'
+                    '/right/valve_driver:\n  ros__parameters: {backend: iio_dac}\n')
+    node = NodeSpec('valve_driver', '/left', {'backend': backend} if by == 'parameter' else {},
+                    parameter_file=str(file) if by == 'file' else '',
+                    users_file=str(file) if by == 'users_file' else '')
+    rig = Rig([node])
+    monkeypatch.setattr(rig.group, 'stop', lambda before_recorder: [])
+    expected = [f'{DRIVER}: ended before it opened and vented its device, which may hold an old '
+                'signal: shut the supply and open the dump valve']
+    # One that was never started has touched nothing either.
+    assert rig.supervisor.finish() == (expected if backend == 'iio_dac' else [])
+    rig.group.processes[DRIVER] = SimpleNamespace(exit_code=0, printed=lambda: printed,
+                                                  how_it_ended=lambda: '')
+    assert rig.supervisor.finish() == (expected if told else [])
+    rig.group.processes.clear()
+    rig.supervisor.__exit__()
 
 
 @pytest.mark.parametrize('failure, reference, told', [
