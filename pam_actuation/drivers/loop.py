@@ -355,6 +355,7 @@ class DriverLoop:
             ('valve_type', self.valve_type),
             ('rate_hz', f'{self._rate_measured_hz:.1f}'),
             ('late_ticks', str(self.late_ticks)),
+            ('max_pressure_gauge_pa', f'{safety.limits.max_pressure_gauge_pa:.0f}'),
             ('target_kpa_gauge', _target_text(decision)),
             ('command_kpa_gauge', f'{gauge_kpa(safety.command_pa):.1f}'),
             ('command_age_ms', f'{_ms(command_age_ns):.1f}'),

@@ -180,6 +180,14 @@ def test_rest_is_still_signalled(valve):
     assert values['state'] == 'ok' and float(values['command_age_ms']) < 6.0
 
 
+@pytest.mark.parametrize('valve', ['ppr', 'hsv'])
+@pytest.mark.parametrize('limits, told', [
+    ({}, '600000'), ({'max_pressure_gauge_pa': 123e3}, '123000')])
+def test_the_status_has_the_limit_in_force(valve, limits, told):
+    """An operator can check it without the parameters of the node."""
+    assert dict(Chain(valve, **limits).run(100).values)['max_pressure_gauge_pa'] == told
+
+
 def test_never_both_valves_open_for_long():
     """Whatever the command does, fill and vent open together for short pulses only."""
     chain = Chain('hsv')
