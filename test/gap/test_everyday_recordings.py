@@ -74,6 +74,31 @@ def test_what_is_held_longer_than_a_period_is_repeated_and_scattered_stamps_leav
     assert openings(late, np.array([1.0, 1.0, 1.0, 0.0]), Pulses(0.010), grid)[:30].min() == 1.0
 
 
+@pytest.mark.parametrize('period_s', [0.009, 0.010, 0.011, 0.021])
+@pytest.mark.parametrize('edges', EDGES.values(), ids=EDGES)
+def test_scattered_stamps_change_no_pulse(edges, period_s):
+    random, stamps = np.random.default_rng(0), np.arange(400) * period_s
+    grid = np.arange(0.0, stamps[-1] + 0.05, 1e-3)
+    # Pulses just above the opening time, pauses just above the closing time, no pause.
+    for duties in ((0.18,), (0.18, 0.0), (0.7, 0.0, 0.9), (0.78,), (1.0,)):
+        duty = np.resize(duties, 400)
+        even, scattered = (openings(at, duty, Pulses(0.010, *edges), grid).sum() for at in (
+            stamps, stamps + 0.3e-3 * random.standard_normal(400)))
+        assert scattered == pytest.approx(even, rel=2e-3)
+
+
+def test_opening_times_leave_the_noise_floor_to_the_sensors():
+    late = {'name': 'valve_dead_zone',
+            'parameters': {'open_time_s': 3.5e-3, 'close_time_s': 2.5e-3}}
+    rig = load_rig(NOMINAL, valve='hsv').with_(fidelity='switching')
+    wave = np.repeat(np.random.default_rng(3).choice([-1.0, 0.0, 1.0], 120), 100)
+    duty = np.column_stack([wave > 0.0, wave < 0.0]) * 0.37
+    run = recorded(rig.with_(effects=[late]), duty, 100, jitter_s=0.0)
+    floors = [ValveProblem(one, [Recording(run, 'hsv')]).floor['pressure']
+              for one in (rig, rig.with_(effects=[late]))]
+    assert floors[1] < 1.5 * floors[0]
+
+
 @pytest.mark.parametrize('lag_s', [0.0, 0.007])
 @pytest.mark.parametrize('fidelity', ['averaged', 'switching'])
 def test_the_pressure_tells_whether_the_valves_switch(fidelity, lag_s):

@@ -16,6 +16,8 @@
 Pulses of on/off valves: how far a valve is open in every step of a grid.
 
 A message gives one pulse, which begins with it. What is held for longer than a period is repeated.
+Its length is the duty times the period of the modulation, or of messages that come a little slower
+or faster. The scatter of stamps moves pulses and leaves their lengths.
 """
 
 from dataclasses import dataclass
@@ -107,11 +109,18 @@ def _edges(time_s: FloatArray, duty: FloatArray, period_s: float
     repeats = np.maximum(np.round(until / period_s), 1.0).astype(int)
     place = np.repeat(np.arange(time_s.size), repeats)
     count = np.arange(place.size) - np.repeat(np.cumsum(repeats) - repeats, repeats)
-    # Stamps that scatter leave no break between pulses that fill their period.
     each = until / repeats
-    each = np.where(np.abs(each - period_s) < SAME_PERIOD * period_s, each, period_s)[place]
-    on = time_s[place] + count * each
-    return on, on + duty[place] * each
+    near = np.abs(each - period_s) < SAME_PERIOD * period_s
+    on = time_s[place] + count * np.where(near, each, period_s)[place]
+    # Stamps scatter, the clock behind them does not.
+    clock_s = until[near].sum() / repeats[near].sum() if near.any() else period_s
+    pulse, pause = (share[place] * np.where(near, clock_s, period_s)[place]
+                    for share in (duty, 1.0 - duty))
+    off = on + pulse
+    # A pause between two pulses keeps its length if it is the shorter one; a full duty has none.
+    kept = near[place[:-1]] & ((pulse[1:] > 0.0) & (pause < pulse)[:-1] | (pause[:-1] == 0.0))
+    off[:-1][kept] = (on[1:] - pause[:-1])[kept]
+    return on, off
 
 
 def _means(instants: FloatArray, lifts: FloatArray, grid_s: FloatArray) -> FloatArray:
