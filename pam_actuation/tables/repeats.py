@@ -17,9 +17,12 @@
 from dataclasses import replace
 
 import numpy as np
+from pam_actuation.messages import VALVE_NAMES
 from pam_actuation.tables.importer import Recording
 from pam_actuation.tables.resample import MEASURED
 from pam_sim.annotations import BoolArray, FloatArray, IntArray
+from pam_sim.gap.criteria import CRITERIA
+from pam_sim.gap.data.duties import period_of_changes_s, rows_of_periods
 from pam_sim.gap.data.noise import smallest_step
 
 QUICK_STEPS = 4.0            # of the resolution, in one row: then a fresh reading must change
@@ -45,7 +48,8 @@ def without_repeats(recording: Recording) -> Recording:
     Parameters
     ----------
     recording : Recording
-        With a row of every signal at each time. Commands are not readings, and stay.
+        With a row of every signal at each time. Commands are not readings, and stay, except
+        duties of on/off valves: one a period is one pulse.
 
     """
     signals, told = dict(recording.signals), []
@@ -59,7 +63,31 @@ def without_repeats(recording: Recording) -> Recording:
         signals[name] = _between_rows(stamps[known])[fresh], values[known][fresh]
         told.append(f'{name}: rows repeat old readings, {int(fresh.sum())} of {fresh.size} were '
                     'kept')
+    for name in recording.signals:
+        place, _, last = name.rpartition('/')
+        if last == VALVE_NAMES['hsv'][0]:
+            told += _without_duties(f'{place}/' if place else '', signals)
     return replace(recording, signals=signals, told=[*recording.told, *told])
+
+
+def _without_duties(place: str, signals: dict[str, tuple[IntArray, FloatArray]]) -> list[str]:
+    """Keep the duties of a pair of valves once for each of their periods; return what is told."""
+    names = [place + name for name in VALVE_NAMES['hsv']]
+    (stamps, _), (others, _) = (signals[name] for name in names)
+    if not np.array_equal(stamps, others):
+        return []
+    duties = np.column_stack([signals[name][1] for name in names])
+    known = np.isfinite(duties).all(axis=1)
+    period_s = period_of_changes_s(stamps[known], duties[known])
+    # A slower signal stays: what of it is a period, the model of the rig tells.
+    if not 0.0 < period_s * CRITERIA.min_pulse_rate_hz <= 1.0:
+        return []
+    rows = rows_of_periods(stamps, duties, period_s)
+    if rows is None or not rows.size:
+        return []
+    signals |= {name: (stamps[rows], signals[name][1][rows]) for name in names}
+    return [f'{" and ".join(names)}: rows repeat duties that change every {1e3 * period_s:.3g} ms '
+            f'at most, {rows.size} of {stamps.size} were kept']
 
 
 def _between_rows(stamps: IntArray) -> IntArray:

@@ -21,6 +21,7 @@ import math
 import numpy as np
 from pam_sim.errors import InputError
 from pam_sim.gap.criteria import CRITERIA
+from pam_sim.gap.data.duties import once_a_period
 from pam_sim.gap.data.health import missed_pulses
 from pam_sim.gap.data.holes import stretches
 from pam_sim.gap.data.noise import noise_of
@@ -185,7 +186,8 @@ def offer_of(run: Run, rig: Rig, added_kg: float = 0.0) -> Offer:
                          f'`valve_signal` of the valve (a `pressure_command` too, behind a '
                          'regulator)', where)
     rest = None if held else rest_of(run, rig, added_kg=added_kg)
-    recording = Recording(run, rig.valve, held, 0.0 if isometric_m is None else isometric_m, rest)
+    recording = Recording(once_a_period(run, rig), rig.valve, held,
+                          0.0 if isometric_m is None else isometric_m, rest)
     if recording.grid_s[-1] < LEAST_DURATION_S:
         raise InputError(f'has {recording.grid_s[-1]:.2f} s in which all its signals are there; '
                          f'at least {LEAST_DURATION_S:g} s are needed', where)

@@ -23,6 +23,7 @@ from pam_actuation.report.sections.gap import gap_section
 from pam_sim.effects.valve_dead_zone_gradual import mean_opening_with_lift
 from pam_sim.gap import find_gap
 from pam_sim.gap.criteria import CRITERIA
+from pam_sim.gap.data.checked import recording_of
 from pam_sim.gap.data.commanded import all_commanded, commanded
 from pam_sim.gap.data.given_motion import given_motion
 from pam_sim.gap.data.health import check_for, check_health
@@ -97,6 +98,42 @@ def test_opening_times_leave_the_noise_floor_to_the_sensors():
     floors = [ValveProblem(one, [Recording(run, 'hsv')]).floor['pressure']
               for one in (rig, rig.with_(effects=[late]))]
     assert floors[1] < 1.5 * floors[0]
+
+
+def _pulsed(row_ms):
+    """Return (rig, Run) of switching valves: a table with a row each few ms, periods of 10 ms."""
+    rig = load_rig(NOMINAL, valve='hsv').with_(fidelity='switching', effects=[
+        {'name': 'valve_dead_zone', 'parameters': {'open_time_s': 1.7e-3, 'close_time_s': 2e-3}}])
+    wave = np.repeat(np.random.default_rng(3).uniform(-0.5, 0.5, 600), 10)
+    duty = np.column_stack([np.clip(wave, 0.0, 1.0), np.clip(-wave, 0.0, 1.0)])
+    run = recorded(rig, duty, 200, jitter_s=0.0)
+    rows = np.arange(0, 6000, row_ms)
+    run.topics['valve_signal'] = Series(7 * 10**9 + 10**6 * rows, dict(zip(
+        rig.signal_names, duty[rows].T)))
+    return rig, run
+
+
+@pytest.mark.parametrize('row_ms', [1, 2, 5])
+def test_duties_that_a_table_repeats_are_one_pulse_a_period(row_ms):
+    rig, once = _pulsed(10)
+    _, repeated = _pulsed(row_ms)
+    first, again = (free_run(rig, recording_of(run, rig))['pressure'] for run in (once, repeated))
+    assert np.abs(again[:first.size] - first[:again.size]).max() < 1.0
+    assert check_for(once, rig).remarks == []
+    assert check_for(repeated, rig).remarks == [
+        'the duties of valve_signal repeat within the PWM period of 10 ms, so 600 of '
+        f'{6000 // row_ms} messages are used']
+
+
+def test_duties_that_change_within_a_period_are_not_taken_for_pulses():
+    rig, run = _pulsed(2)
+    values = run.topics['valve_signal'].values['fill_duty']
+    values[:] = np.random.default_rng(1).uniform(0.0, 0.5, values.size)
+    problem, = check_for(run, rig).problems
+    assert problem.startswith('valve_signal comes every 2 ms, and its duties change within the '
+                              'PWM period of 10 ms, so single pulses are not told')
+    averaged = check_for(run, rig.with_(fidelity='averaged'))
+    assert averaged.usable and any('their mean acts' in told for told in averaged.remarks)
 
 
 @pytest.mark.parametrize('lag_s', [0.0, 0.007])

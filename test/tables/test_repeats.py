@@ -61,6 +61,33 @@ def test_two_steps_tell_whether_a_sensor_answers_in_every_row(rows):
     assert fresh_rows(STAMPS, held(np.round(values), rows)).mean() == 1.0 / rows
 
 
+@pytest.mark.parametrize('row_ms', [1, 2, 3, 5])
+def test_a_duty_of_a_pair_of_valves_is_kept_once_a_period(row_ms):
+    """Every period has its own pulse, or a duty is held: each 10 ms of it is one message."""
+    time_ms = np.arange(0, 6000, row_ms)
+    each = np.random.default_rng(2).uniform(0.1, 0.9, 600)
+    each[100:300] = 0.5
+    fill = each[time_ms // 10]
+    table = {'fill_duty': (10**6 * time_ms, fill), 'vent_duty': (10**6 * time_ms, 0.0 * fill)}
+    thin = without_repeats(Recording(table, TableMapping()))
+    stamps, values = thin.signals['fill_duty']
+    assert np.abs(stamps - 10**7 * np.arange(600)).max() <= row_ms * 10**6
+    assert np.array_equal(values, each) and len(thin.signals['vent_duty'][0]) == 600
+    assert thin.told == ['fill_duty and vent_duty: rows repeat duties that change every 10 ms at '
+                         f'most, 600 of {time_ms.size} were kept']
+
+
+@pytest.mark.parametrize('shown', [
+    np.random.default_rng(0).uniform(0.1, 0.9, 2000),              # another in each row
+    np.repeat(np.random.default_rng(0).uniform(0.1, 0.9, 2000), np.random.default_rng(1).choice(
+        [1, 2, 3], 2000))[:2000],                                  # on no grid
+    np.full(2000, 0.4)])
+def test_duties_on_no_grid_stay(shown):
+    table = {'fill_duty': (STAMPS // 5, shown), 'vent_duty': (STAMPS // 5, 0.0 * shown)}
+    thin = without_repeats(Recording(table, TableMapping()))
+    assert (len(thin.signals['fill_duty'][0]), thin.told) == (2000, [])
+
+
 def test_commands_keep_every_row_and_each_signal_its_own_stamps():
     given = {'pressure': held(MOTION, 2), 'contraction': MOTION, 'force': held(MOTION, 9),
              'ppr_voltage': held(MOTION, 5)}

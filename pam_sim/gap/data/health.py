@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.gap.criteria import CRITERIA, Criteria
+from pam_sim.gap.data.duties import duties_told
 from pam_sim.gap.data.resting import rest_of
 from pam_sim.gap.data.signals import FIELD, READABLE, recorded_valve, SIGNALS
 from pam_sim.rig import Rig
@@ -58,6 +59,9 @@ def check_for(run: Run, rig: Rig, criteria: Criteria = CRITERIA) -> Health:
     """Check a recording that shall be compared with a rig; see ``check_health``."""
     health = check_health(run, rig.valve, criteria, rig.is_driven,
                           rig.parameters.get('ppr_highest_v', MAX_VOLTAGE_V))
+    problem, remark = duties_told(run, rig)
+    health.problems += [problem] if problem else []
+    health.remarks += [remark] if remark else []
     rest = rest_of(run, rig, criteria) if health.usable and 'force' in health.signals else None
     health.remarks += [] if rest is None else [rest.text()]
     return health
