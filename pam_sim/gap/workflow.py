@@ -26,6 +26,7 @@ from pam_sim.gap.data.checked import checked_runs, recording_of
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.speeds import moves_at_one_speed
 from pam_sim.gap.data.split import FIT, SELECT
+from pam_sim.gap.data.supply import with_recorded_supply
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.plan.detectable import sizes_or_reasons
 from pam_sim.gap.propose.proposal import propose
@@ -122,6 +123,8 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     recordings = [recording_of(run, rig, criteria) for run in checked.runs]
     result = GapResult('unknown', '', remarks=checked.remarks, recorded=_recorded(checked.runs))
     result.remarks += beyond_table(recordings, rig)
+    rig, told = with_recorded_supply(rig, recordings)
+    result.remarks += told
     if _needs_pulses(rig, recordings, criteria):
         rig = rig.with_(fidelity='switching')
         result.remarks.append(PULSES)

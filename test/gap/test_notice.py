@@ -23,7 +23,7 @@ from pam_sim.gap import find_gap
 from pam_sim.gap.criteria import CRITERIA
 from pam_sim.gap.data.noise import STAMP_SD_S
 from pam_sim.gap.data.recording import Recording
-from pam_sim.gap.data.supply import supply_scatter, supply_stands
+from pam_sim.gap.data.supply import supply_scatter, supply_stands, with_recorded_supply
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.select.context import context_of
 from pam_sim.gap.subsystems.problems import subsystem_problems
@@ -97,6 +97,27 @@ def test_a_recorded_supply_pressure_is_a_witness(quiet):
                              ['supply_droop', 'dead_volume'])
         # What stands still is no reservoir that empties.
         assert ('supply_droop' in {c.name for c in context.pool}) != stands
+
+
+@pytest.mark.parametrize('preset', ['dmsp_5_300_hanging_mass', 'dmsp_20_300_hanging_mass'])
+def test_the_recorded_supply_pressure_is_that_of_the_model(preset):
+    """However wrong the model is, its supply stays where it was recorded."""
+    given = load_rig(preset, valve='hsv').with_(parameters={'supply_pa': 650e3})
+    run = with_supply(switched(given.with_(parameters={'supply_pa': 560e3})), 60e3)
+    rig, (told,) = with_recorded_supply(given, [Recording(run, 'hsv')])
+    assert rig.parameters['supply_pa'] == pytest.approx(771.3e3, abs=1e3)
+    assert rig.prior_sd('supply_pa') == pytest.approx(
+        np.hypot(60e3 / np.sqrt(12.0), 6.7e3), rel=0.05)
+    assert 'supply_pa is 771' in told and 'in place of the 650 kPa of the model' in told
+    falls = rig.with_(effects=['supply_droop'])
+    full, _ = with_recorded_supply(falls, [Recording(run, 'hsv')])
+    assert full.parameters['supply_pa'] == pytest.approx(801e3, abs=2e3)
+    result = find_gap(run, given, effects=['coulomb_friction'])
+    assert told in result.remarks and 'supply_pa' not in {p.name for p in result.parameters}
+    final = load_rig(result.model_yaml).parameters['supply_pa']
+    assert abs(final - rig.parameters['supply_pa']) <= 3.6 * rig.prior_sd('supply_pa')
+    exact = given.with_(tolerance={'supply_pa': 0.0})
+    assert with_recorded_supply(exact, [Recording(run, 'hsv')]) == (exact, [])
 
 
 @pytest.mark.parametrize(('first', 'last', 'value'), [

@@ -54,7 +54,8 @@ class MechanicsProblem(SubsystemProblem):
         return tuple(s for s in recording.signals if s != 'pressure')
 
     @staticmethod
-    def _rig_numbers(rig: Rig) -> list[Known]:
+    def _rig_numbers(rig: Rig, recordings: Sequence[Recording], criteria: Criteria
+                     ) -> list[Known]:
         valve = {p.name for p in (*ppr.PARAMETERS, *hsv.PARAMETERS)}
         return [k for k in known_numbers(rig) if k.name not in valve]
 

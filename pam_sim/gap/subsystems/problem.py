@@ -98,7 +98,7 @@ class SubsystemProblem:
         self.simulations, self.asked, self._lock = 0, 0, threading.Lock()
         self._kept_errors: Recent[FloatArray] = Recent(KEPT_ERRORS)
         self._kept_runs: Recent[Response] = Recent(KEPT_RUNS)
-        self.known = self._rig_numbers(rig) + self._nuisances(recordings)
+        self.known = self._rig_numbers(rig, recordings, criteria) + self._nuisances(recordings)
         self._start = [{s: r.start(s) for s in r.measured} for r in recordings]
         self._index, parts, blocks, signals, measured, times, runs = ([] for _ in range(7))
         first = 0
@@ -143,7 +143,8 @@ class SubsystemProblem:
         raise NotImplementedError
 
     @staticmethod
-    def _rig_numbers(rig: Rig) -> list[Known]:
+    def _rig_numbers(rig: Rig, recordings: Sequence[Recording], criteria: Criteria
+                     ) -> list[Known]:
         raise NotImplementedError
 
     @staticmethod

@@ -15,6 +15,7 @@
 """The valve: valve signal and measured contraction in, pressure out."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -23,6 +24,7 @@ from pam_sim.effects.registry import get_effect
 from pam_sim.gap.criteria import CRITERIA, Criteria
 from pam_sim.gap.data.noise import noise_sd, SMALLEST, STAMP_SD_S
 from pam_sim.gap.data.recording import Recording, smoothed
+from pam_sim.gap.data.supply import has_supply
 from pam_sim.gap.subsystems.effects import acts_on, true_value
 from pam_sim.gap.subsystems.known import (
     Known, known_numbers, latency, LATENCY_MAX_S, of_run)
@@ -61,9 +63,17 @@ class ValveProblem(SubsystemProblem):
         return ('pressure',)
 
     @staticmethod
-    def _rig_numbers(rig: Rig) -> list[Known]:
+    def _rig_numbers(rig: Rig, recordings: Sequence[Recording], criteria: Criteria
+                     ) -> list[Known]:
         own = {p.name for p in (ppr if rig.valve == 'ppr' else hsv).PARAMETERS}
-        return [k for k in known_numbers(rig) if k.name in own]
+        found = [k for k in known_numbers(rig) if k.name in own]
+        if not any(has_supply(r) for r in recordings):
+            return found
+        # What was recorded stands, whatever a number that is free would explain.
+        return [replace(
+            k, lower=max(k.lower, k.value - criteria.max_prior_sd * k.sd),
+            upper=min(k.upper, k.value + criteria.max_prior_sd * k.sd))
+            if k.name == 'supply_pa' else k for k in found]
 
     @staticmethod
     def _nuisances(recordings: Sequence[Recording]) -> list[Known]:
