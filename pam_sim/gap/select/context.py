@@ -27,6 +27,7 @@ from pam_sim.gap.select.candidates import (
     candidates, left_out, split_refinements, within_reading)
 from pam_sim.gap.select.comparison import gap
 from pam_sim.gap.select.ranking import Ranking
+from pam_sim.gap.select.reservoir import with_compressor
 from pam_sim.gap.select.rival import Rival
 from pam_sim.gap.select.screening import screen, Screened
 from pam_sim.gap.subsystems.problem import SubsystemProblem
@@ -61,7 +62,7 @@ class SearchContext:
         ``matters(with, without)``: whether two fits differ by enough for a name, in a free
         run; asked of every effect once there are several.
     left_out : tuple of str
-        A sentence for every name asked for that is not tried.
+        A sentence for every name asked for that is not tried, and for a compressor that is alone.
 
     """
 
@@ -137,13 +138,15 @@ def context_of(estimator: Estimator, seen_gap: float, least_gap: float,
     pool = within_reading(
         candidates(estimator.rig, outputs, only, stands), recordings, estimator.criteria)
     base = estimator.base
+    pool, compressor = with_compressor(pool, estimator)
     screened = screen(estimator, base, split_refinements(pool)[0])
     first_gap = {p.subsystem: first_gap_of(p, base, screened, seen_gap)
                  for p in estimator.problems}
     return SearchContext(
         estimator, Ranking(estimator, base, seen_gap), base, tuple(pool), outputs,
         tuple(screened), first_gap, seen_gap, least_gap, out_of_time, matters,
-        tuple(left_out(only, pool, estimator.rig, outputs, stands)))
+        (*left_out(only, pool, estimator.rig, outputs, stands), *(
+            [compressor] if compressor and first_gap['valve'] > seen_gap else [])))
 
 
 def first_gap_of(problem: SubsystemProblem, base: Fit, screened: Iterable[Screened],
