@@ -52,7 +52,7 @@ LEAST_CHANGES, STEADY_SHARE = 100, 0.9        # of a sensor that is slower than 
 LEAST_PA = 5e3                         # absolute: no rig has such a vacuum
 MOST_PA = 1e7
 LEAST_KPA = -200.0                     # gauge in kPa with noise; noise in Pa reaches further
-MOST_SUPPLY_PA = 2e6
+MOST_SUPPLY_PA = 2e6                   # and no muscle is filled so far
 _PRESSURE_UNITS = (
     (1.6, 'MPa', 'Multiply them by 1000000'), (16.0, 'bar', 'Multiply them by 100000'),
     (150.0, 'kPa or psi', 'Multiply kPa by 1000, psi by 6894.8'),
@@ -61,6 +61,8 @@ LEAST_LIMIT_M = 0.02                   # any muscle may shorten by this
 MOST_M = 0.5                           # and none of the usual ones by this
 MOST_N = 1e5
 SHARE_HINT = ' A share of the length? Multiply it by the length then; the topic is in m.'
+PSI_HINT = (' Is the unit right? psi that are taken for bar are 14.5 times too much, and kPa that '
+            'are taken for psi 6.9 times.')
 GAUGE_HINT = ' If it was not, is it gauge pressure? Add 101325 Pa then.'
 # Of which only the times are looked at.
 _WITHOUT_VALUES = {row.type_name for row in OF_A_RUN.values() if row.numeric is None}
@@ -350,14 +352,34 @@ def _unit(low: float, high: float, unit: str, likely: str, fix: str) -> tuple[st
             f'{fix}'), True
 
 
-def _pressure(finite: FloatArray, low: float, high: float, size_of: SizeOf) -> tuple[str, bool]:
-    if low >= P_ATM_PA - ATMOSPHERE_MARGIN_PA:
-        if high <= P_ATM_PA + MAX_GAUGE_PA:
-            return '', False
-        if float(np.median(finite)) > MOST_PA:
-            return _unit(low, high, 'Pa', 'mPa, or Pa multiplied by 1000 once more',
-                         'Divide them by 1000; the topic is absolute, in Pa.')
+def _pressure(finite: FloatArray, low: float, high: float, size_of: SizeOf,
+              is_supply: bool = False) -> tuple[str, bool]:
+    """Return what is said of both ends; where one end tells of another unit, only that."""
+    above = _above(finite, low, high, is_supply)
+    below = _below(finite, low, high, size_of)
+    if above[1] or below[1]:
+        return above if above[1] else below
+    return ' '.join(one for one, _ in (above, below) if one), False
+
+
+def _above(finite: FloatArray, low: float, high: float, is_supply: bool) -> tuple[str, bool]:
+    """Return what is said of pressures that are too high."""
+    if high <= (MOST_SUPPLY_PA if is_supply else P_ATM_PA + MAX_GAUGE_PA):
+        return '', False
+    if float(np.median(finite)) > MOST_PA:
+        return _unit(low, high, 'Pa', 'mPa, or Pa multiplied by 1000 once more',
+                     'Divide them by 1000; the topic is absolute, in Pa.')
+    if is_supply:
+        return f'up to {gauge_kpa(high):.0f} kPa gauge, more than a supply has.{PSI_HINT}', False
+    if float(np.quantile(finite, 0.99)) <= MOST_SUPPLY_PA:      # but for spikes
         return f'up to {gauge_kpa(high):.0f} kPa gauge, more than the muscle stands.', False
+    return f'up to {gauge_kpa(high):.0f} kPa gauge, which no muscle stands.{PSI_HINT}', True
+
+
+def _below(finite: FloatArray, low: float, high: float, size_of: SizeOf) -> tuple[str, bool]:
+    """Return what is said of pressures that are too low."""
+    if low >= P_ATM_PA - ATMOSPHERE_MARGIN_PA:
+        return '', False
     usual = float(np.median(finite))
     # A spike must not hide the unit of the rest.
     largest = float(np.quantile(finite, 0.99))
@@ -385,9 +407,7 @@ def _pressure(finite: FloatArray, low: float, high: float, size_of: SizeOf) -> t
 
 
 def _supply(finite: FloatArray, low: float, high: float, size_of: SizeOf) -> tuple[str, bool]:
-    if low >= P_ATM_PA - ATMOSPHERE_MARGIN_PA and high <= MOST_SUPPLY_PA:
-        return '', False
-    return _pressure(finite, low, high, size_of)
+    return _pressure(finite, low, high, size_of, is_supply=True)
 
 
 def _contraction(finite: FloatArray, low: float, high: float,

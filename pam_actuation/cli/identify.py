@@ -62,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
         check_folder(args.out, FILES, args.overwrite)
     rig = load_rig(args.rig)
     runs = [load_run(path, args.namespace, topics=args.renamed) for path in args.run]
-    note_implausible(args, runs)
+    note_implausible(args, runs, must_be_right=True)
     with progress(args, 1.0, '', 'identify') as bar:
         found = identify(runs, rig, args.unknown, args.added_kg, args.seed,
                          progress=lambda done: bar.update(done - bar.n))

@@ -62,6 +62,22 @@ def test_pressures_in_other_units_are_told_with_the_fix(values, words):
     assert sentence.startswith('/muscle/pressure: ') and sentence.count('\n') == 0
 
 
+def test_a_zero_of_the_sensor_hides_no_pressure_that_no_muscle_stands():
+    psi_as_bar = P_ATM_PA + (GAUGE_PA - 11e3) / 6894.8 * 1e5
+    sentence, unusable = look('pressure_pa', psi_as_bar)
+    assert unusable and 'which no muscle stands' in sentence and 'psi that are taken' in sentence
+    # A spike tells nothing of the unit, and both ends are told.
+    spiked = np.where(TIME_S == 1.0, 7e6, PRESSURE_PA - 11e3)
+    sentence, unusable = look('pressure_pa', spiked)
+    assert not unusable
+    assert 'more than the muscle stands' in sentence and 'the sensor has a zero' in sentence
+    supply_pa = np.array([1.1e6, 1.2e6, 95e3])
+    sentence, _ = look('pressure_pa', supply_pa, '/muscle/supply_pressure')
+    assert 'below atmospheric' in sentence and 'up to' not in sentence
+    sentence, _ = look('pressure_pa', [7e6, 95e3], '/muscle/supply_pressure')
+    assert 'more than a supply has' in sentence
+
+
 def slow(values, rate_hz):
     """Return values at 200 Hz of a sensor that has new ones at a lower rate."""
     return values[np.floor(np.floor(TIME_S * rate_hz) / rate_hz * 200.0).astype(int)]
@@ -137,6 +153,12 @@ def in_kpa(short, message):
         message.stamp_ns, message.pressure_pa * 1e-3)
 
 
+def psi_as_bar(short, message):
+    # With the zero of the sensor, below which a vented muscle seems to be.
+    return message if short != 'pressure' else type(message)(
+        message.stamp_ns, P_ATM_PA + (message.pressure_pa - P_ATM_PA - 11e3) / 6894.8 * 1e5)
+
+
 def in_mm(short, message):
     return message if short != 'contraction' else type(message)(
         message.stamp_ns, message.contraction_m * 1e3, message.velocity_m_per_s)
@@ -161,11 +183,13 @@ def bags(tmp_path_factory):
                         folder / 'good')
     return {'good': str(folder / 'good'), **{
         name: converted(folder / 'good', folder / name, change)
-        for name, change in (('kpa', in_kpa), ('mm', in_mm), ('nan', with_nan))}}
+        for name, change in (
+            ('kpa', in_kpa), ('psi', psi_as_bar), ('mm', in_mm), ('nan', with_nan))}}
 
 
 WORDS = {'kpa': ('/muscle/pressure: the values, 10', 'likely kPa', 'Multiply them by 1000'),
          'mm': ('/muscle/contraction: the values, ', 'likely millimetres', 'Divide them by 1000'),
+         'psi': ('/muscle/pressure: up to ', 'no muscle stands', 'kPa that are taken for psi'),
          'nan': ('/muscle/pressure: ', 'values of pressure_pa are not finite')}
 # Exit code of every verb that reads bags, by what is wrong: 1 answered with a warning or refused
 # by the verdict, 2 refused.
@@ -174,7 +198,9 @@ VERBS = {
     'report': (['report', '{bag}', '--out', '{out}.html'], {'kpa': 1, 'mm': 1, 'nan': 1}),
     'replay': (['replay', '{bag}', '--only', 'plant'], {'kpa': 1, 'mm': 1, 'nan': 1}),
     'rules': (['rules', '{bag}', '--top', '0'], {'kpa': 1, 'mm': 1, 'nan': 1}),
-    'gap': (['gap', '{bag}', '--out', '{out}_gap'], {'kpa': 1, 'mm': 1}),
+    'gap': (['gap', '{bag}', '--out', '{out}_gap'], {'kpa': 1, 'psi': 1, 'mm': 1}),
+    'identify': (['identify', '{bag}', '--rig', 'dmsp_5_300_realistic', '--unknown', 'mass_kg'],
+                 {'kpa': 2, 'psi': 2}),
     'explain': (['gap', '{bag}', '--explain', 'hysteresis'], {'kpa': 2, 'mm': 2}),
     'tune': (['tune', '{bag}', '--out', '{out}.yaml'], {'kpa': 2, 'mm': 2}),
     'characterise': (['characterise', '{bag}', '--out', '{out}_c'], {'kpa': 2, 'mm': 2})}

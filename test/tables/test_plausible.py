@@ -329,6 +329,13 @@ def test_a_pressure_below_atmosphere_beyond_a_zero_is_refused(gauge_pa):
     assert doubt.is_wrong
 
 
+def test_psi_that_are_called_bar_are_refused_beside_the_noise_of_a_vented_muscle():
+    psi = np.repeat([-0.1, 40.0, 78.0], 20)
+    mapped = column_of_text('pressure', 'p_bar:bar_gauge', '--map')
+    doubt, = doubts({'pressure': (STAMP_NS, mapped.to_si(psi))}, {'pressure': mapped}, Size())
+    assert doubt.is_wrong and '--map pressure="p_bar:psi_gauge"' in doubt.sentence
+
+
 def test_no_unit_is_proposed_in_which_no_muscle_moves():
     doubt, = of_pressure(np.repeat([-60e3, 90e3], [40, 20]))
     assert doubt.is_wrong and 'hPa' not in doubt.sentence
