@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-What Ctrl-C does to a program of this package, from its first lines to its last.
+What Ctrl-C, or SIGTERM, does to a program of this package, from its first lines to its last.
 
 Python raises KeyboardInterrupt wherever the main thread happens to be: also in an import, in a
 callback from C, at the end of the interpreter. The user then sees a page of traceback, a wrong
@@ -53,11 +53,12 @@ OWNERS_OF_MEMORY = f'{os.sep}llvmlite{os.sep}'
 # taking its tables down, with the lock of the interpreter held: only the system can end that.
 # https://github.com/eProsima/Fast-DDS/issues/6193
 LEAVE_S = 3.5
+STOPPING = (signal.SIGINT, signal.SIGTERM)          # what a verb of ``pam`` is ended by
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)     # what a node is ended by
 
 
 def leave_at_once(program: str, exit_code: int = EXIT_INTERRUPTED,
-                  numbers: Iterable[int] = (signal.SIGINT,)) -> None:
+                  numbers: Iterable[int] = STOPPING) -> None:
     """End the process by any of these signals from now on, with one line and nothing else."""
     def leave(number: int, frame: FrameType | None) -> None:
         try:
@@ -116,7 +117,7 @@ class Closing:
 closing = Closing()
 
 
-def ignore(numbers: Iterable[int] = (signal.SIGINT,)) -> None:
+def ignore(numbers: Iterable[int] = STOPPING) -> None:
     """Let these signals change nothing any more: the process is about to end by itself."""
     for number in (*numbers, signal.SIGALRM):       # that of a Worker, which may still ask again
         signal.signal(number, signal.SIG_IGN)
@@ -128,8 +129,7 @@ def undisturbed() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    numbers = (signal.SIGINT, signal.SIGTERM)
-    before: dict[int, Any] = {number: signal.signal(number, _unheard) for number in numbers}
+    before: dict[int, Any] = {number: signal.signal(number, _unheard) for number in STOPPING}
     try:
         yield
     finally:
@@ -161,7 +161,7 @@ def held() -> Iterator[Callable[[], bool]]:
 
     try:
         number: int
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in STOPPING:
             # What is ignored, as in a process in the background, stays ignored.
             if signal.getsignal(number) not in (signal.SIG_IGN, None):
                 before[number] = signal.signal(number, note)
@@ -191,9 +191,10 @@ def _unheard(number: int, frame: FrameType | None) -> None:
 
 class Worker:
     """
-    Turn SIGINT into KeyboardInterrupt where Python can raise it safely; made by the main thread.
+    Turn SIGINT and SIGTERM into KeyboardInterrupt where Python can raise it safely.
 
-    The caller's frame is where the work begins; the handlers stay until ``ignore``.
+    The main thread makes it. The caller's frame is where the work begins; the handlers stay until
+    ``ignore``.
     """
 
     def __init__(self) -> None:
@@ -202,11 +203,14 @@ class Worker:
         self._asked_s = -ONE_REQUEST_S
         self._unraisable = sys.unraisablehook
         sys.unraisablehook = self._not_raised
-        signal.signal(signal.SIGALRM, self._ask)
-        signal.signal(signal.SIGINT, self._ask)
+        for number in (signal.SIGALRM, *STOPPING):
+            signal.signal(number, self._ask)
 
     def _ask(self, number: int, frame: FrameType | None) -> None:
         if os.getpid() != self._pid:        # a child on its way to another program
+            if number == signal.SIGTERM:    # which its parent sent: it ends, as without us
+                signal.signal(number, signal.SIG_DFL)
+                os.kill(os.getpid(), number)
             return
         now_s = time.monotonic()
         if now_s - self._asked_s < ONE_REQUEST_S:

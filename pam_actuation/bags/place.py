@@ -15,21 +15,27 @@
 """
 Where a bag is written, and which bag it may take the place of.
 
-A bag under a new name grows in its own folder, so that a killed recorder leaves it there.
+A recording under a new name grows in its own folder, so that a killed recorder leaves it there.
 A bag that replaces another grows in a folder beside it; the two change places only when
 the new one is whole. What is not part of the former bag is never deleted: a folder that
 holds anything else is refused.
+
+What can be made again, as by an import, always grows beside, so that a kill leaves nothing under
+the name. The next bag of this name removes what was left.
 """
 
 from collections.abc import Iterable
 import contextlib
+import fcntl
 import os
 from pathlib import Path
+import re
 import stat
 
 from pam_actuation.bags import disk, layout
 from pam_sim.errors import InputError
 from pam_sim.files import make_folder, reason, shown, StrPath, try_to_write
+from pam_sim.files import UNFINISHED as BEGUN
 
 # Added to the name of a bag while it is written beside the one it replaces, when it ended
 # early and may not, and to the name of the former bag while they change places.
@@ -75,6 +81,8 @@ class BagPlace:
     ----------
     directory, overwrite
         As ``check_bag_target``, which is asked first.
+    beside : bool
+        Write beside the folder also where there is none yet.
 
     Attributes
     ----------
@@ -85,14 +93,21 @@ class BagPlace:
 
     """
 
-    def __init__(self, directory: StrPath, overwrite: bool = False) -> None:
+    def __init__(self, directory: StrPath, overwrite: bool = False, beside: bool = False) -> None:
         directory = check_bag_target(directory, overwrite)
         self.directory = self.folder = directory
         self._former = _bag_in(directory, overwrite)
-        if self._former:
+        self._lock: int | None = None
+        if beside:
+            _remove_left(directory)
+            self.folder = _free(directory, f'{BEGUN}{directory.name}')
+        elif self._former:
             self.folder = _free(directory, f'{directory.name}{UNFINISHED}')
         self._made = [path for path in (self.folder, *self.folder.parents) if not path.exists()]
         make_folder(self.folder)
+        if beside:
+            self._lock = os.open(self.folder, os.O_RDONLY)
+            _take(self._lock)
 
     def settle(self, whole: bool = True) -> Path:
         """
@@ -101,6 +116,9 @@ class BagPlace:
         One that is not whole replaces nothing: it gets a name of its own beside the former.
         """
         if not self._former:
+            if self.folder != self.directory:
+                os.rename(self.folder, self.directory)
+                self._moved()
             return self.directory
         if not whole:
             self.directory = _free(self.directory, f'{self.directory.name}{STOPPED}')
@@ -123,6 +141,7 @@ class BagPlace:
 
     def _moved(self) -> None:
         self.folder, self._made = self.directory, [self.directory]
+        self._unlock()
         disk.sync_directory(self.directory.parent)
 
     def give_up(self, files: Iterable[Path]) -> None:
@@ -133,6 +152,12 @@ class BagPlace:
         for folder in self._made:
             with contextlib.suppress(OSError):
                 folder.rmdir()
+        self._unlock()
+
+    def _unlock(self) -> None:
+        if self._lock is not None:
+            os.close(self._lock)
+        self._lock = None
 
 
 def _absolute(directory: StrPath) -> Path:
@@ -209,6 +234,37 @@ def _is_regular(path: Path) -> bool:
         return stat.S_ISREG(os.lstat(path).st_mode)
     except OSError:
         return False
+
+
+def _take(folder: int) -> bool:
+    """Return whether an open folder is locked for this process now; no other holds it then."""
+    try:
+        fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True
+
+
+def _remove_left(directory: Path) -> None:
+    """Remove what killed processes left of a bag that was written beside this folder."""
+    part = re.compile(re.escape(directory.name) + r'_\d+\.mcap')
+    name = re.compile(re.escape(f'{BEGUN}{directory.name}') + r'\d*')
+    parent = directory.parent
+    for folder in [parent / one for one in os.listdir(parent) if name.fullmatch(one)] if (
+            parent.is_dir()) else ():
+        with contextlib.suppress(OSError):
+            files = sorted(folder.iterdir())
+            opened = os.open(folder, os.O_RDONLY)
+            try:
+                # An empty one may just begin.
+                if files and _take(opened) and all(_is_regular(one) and (
+                        one.name == layout.METADATA_FILE or part.fullmatch(one.name))
+                        for one in files):
+                    for one in files:
+                        one.unlink()
+                    folder.rmdir()
+            finally:
+                os.close(opened)
 
 
 def _free(directory: Path, name: str) -> Path:

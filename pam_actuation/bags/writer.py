@@ -60,6 +60,9 @@ class BagWriter:
         Go on in the next file from about this size on; 0: never.
     max_file_s : float
         Go on in the next file after this time between first and newest message [s]; 0: never.
+    beside : bool
+        Write beside ``directory``, so that a killed process leaves nothing there: for what can
+        be made again.
 
     Raises
     ------
@@ -73,9 +76,9 @@ class BagWriter:
 
     def __init__(self, directory: StrPath, metadata: Mapping[str, Any] | None = None,
                  overwrite: bool = False, max_file_bytes: int = 0,
-                 max_file_s: float = 0.0) -> None:
+                 max_file_s: float = 0.0, beside: bool = False) -> None:
         check_limits(max_file_bytes, max_file_s)
-        self._place = BagPlace(directory, overwrite)
+        self._place = BagPlace(directory, overwrite, beside)
         self.directory = self._place.directory
         self._records = _records(metadata or {})
         self._limit_bytes = max_file_bytes or float('inf')

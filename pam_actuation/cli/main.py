@@ -63,8 +63,8 @@ def main(argv: list[str] | None = None) -> int:
     Parameters
     ----------
     argv : list of str, optional
-        Arguments; default: those of the process, which is then ended by Ctrl-C with exit code
-        130 and one line, whatever it is doing.
+        Arguments; default: those of the process, which is then ended by Ctrl-C or SIGTERM
+        with exit code 130 and one line, whatever it is doing.
 
     Returns
     -------
@@ -129,7 +129,7 @@ def _parsed_and_run(argv: list[str] | None, begin: Callable[[], object]) -> int:
     except SystemExit as ended:     # --help, or an option that is not allowed
         return ended.code if isinstance(ended.code, int) else EXIT_BAD_INPUT
     try:
-        begin()         # from here on Ctrl-C is told below
+        begin()         # from here on Ctrl-C and SIGTERM are told below
         tell_when_compiling(lambda: print(
             f'pam {args.verb}: compiling the equations of this rig, once; up to two minutes',
             file=sys.stderr, flush=True))

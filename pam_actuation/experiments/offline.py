@@ -206,7 +206,8 @@ def simulate_experiment(
     writer = None
     try:
         with interrupts.held() as stopped:
-            writer = BagWriter(out, {'pam_experiment': metadata}, overwrite=overwrite)
+            writer = BagWriter(out, {'pam_experiment': metadata}, overwrite=overwrite,
+                               beside=True)
             recorder = MessageWriter(writer, namespace, name)
             loops = _Loops(experiment, rig, controller, seed, learning, recorder, transport_ns,
                            ticks or {}, driver, preview_s)

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pam_actuation import messages
+from pam_actuation import interrupts, messages
 from pam_actuation.bags.message_writer import MessageWriter
 from pam_actuation.bags.metadata import experiment_metadata
 from pam_actuation.bags.plausibility import Size
@@ -44,7 +44,7 @@ from pam_sim.errors import InputError
 from pam_sim.files import StrPath
 from pam_sim.joint.parameters import SIDES
 
-_PROGRESS_EVERY = 20_000
+_LOOK_EVERY = 5_000              # messages: for a signal, and to tell the progress
 
 
 @dataclass
@@ -264,6 +264,8 @@ def write_bag(recording: Recording, path: StrPath, *, rig: Any = None, namespace
     ------
     InputError, OSError
         As ``BagWriter``.
+    KeyboardInterrupt
+        Ctrl-C or SIGTERM; nothing is left, or the bag is whole and the message says so.
 
     """
     metadata = experiment_metadata(
@@ -276,19 +278,27 @@ def write_bag(recording: Recording, path: StrPath, *, rig: Any = None, namespace
     space = namespace_of(namespace or (JOINT if recording.is_of_joint else MUSCLE))
     streams = _streams(recording.signals)
     order = _by_time(streams)
-    writer = BagWriter(path, metadata, overwrite)
-    messages_of = MessageWriter(writer, space, space.rpartition('/')[2])
+    writer = None
     try:
-        for done, (place, number) in enumerate(order):
-            stream = streams[place]
-            stamp_ns = int(stream.stamp_ns[number])
-            messages_of.write(
-                stream.topic, stream.make(stamp_ns, stream.values[number].tolist()), stamp_ns)
-            if progress is not None and done % _PROGRESS_EVERY == 0:
-                progress(done / len(order))
-        writer.close()
+        with interrupts.held() as stopped:
+            writer = BagWriter(path, metadata, overwrite, beside=True)
+            messages_of = MessageWriter(writer, space, space.rpartition('/')[2])
+            for done, (place, number) in enumerate(order):
+                if done % _LOOK_EVERY == 0:
+                    if stopped():
+                        raise KeyboardInterrupt
+                    if progress is not None:
+                        progress(done / len(order))
+                stream = streams[place]
+                stamp_ns = int(stream.stamp_ns[number])
+                messages_of.write(
+                    stream.topic, stream.make(stamp_ns, stream.values[number].tolist()), stamp_ns)
+            writer.close()
     finally:
-        writer.discard()
+        if writer is not None:
+            writer.discard()
+    if stopped():
+        raise KeyboardInterrupt(f'stopped; the bag {writer.directory} is whole')
     return writer.counts
 
 
