@@ -68,6 +68,8 @@ def add_arguments(parser: Parser) -> None:
                         dest='end_s', help='leave out what comes later, in s after the start')
     parser.add_argument('--sort', action='store_true',
                         help='put rows in order whose time runs back')
+    parser.add_argument('--part', type=count(1, 10**6), default=0, metavar='N',
+                        help='take the Nth recording of a file in which the time begins anew')
     parser.add_argument('--missing', action='append', default=[], metavar='TEXT',
                         help='text that stands for a missing value; may be repeated')
     parser.add_argument('--leave-out', action='append', default=[], metavar='COLUMN',
@@ -106,7 +108,8 @@ def run(args: argparse.Namespace) -> int:
     if args.preview:
         return _show(args, tables, found)
     recording = recording_of(
-        tables, found.mapping, sort=args.sort, missing=args.missing, accept=args.accept,
+        tables, found.mapping, sort=args.sort, part=args.part, missing=args.missing,
+        accept=args.accept,
         size=size_of_rig(rig) if rig is not None else size_of_mapping(found.mapping))
     if args.begin_s > 0.0 or args.end_s < float('inf'):
         recording = recording.between(args.begin_s, args.end_s)
@@ -189,7 +192,7 @@ def _show(args: argparse.Namespace, tables: 'list[Table]', found: 'Guess') -> in
     as_it_is = _as_it_is(args)
     lines = [f'{args.files[0]}: {as_it_is}', ''] if as_it_is else []
     lines.append(preview(tables, found, args.missing))
-    problems = time_problems(tables, found, args.sort)
+    problems = time_problems(tables, found, args.sort, args.part)
     if problems:
         lines += ['', 'the time is not read yet:', *(f'    {one}' for one in problems)]
     if found.questions:

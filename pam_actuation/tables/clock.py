@@ -14,9 +14,9 @@
 
 """The time of every row, in nanoseconds: from a column, a rate, or the file itself."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 import re
-from typing import NamedTuple, TYPE_CHECKING
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pam_actuation.messages import START_NS
@@ -24,6 +24,7 @@ from pam_actuation.tables.dates import Dates, dates_of, days_as_ns
 from pam_actuation.tables.day_and_time import (
     dates_of_pair, holds_dates, holds_times_of_day, is_called_time, pair_of)
 from pam_actuation.tables.mapping import TableMapping, TimeMap
+from pam_actuation.tables.order import Clock, in_order, Times
 from pam_actuation.tables.table import Table
 from pam_actuation.tables.units import DATE, FACTORS, is_output, TIME, unit_of_text
 from pam_actuation.tables.words import unit_in
@@ -39,35 +40,7 @@ UNLIKELY_HZ = 1.0                           # below: the user has to say the uni
 FEWEST_RISING = 20                          # rows that tell a time from values that rise
 EPOCH_S = 9e8                               # seconds that can only count from 1970
 GAP_S, GAP_STEPS = 0.05, 5.0                # longer than both: rows are missing
-LATE_S = 1.0                                # messages that overtake one another by less
 JUMP_S = 10.0                               # longer than this and the rest: the clock was set
-
-
-@dataclass(frozen=True)
-class Clock:
-    """
-    The times of the rows of a table.
-
-    Parameters
-    ----------
-    stamp_ns : ndarray of int64, shape (rows,)
-        Growing strictly.
-    rows : ndarray of int64, shape (rows,)
-        Rows of the table that they belong to.
-    told : str
-        Where the time came from, for the preview.
-    remarks : tuple of str
-        What was mended, and gaps.
-    jump : str
-        A sentence on a clock that was set within the recording, '' without.
-
-    """
-
-    stamp_ns: IntArray
-    rows: IntArray
-    told: str
-    remarks: tuple[str, ...] = ()
-    jump: str = ''
 
 
 def time_column(table: Table, mapping: TableMapping) -> TimeMap | None:
@@ -115,7 +88,7 @@ def _rises_without_name(table: Table, mapping: TableMapping) -> bool:
 
 
 def clock_of(table: Table, mapping: TableMapping, start_ns: int = START_NS,
-             sort: bool = False) -> Clock:
+             sort: bool = False, part: int = 0) -> Clock:
     """
     Return the times of the rows.
 
@@ -129,6 +102,9 @@ def clock_of(table: Table, mapping: TableMapping, start_ns: int = START_NS,
         Stamp of time 0, where the times do not count from 1970.
     sort : bool
         Put the rows in order of time.
+    part : int
+        Which recording is meant, from 1, where the time begins anew within the table; 0: there
+        is but one.
 
     Raises
     ------
@@ -137,32 +113,47 @@ def clock_of(table: Table, mapping: TableMapping, start_ns: int = START_NS,
 
     """
     if mapping.rate_hz is not None:
+        if part:
+            raise InputError('a part is found by a column of the time, and --rate goes without; '
+                             'give one of them', f'--part {part}')
         rows = np.arange(len(table), dtype=np.int64)
         numbers = rows if table.numbered is None else table.numbered
         stamps = start_ns + np.round(numbers * (1e9 / mapping.rate_hz)).astype(np.int64)
-        return Clock(stamps, rows, f'{mapping.rate_hz:g} rows a second')
+        return Clock(stamps, rows, f'{mapping.rate_hz:g} rows a second',
+                     _hidden(table, mapping, start_ns))
     column = time_column(table, mapping)
     if column is None:
         if table.stamp_ns is None:
             raise InputError(
                 'no column is the time; add --map time="COLUMN:s", or --rate HZ for rows at '
                 'equal distances', table.source)
-        read = _Times(table.stamp_ns, f'times of the messages on {table.topic}')
+        read = Times(table.stamp_ns, f'times of the messages on {table.topic}')
     else:
         read = _from_column(table, column, start_ns)
-    return _with_gaps(table, _in_order(table, read, sort))
+    return _with_gaps(table, in_order(table, read, sort, part))
 
 
-class _Times(NamedTuple):
-    """The stamps of all rows as they were read; ``step_ns`` is the resolution, 0 if unknown."""
+def _hidden(table: Table, mapping: TableMapping, start_ns: int) -> tuple[str, ...]:
+    """Return a remark on a time that runs back where the rows are taken at equal distances."""
+    column = time_column(table, replace(mapping, rate_hz=None))
+    try:
+        stamps = None if column is None else _from_column(table, column, start_ns).stamp_ns
+    except InputError:          # no time that could be read
+        return ()
+    row = int(np.argmin(np.diff(stamps))) + 1 if stamps is not None and len(stamps) > 1 else 0
+    if column is None or stamps is None or not row or stamps[row] >= stamps[row - 1]:
+        return ()
+    return (f'the time in column "{column.column}" runs back by '
+            f'{(stamps[row - 1] - stamps[row]) * 1e-9:g} s at {_line(table.place(row))}, and '
+            '--rate takes the rows as one recording without a pause; are they two?',)
 
-    stamp_ns: IntArray
-    told: str
-    step_ns: int = 0
-    remark: str = ''
+
+def _line(place: str) -> str:
+    """Return where in its file a place is, as ``line 7``; a place without a line as it is."""
+    return place.partition(':')[2] and f'line {place.rpartition(":")[2]}' or place
 
 
-def _from_column(table: Table, column: TimeMap, start_ns: int) -> _Times:
+def _from_column(table: Table, column: TimeMap, start_ns: int) -> Times:
     """Return the times in a column."""
     import pandas as pd
     name = table.require(column.column, column.where)
@@ -181,7 +172,7 @@ def _from_column(table: Table, column: TimeMap, start_ns: int) -> _Times:
     if pd.api.types.is_integer_dtype(values) and unit == 'ns':
         stamps = values.to_numpy(dtype=np.int64)
         start = 0 if len(stamps) and abs(int(stamps[0])) > EPOCH_S * 1e9 else start_ns
-        return _Times(start + stamps, f'column "{name}" in ns')
+        return Times(start + stamps, f'column "{name}" in ns')
     numbers = table.numbers(name)
     missing = np.flatnonzero(~np.isfinite(numbers))
     if len(missing):
@@ -190,7 +181,7 @@ def _from_column(table: Table, column: TimeMap, start_ns: int) -> _Times:
             'give --rate HZ', table.place(int(missing[0])))
     days = days_as_ns(numbers) if unit in ('', DATE) else None
     if days is not None:
-        return _Times(days, f'column "{name}" in days', _resolution_ns(days))
+        return Times(days, f'column "{name}" in days', _resolution_ns(days))
     if unit == DATE:
         raise InputError(f'column "{name}" holds numbers that are no days of a spreadsheet or of '
                          f'MATLAB; add --map time="{name}:s" (or ms, us, ns)', table.source)
@@ -199,8 +190,8 @@ def _from_column(table: Table, column: TimeMap, start_ns: int) -> _Times:
     start = 0 if len(numbers) and numbers[0] * factor > EPOCH_S else start_ns
     # Whole numbers of the unit first: their product with a power of ten is exact.
     stamps = start + np.round(numbers * (factor * 1e9)).astype(np.int64)
-    return _Times(stamps, f'column "{name}" in {unit}', _resolution_ns(stamps - start),
-                  _rate_remark(table, name, unit, stamps, bool(column.unit)))
+    return Times(stamps, f'column "{name}" in {unit}', _resolution_ns(stamps - start),
+                 _rate_remark(table, name, unit, stamps, bool(column.unit)))
 
 
 def _is_text_date(values: 'pd.Series') -> bool:
@@ -212,7 +203,7 @@ def _is_text_date(values: 'pd.Series') -> bool:
     return bool(re.search(r'\d[-/:.]\d', first)) and not re.fullmatch(r'[+-]?[\d.]+', first)
 
 
-def _dates(table: Table, name: str, start_ns: int) -> _Times:
+def _dates(table: Table, name: str, start_ns: int) -> Times:
     """Return the times in a column of texts, or of dates as other files hold them."""
     import pandas as pd
     values = table.columns[name]
@@ -228,20 +219,20 @@ def _dates(table: Table, name: str, start_ns: int) -> _Times:
             f'column "{name}" holds {str(values.iloc[found])!r}, which is no date and time as in '
             '2026-11-25T09:30:00.125', table.place(found))
     stamps = found.stamp_ns + (start_ns if found.is_of_day else 0)
-    return _Times(stamps, f'column "{name}", {found.told}', _resolution_ns(found.stamp_ns),
-                  found.remark)
+    return Times(stamps, f'column "{name}", {found.told}', _resolution_ns(found.stamp_ns),
+                 found.remark)
 
 
-def _paired(table: Table, date: str, time: str, start_ns: int) -> _Times:
+def _paired(table: Table, date: str, time: str, start_ns: int) -> Times:
     """Return the times whose date is in one column and whose time of day in another."""
     found = dates_of_pair(table, date, time)
     if isinstance(found, int):
         texts = ' '.join(str(table.columns[name].iloc[found]) for name in (date, time))
         raise InputError(f'columns "{date}" and "{time}" hold {texts!r}, which is no date and '
                          'time as in 2026-11-25 09:30:00.125', table.place(found))
-    return _Times(found.stamp_ns + (start_ns if found.is_of_day else 0),
-                  f'columns "{date}" and "{time}", {found.told}',
-                  _resolution_ns(found.stamp_ns), found.remark)
+    return Times(found.stamp_ns + (start_ns if found.is_of_day else 0),
+                 f'columns "{date}" and "{time}", {found.told}',
+                 _resolution_ns(found.stamp_ns), found.remark)
 
 
 def _unit_of_name(table: Table, name: str) -> str:
@@ -320,70 +311,4 @@ def _with_gaps(table: Table, clock: Clock) -> Clock:
             f'({rest_s:.4g} s); was the clock set? Split the file here, or correct the times'))
     return replace(clock, remarks=(
         *clock.remarks, f'gaps in the time: {len(gaps)}, the longest {long_s:.4g} s before '
-        f'{place.partition(":")[2] and "line " + place.rpartition(":")[2] or place}'))
-
-
-def _in_order(table: Table, read: _Times, sort: bool) -> Clock:
-    """Return the clock with its rows in order, each with a time of its own."""
-    stamps, told, step_ns, remark = read
-    rows, remarks = np.arange(len(stamps), dtype=np.int64), [remark] if remark else []
-    back = np.flatnonzero(np.diff(stamps) < 0)
-    if len(back):
-        late_s = 1e-9 * float(np.max(np.maximum.accumulate(stamps) - stamps))
-        overtaken = bool(table.topic) and late_s < LATE_S
-        if not (sort or overtaken):
-            row = int(back[0]) + 1
-            raise InputError(
-                f'the time runs back by {(stamps[row - 1] - stamps[row]) * 1e-9:g} s '
-                f'({len(back)} times in all); two recordings in one file? Split it here, or add '
-                '--sort to put the rows in order', table.place(row))
-        order = np.argsort(stamps, kind='stable')
-        stamps, rows = stamps[order], rows[order]
-        if overtaken:
-            told += f', put in order ({len(back)} arrived late, by up to {1e3 * late_s:.3g} ms)'
-        else:
-            remarks.append(f'the rows were put in order of time ({len(back)} steps back)')
-    repeated = np.flatnonzero(np.diff(stamps) == 0) + 1
-    if not len(repeated):
-        return Clock(stamps, rows, told, tuple(remarks))
-    same = [row for row in repeated if _equal_rows(table, int(rows[row - 1]), int(rows[row]))]
-    if len(same) == len(repeated):
-        kept = np.ones(len(stamps), dtype=bool)
-        kept[same] = False
-        remarks.append(f'rows that stand twice, taken once: {len(same)}')
-        return Clock(stamps[kept], rows[kept], told, tuple(remarks))
-    if step_ns and _is_coarse(stamps, step_ns):
-        remarks.append(
-            f'rows that repeat a time: {len(repeated)}. Times are written to {1e-6 * step_ns:g} '
-            'ms; rows of one time were spread over that')
-        return Clock(_spread(stamps, step_ns), rows, told, tuple(remarks))
-    raise InputError(
-        f'the row has the time of the row before, with other values ({len(repeated)} such rows); '
-        'two recordings in one file, or a time that is too coarse? Then give --rate HZ',
-        table.place(int(rows[repeated[0]])))
-
-
-def _is_coarse(stamps: IntArray, step_ns: int) -> bool:
-    """Return whether times repeat because they are written to ``step_ns``."""
-    times = np.unique(stamps)
-    steps = np.diff(times)
-    if not len(steps) or float(np.median(steps)) > 3.0 * step_ns:
-        return False
-    # A stamp that was not renewed is followed by a longer step; a rounded one is not.
-    repeated = np.flatnonzero(np.diff(stamps) == 0)
-    after = np.searchsorted(times, stamps[repeated])
-    return float(np.median(steps[np.minimum(after, len(steps) - 1)])) < 1.9 * float(
-        np.median(steps))
-
-
-def _equal_rows(table: Table, one: int, other: int) -> bool:
-    return all(column.iloc[one] == column.iloc[other] or (
-        column.iloc[one] != column.iloc[one] and column.iloc[other] != column.iloc[other])
-        for column in table.columns.values())
-
-
-def _spread(stamps: IntArray, step_ns: int) -> IntArray:
-    """Return stamps with those that are equal at equal distances within one step."""
-    _, first, count = np.unique(stamps, return_index=True, return_counts=True)
-    number = np.arange(len(stamps)) - np.repeat(first, count)
-    return stamps + number * step_ns // np.repeat(count, count)
+        f'{_line(place)}'))

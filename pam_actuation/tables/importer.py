@@ -108,8 +108,8 @@ class Recording:
 
 
 def recording_of(tables: Sequence[Table], mapping: TableMapping, *, size: Size,
-                 start_ns: int = START_NS, sort: bool = False, missing: Collection[str] = (),
-                 accept: bool = False) -> Recording:
+                 start_ns: int = START_NS, sort: bool = False, part: int = 0,
+                 missing: Collection[str] = (), accept: bool = False) -> Recording:
     """
     Return the signals in tables.
 
@@ -123,7 +123,7 @@ def recording_of(tables: Sequence[Table], mapping: TableMapping, *, size: Size,
         Columns and units of the signals.
     size : Size
         Of the muscle.
-    start_ns, sort
+    start_ns, sort, part
         As ``clock_of``.
     missing : collection of str
         Texts that stand for missing values.
@@ -144,7 +144,7 @@ def recording_of(tables: Sequence[Table], mapping: TableMapping, *, size: Size,
                 if (column := table.name_of(one.column)) is not None}
         if not held:
             continue
-        clock = clock_of(table, mapping, start_ns, sort)
+        clock = clock_of(table, mapping, start_ns, sort, part)
         if clock.jump and not accept:
             raise InputError(f'{clock.jump}. (--accept takes them as they are)')
         result.told.append(f'{Path(table.source).name}: time from {clock.told}')

@@ -71,7 +71,8 @@ def preview(tables: Collection[Table], found: Guess, missing: Collection[str] = 
     return '\n'.join(lines)
 
 
-def time_problems(tables: Collection[Table], found: Guess, sort: bool = False) -> list[str]:
+def time_problems(tables: Collection[Table], found: Guess, sort: bool = False,
+                  part: int = 0) -> list[str]:
     """Return a sentence for each table whose time cannot be read, if a signal is in the table."""
     columns = [one.column for one in found.mapping.signals.values()] + [
         one.column for one in found.questions if one.column]
@@ -79,7 +80,7 @@ def time_problems(tables: Collection[Table], found: Guess, sort: bool = False) -
     for table in tables:
         if any(table.name_of(one) is not None for one in columns) or len(tables) == 1:
             try:
-                clock_of(table, found.mapping, sort=sort)
+                clock_of(table, found.mapping, sort=sort, part=part)
             except InputError as error:
                 problems.append(str(error))
     return problems

@@ -40,7 +40,7 @@ NUMBERS = {
     **{(verb, option): allowed for verb in ('status', 'estop', 'reset', 'param')
        for option, allowed in (('--domain-id', '0 to 232'), ('--wait', '0.1 to 60 s'))},
     ('import', '--rate'): '0.1 to 1000000 Hz', ('import', '--every'): '1 to 1000000',
-    ('import', '--resample'): '1 to 10000 Hz',
+    ('import', '--resample'): '1 to 10000 Hz', ('import', '--part'): '1 to 1000000',
     ('import', '--from'): '0 s or more', ('import', '--to'): '0 s or more',
     ('export', '--rate'): '0.1 to 100000 Hz',
     ('rig', '--length-mm'): '20 to 9000 mm', ('rig', '--bore-mm'): '1 to 100 mm',

@@ -1,0 +1,80 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Rows that are not in order of time: a few that came late, or two recordings in one file."""
+
+import numpy as np
+from pam_actuation.bags.load import load_run
+from pam_actuation.cli.main import main
+import pytest
+
+ROWS = 2000
+NUMBERS = np.arange(ROWS)
+PRESSURE_BAR = 2.0 + 2.0 * np.sin(NUMBERS / 300.0)
+
+
+@pytest.fixture
+def call(tmp_path, monkeypatch, capsys):
+    """Return a function that imports times and pressures: exit code and what was said."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(times_ms, pressure_bar, *options):
+        rows = ''.join(f'{time},{bar:.4f}\n' for time, bar in zip(times_ms, pressure_bar))
+        (tmp_path / 'a.csv').write_text(f't_ms,p_bar\n{rows}')
+        code = main(['import', 'a.csv', '--map', 'pressure=p_bar:bar_gauge', '--out', 'bag',
+                     '--overwrite', *options])
+        said = capsys.readouterr()
+        return code, said.out + said.err
+    return run
+
+
+@pytest.mark.parametrize('later_ms', [0, 0.4, 300])
+def test_two_recordings_are_not_put_between_one_another(later_ms, call, tmp_path):
+    times_ms = np.concatenate([NUMBERS, NUMBERS + later_ms])
+    both_bar = np.concatenate([PRESSURE_BAR, 4.0 - PRESSURE_BAR])
+    code, said = call(times_ms, both_bar, '--sort')
+    assert code == 2 and not (tmp_path / 'bag').exists()
+    assert said.startswith(f'pam import: a.csv:{ROWS + 2}: 2 recordings in one file')
+    code, said = call(times_ms, both_bar)
+    assert code == 2 and 'Take one of them with --part 1 or --part 2' in said
+    for part, values in enumerate((PRESSURE_BAR, 4.0 - PRESSURE_BAR), 1):
+        code, said = call(times_ms, both_bar, '--part', str(part))
+        assert code == 0 and f'part {part} of 2' in said
+        assert load_run('bag')['pressure']['pressure_pa'] == pytest.approx(
+            101_325.0 + 1e5 * values, abs=6.0)
+    code, said = call(times_ms, both_bar, '--part', '3')
+    assert code == 2 and 'a.csv has 2 parts' in said
+
+
+def test_rows_that_came_late_or_twice_are_still_sorted(call):
+    pairs = NUMBERS.reshape(-1, 2)[:, ::-1].ravel()
+    block = np.concatenate([NUMBERS[:200], NUMBERS[1700:], NUMBERS[200:1700]])
+    twice = np.concatenate([NUMBERS, NUMBERS[:1500]])
+    shuffled = np.random.default_rng(1).permutation(ROWS)
+    for order in (pairs, block, twice, shuffled, NUMBERS[::-1]):
+        code, said = call(NUMBERS[order], PRESSURE_BAR[order], '--sort')
+        assert code == 1 and 'put in order of time' in said, said
+        assert len(load_run('bag')['pressure']['pressure_pa']) == ROWS
+
+
+def test_a_rate_says_what_time_it_hides(call):
+    twice_ms = np.concatenate([NUMBERS, NUMBERS])
+    both_bar = np.concatenate([PRESSURE_BAR, PRESSURE_BAR])
+    for options in ((), ('--leave-out', 't_ms')):
+        code, said = call(twice_ms, both_bar, '--rate', '1000', *options)
+        assert code == 1
+        assert f'column "t_ms" runs back by 1.999 s at line {ROWS + 2}, and --rate' in said
+    assert call(NUMBERS, PRESSURE_BAR, '--rate', '1000')[0] == 0
+    code, said = call(twice_ms, both_bar, '--rate', '1000', '--part', '2')
+    assert code == 2 and 'give one of them' in said
