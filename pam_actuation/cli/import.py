@@ -109,10 +109,8 @@ def run(args: argparse.Namespace) -> int:
         return _show(args, tables, found)
     recording = recording_of(
         tables, found.mapping, sort=args.sort, part=args.part, missing=args.missing,
-        accept=args.accept,
+        accept=args.accept, begin_s=args.begin_s, end_s=args.end_s,
         size=size_of_rig(rig) if rig is not None else size_of_mapping(found.mapping))
-    if args.begin_s > 0.0 or args.end_s < float('inf'):
-        recording = recording.between(args.begin_s, args.end_s)
     recording = without_repeats(recording)
     if args.resample is not None:
         recording = resampled(recording, args.resample)
@@ -235,13 +233,14 @@ def _following(recording: 'Recording', out: str, rig: str | None, model: Any) ->
 def _tell(args: argparse.Namespace, recording: 'Recording', found: 'Guess',
           counts: dict[str, int], out: str, left: list[str], likely: list[str],
           following: str) -> None:
+    import numpy as np
     remarks = [one.sentence for one in recording.found]
     lines = [f'imported {recording.duration_s:.4g} s from {", ".join(recording.sources)}']
     lines += [f'  {text}' for text in recording.told]
     for name, one in found.mapping.signals.items():
-        stamps, _ = recording.signals.get(name, ((), ()))
+        _, values = recording.signals.get(name, ((), ()))
         lines.append(f'  {name}: column "{one.column}" in {one.reading} '
-                     f'({found.told.get(name, "as stated")}), {len(stamps)} values')
+                     f'({found.told.get(name, "as stated")}), {np.isfinite(values).sum()} values')
     if left:
         lines.append('  not imported: ' + ', '.join(f'"{column}"' for column in left[:_MOST_LEFT])
                      + (f' and {len(left) - _MOST_LEFT} more' if len(left) > _MOST_LEFT else ''))

@@ -32,7 +32,7 @@ from pam_actuation.tables.clock import clock_of
 from pam_actuation.tables.guess import is_exported, unit_of_column
 from pam_actuation.tables.lengths import size_of_mapping
 from pam_actuation.tables.mapping import TableMapping
-from pam_actuation.tables.plausible import Doubt, doubts
+from pam_actuation.tables.plausible import Doubt, doubts, missing_values
 from pam_actuation.tables.signals import are_of_joint, BY_NAME, of_muscles, Signal
 from pam_actuation.tables.table import no_column_in, Table
 from pam_actuation.tables.units import ANGLE, LENGTH, of_output
@@ -93,23 +93,31 @@ class Recording:
         return (max(int(stamps[-1]) for stamps, _ in self.signals.values()) - first) * 1e-9
 
     def between(self, begin_s: float, end_s: float) -> 'Recording':
-        """Return what lies between two times after the start; InputError if that is nothing."""
+        """
+        Return what lies between two times after the start; InputError if that is nothing.
+
+        A signal without a value there is left out, and a doubt says so.
+        """
         first = min(int(stamps[0]) for stamps, _ in self.signals.values())
-        signals = {}
+        signals, found = {}, [*self.found]
         for name, (stamps, values) in self.signals.items():
             after_s = (stamps - first) * 1e-9
             kept = (after_s >= begin_s) & (after_s <= end_s)
-            if kept.any():
+            if np.isfinite(values[kept]).any():
                 signals[name] = stamps[kept], values[kept]
+            elif np.isfinite(values).any():
+                found.append(Doubt(f'{name} (column "{self.mapping.signals[name].column}") has '
+                                   'no value in the time asked for, and is not in the bag'))
         if not signals:
-            raise InputError(f'no row lies between {begin_s:g} and {end_s:g} s; the recording '
+            raise InputError(f'no value lies between {begin_s:g} and {end_s:g} s; the recording '
                              f'has {self.duration_s:.6g} s', '--from and --to')
-        return Recording(signals, self.mapping, self.sources, self.told, self.found)
+        return Recording(signals, self.mapping, self.sources, self.told, found)
 
 
 def recording_of(tables: Sequence[Table], mapping: TableMapping, *, size: Size,
                  start_ns: int = START_NS, sort: bool = False, part: int = 0,
-                 missing: Collection[str] = (), accept: bool = False) -> Recording:
+                 missing: Collection[str] = (), accept: bool = False, begin_s: float = 0.0,
+                 end_s: float = float('inf')) -> Recording:
     """
     Return the signals in tables.
 
@@ -129,6 +137,8 @@ def recording_of(tables: Sequence[Table], mapping: TableMapping, *, size: Size,
         Texts that stand for missing values.
     accept : bool
         Take values that cannot be what the mapping says.
+    begin_s, end_s : float
+        Leave out what was before or after, in s after the start.
 
     Raises
     ------
@@ -160,6 +170,9 @@ def recording_of(tables: Sequence[Table], mapping: TableMapping, *, size: Size,
             raise InputError(no_column_in(tables, one.column), one.where or name)
         result.signals[name] = _joined(name, pieces[name])
     _check(result, size, accept)
+    if begin_s > 0.0 or end_s < float('inf'):
+        result = result.between(begin_s, end_s)
+    result.found += missing_values(result.signals, mapping.signals)
     return result
 
 

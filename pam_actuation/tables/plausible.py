@@ -76,13 +76,9 @@ def doubts(signals: Mapping[str, tuple[IntArray, FloatArray]], mapped: Mapping[s
     for name, (stamp_ns, column) in signals.items():
         signal, finite = BY_NAME[name], column[np.isfinite(column)]
         said = f'{name} (column "{mapped[name].column}" in {mapped[name].unit.name})'
-        lost = len(column) - len(finite)
         if not len(finite):
             found.append(Doubt(f'{said} holds no number', True))
             continue
-        if lost:
-            found.append(Doubt(f'{said}: {lost} of {len(column)} values are missing and were '
-                               'left out'))
         dropped = _dropped(mapped[name], column)
         if dropped.any():
             found.append(Doubt(
@@ -100,6 +96,16 @@ def doubts(signals: Mapping[str, tuple[IntArray, FloatArray]], mapped: Mapping[s
             both = _held(place, own, read, size), _zero(place, own, read, size)
             found += [one for one in both if one is not None]
     return found
+
+
+def missing_values(signals: Mapping[str, tuple[IntArray, FloatArray]],
+                   mapped: Mapping[str, ColumnMap]) -> list[Doubt]:
+    """Return a doubt on each signal with missing values; parameters are those of ``doubts``."""
+    counts = {name: (int((~np.isfinite(column)).sum()), len(column))
+              for name, (_, column) in signals.items()}
+    return [Doubt(f'{name} (column "{mapped[name].column}" in {mapped[name].unit.name}): '
+                  f'{lost} of {rows} values are missing and were left out')
+            for name, (lost, rows) in counts.items() if 0 < lost < rows]
 
 
 def _dropped(mapped: ColumnMap, column: FloatArray) -> BoolArray:

@@ -31,7 +31,7 @@ def call(tmp_path, monkeypatch, capsys):
 
     def run(times_ms, pressure_bar, *options):
         rows = ''.join(f'{time},{bar:.4f}\n' for time, bar in zip(times_ms, pressure_bar))
-        (tmp_path / 'a.csv').write_text(f't_ms,p_bar\n{rows}')
+        (tmp_path / 'a.csv').write_text(f't_ms,p_bar\n{rows}'.replace('nan', ''))
         code = main(['import', 'a.csv', '--map', 'pressure=p_bar:bar_gauge', '--out', 'bag',
                      '--overwrite', *options])
         said = capsys.readouterr()
@@ -78,3 +78,19 @@ def test_a_rate_says_what_time_it_hides(call):
     assert call(NUMBERS, PRESSURE_BAR, '--rate', '1000')[0] == 0
     code, said = call(twice_ms, both_bar, '--rate', '1000', '--part', '2')
     assert code == 2 and 'give one of them' in said
+
+
+def test_the_counts_are_of_what_is_in_the_bag(call, tmp_path):
+    lost = np.where((NUMBERS >= 500) & (NUMBERS < 1500), np.nan, PRESSURE_BAR)
+    code, said = call(NUMBERS, lost)
+    assert code == 1 and '), 1000 values' in said and '1000 of 2000 values are missing' in said
+    code, said = call(NUMBERS, lost, '--to', '0.509')
+    assert code == 1 and '), 500 values' in said and '10 of 510 values are missing' in said
+    assert len(load_run('bag')['pressure']['pressure_pa']) == 500
+    code, said = call(NUMBERS, lost, '--from', '0.6', '--to', '0.8')
+    assert code == 2 and 'no value lies between 0.6 and 0.8 s' in said
+    rows = ''.join(f'{k},{bar:.4f},{k % 90 / 9}\n' for k, bar in zip(NUMBERS, lost))
+    (tmp_path / 'b.csv').write_text(f't_ms,p_bar,x_mm\n{rows}'.replace('nan', ''))
+    code = main(['import', 'b.csv', '--out', 'b', '--from', '0.6', '--to', '0.8', '--map',
+                 'pressure=p_bar:bar_gauge'])
+    assert code == 1 and set(load_run('b').topics) == {'contraction'}
