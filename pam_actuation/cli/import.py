@@ -51,6 +51,9 @@ def add_arguments(parser: Parser) -> None:
              'may be repeated')
     parser.add_argument('--mapping', type=source, default=None, metavar='FILE',
                         help='mapping file, as --save-mapping writes it; --map goes before it')
+    parser.add_argument('--without', action='append', default=[], metavar='SIGNAL',
+                        help='a signal of the mapping file that was not recorded this time; may '
+                             'be repeated')
     parser.add_argument('--save-mapping', type=out_path, default=None, metavar='FILE',
                         help='write down how the columns were read, for the next file')
     parser.add_argument('--rate', type=number(0.1, 1e6, 'Hz'), default=None, metavar='HZ',
@@ -136,7 +139,7 @@ def _understood(args: argparse.Namespace) -> 'tuple[list[Table], Guess]':
     from pam_actuation.tables.preview import how_to_begin, question_sentence
     from pam_sim.errors import InputError
     mapping = (load_mapping(args.mapping) if args.mapping else TableMapping()).with_options(
-        args.maps, args.rate)
+        args.maps, args.rate).without(args.without)
     # A mapping file says everything; otherwise all columns are looked at.
     wanted = [one.column for one in mapping.signals.values()] if args.mapping else None
     if not args.preview and (as_it_is := _as_it_is(args)):
@@ -237,7 +240,7 @@ def _tell(args: argparse.Namespace, recording: 'Recording', found: 'Guess',
     remarks = [one.sentence for one in recording.found]
     lines = [f'imported {recording.duration_s:.4g} s from {", ".join(recording.sources)}']
     lines += [f'  {text}' for text in recording.told]
-    for name, one in found.mapping.signals.items():
+    for name, one in recording.mapping.signals.items():
         _, values = recording.signals.get(name, ((), ()))
         lines.append(f'  {name}: column "{one.column}" in {one.reading} '
                      f'({found.told.get(name, "as stated")}), {np.isfinite(values).sum()} values')

@@ -15,7 +15,7 @@
 """Tables to a bag: read, map, check, write."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 import hashlib
 from pathlib import Path
 from typing import Any
@@ -166,9 +166,17 @@ def recording_of(tables: Sequence[Table], mapping: TableMapping, *, size: Size,
             pieces.setdefault(name, []).append((*_said(
                 clock.stamp_ns, values, is_exported(column, BY_NAME[name])), table.source))
     for name, one in mapping.signals.items():
-        if name not in pieces:
-            raise InputError(no_column_in(tables, one.column), one.where or name)
-        result.signals[name] = _joined(name, pieces[name])
+        if name in pieces:
+            result.signals[name] = _joined(name, pieces[name])
+        elif one.optional:
+            result.told.append(f'{name}: no column "{one.column}", which is optional')
+        else:
+            hint = '' if one.where.startswith('--map ') else (
+                f'. To go without {name}, add --without {name}, or write "optional: true" for it '
+                'in the mapping file')
+            raise InputError(f'{no_column_in(tables, one.column)}{hint}', one.where or name)
+    result.mapping = replace(mapping, signals={
+        name: mapping.signals[name] for name in mapping.signals if name in result.signals})
     _check(result, size, accept)
     if begin_s > 0.0 or end_s < float('inf'):
         result = result.between(begin_s, end_s)

@@ -38,7 +38,8 @@ COLUMN_KEYS = (
     Key('zero', float, 'value of the column that means 0', 0.0),
     Key('gain', float, 'units for each step of the column; -1 turns the sign round', 1.0),
     Key('missing', float, 'number that stands for a missing value, such as 0 of a broken wire',
-        otherwise='none'))
+        otherwise='none'),
+    Key('optional', bool, 'whether a table without the column is read all the same', False))
 TIME_KEYS = (COLUMN_KEYS[0], Key(
     'unit', str, '`s`, `ms`, `us`, `ns`, `min`, `h`, or `date`', otherwise='from the name'))
 KEYS = (
@@ -63,6 +64,8 @@ class ColumnMap:
         Such as 0.5 and 2.5 for a sensor of 0.5 to 4.5 V that means 0 to 10 bar.
     missing : float, optional
         Number in the column that stands for a missing value.
+    optional : bool
+        Whether the column may be missing.
     where : str
         Where the user said so, for messages.
 
@@ -73,6 +76,7 @@ class ColumnMap:
     zero: float = 0.0
     gain: float = 1.0
     missing: float | None = None
+    optional: bool = False
     where: str = field(default='', compare=False)
 
     def to_si(self, values: FloatArray) -> FloatArray:
@@ -92,7 +96,7 @@ class ColumnMap:
             entry['gain'] = self.gain
         if self.missing is not None:
             entry['missing'] = self.missing
-        return entry
+        return entry | ({'optional': True} if self.optional else {})
 
     @property
     def numbers(self) -> tuple[str, ...]:
@@ -182,12 +186,21 @@ class TableMapping:
             time, rows_hz = None, rate_hz
         return replace(self, signals=signals, time=time, rate_hz=rows_hz)
 
+    def without(self, names: Iterable[str]) -> 'TableMapping':
+        """Return the mapping without some signals; InputError for one that it does not hold."""
+        signals = dict(self.signals)
+        for name in names:
+            if signals.pop(name, None) is None:
+                raise InputError(f'{name!r} is no signal of the mapping; it holds '
+                                 f'{", ".join(self.signals) or "none"}', '--without')
+        return replace(self, signals=signals)
+
 
 def column_of_text(signal: str, text: str, where: str) -> ColumnMap:
     """Return what a text such as ``SYNTAX`` says of a signal; InputError if it cannot."""
     quantity = signal_of(signal, where).quantity
     column, words = _split(text)
-    numbers: dict[str, float] = {}
+    numbers: dict[str, Any] = {}
     while words and _NUMBER.match(words[-1]):
         key, _, value = words.pop().partition('=')
         numbers[key.strip()] = _number(value, key.strip(), where)
@@ -225,10 +238,11 @@ def load_mapping(path: StrPath) -> TableMapping:
     for name, entry in signals_key.read(tree).items():
         quantity = signal_of(name, tree['signals'].where(name)).quantity
         entry = tree['signals'].require(name, dict).check_keys(names_of(COLUMN_KEYS))
-        _, unit, zero, gain, missing = COLUMN_KEYS
+        _, unit, zero, gain, missing, optional = COLUMN_KEYS
         signals[name] = _checked(ColumnMap(
             _column(entry), checked_unit(unit.read(entry), quantity, entry.where('unit')),
-            zero.read(entry), gain.read(entry), missing.read(entry), entry.where()))
+            zero.read(entry), gain.read(entry), missing.read(entry), optional.read(entry),
+            entry.where()))
     return TableMapping(signals, time, rate_hz)
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from pam_actuation.bags.load import load_run
 from pam_actuation.cli.main import main
 from pam_actuation.tables.guess import guess
-from pam_actuation.tables.mapping import TableMapping
+from pam_actuation.tables.mapping import load_mapping, TableMapping
 from pam_actuation.tables.preview import question_sentence
 from pam_actuation.tables.table import Table
 import pandas as pd
@@ -155,3 +155,25 @@ def test_a_row_of_units_may_state_outputs_of_sensors(tmp_path, ending, monkeypat
     assert main(['import', f'm.{ending}', '--out', 'plain', '--map',
                  'pressure=p:bar_gauge:zero=4:gain=0.625', '--map', 'contraction=#3:um']) == 1
     assert 'the file says counts' in capsys.readouterr().out
+
+
+def test_a_signal_of_the_mapping_may_be_missing(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    rows = ''.join(f'{0.01 * k:.2f},{k % 9 / 3:.2f},{1 + k % 7}\n' for k in range(200))
+    (tmp_path / 'a.csv').write_text(f't_s,p_bar,x_mm\n{rows}')
+    text = ('signals:\n  pressure: {column: p_bar, unit: bar_gauge}\n'
+            '  force: {column: F_N, unit: N}\n')
+    (tmp_path / 'm.yaml').write_text(text)
+    words = ['import', 'a.csv', '--mapping', 'm.yaml', '--out', 'bag', '--overwrite']
+    assert main(words) == 2
+    said = capsys.readouterr().err
+    assert 'no column "F_N"' in said and '--without force' in said and '"optional: true"' in said
+    assert main([*words, '--without', 'force']) == 0
+    assert 'force' not in capsys.readouterr().out
+    assert main([*words, '--without', 'angle']) == 2
+    assert 'it holds pressure, force' in capsys.readouterr().err
+    (tmp_path / 'm.yaml').write_text(text.replace('unit: N', 'unit: N, optional: true'))
+    assert load_mapping('m.yaml').to_yaml().count('optional: true') == 1
+    assert main(words) == 0
+    assert 'force: no column "F_N", which is optional' in capsys.readouterr().out
+    assert 'force' not in load_run('bag').metadata['mapping']
