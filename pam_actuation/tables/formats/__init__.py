@@ -18,8 +18,10 @@ from collections.abc import Callable, Collection
 import importlib
 import os
 from pathlib import Path
+import shlex
 from typing import Any
 
+from pam_actuation.bags.layout import METADATA_FILE
 from pam_actuation.tables.table import Table
 from pam_sim.errors import InputError
 from pam_sim.files import refuse_pipe, shown, StrPath
@@ -33,6 +35,7 @@ ENDINGS = {
     '.npy': 'numpy_file', '.xlsx': 'workbook', '.tdms': 'tdms', '.mcap': 'bag', '.db3': 'bag',
     '.bag': 'bag'}
 COMPRESSED = ('.gz', '.bz2', '.xz')
+MOST_NAMED = 3               # files of a folder, in a message
 
 
 def read_tables(path: StrPath, every: int = 1, wanted: Collection[str] | None = None,
@@ -67,6 +70,9 @@ def read_tables(path: StrPath, every: int = 1, wanted: Collection[str] | None = 
     if not place.exists():
         raise InputError('there is no such file', shown(path))
     refuse_pipe(path)
+    if place.is_dir() and not (place / METADATA_FILE).exists():
+        raise InputError(f'is a folder without the {METADATA_FILE} of a bag; {_inside(place)}',
+                         shown(path))
     module = importlib.import_module(f'{__name__}.{kind_of(place)}')
     try:
         tables: list[Table] = module.read(str(path), every, wanted, progress or (lambda _: None))
@@ -77,14 +83,28 @@ def read_tables(path: StrPath, every: int = 1, wanted: Collection[str] | None = 
     return tables
 
 
+def _inside(folder: Path) -> str:
+    """Return what to name in place of a folder that is no bag."""
+    files = [shlex.quote(str(folder / name)) for name in sorted(os.listdir(folder))
+             if not (folder / name).is_dir() and _ending(folder / name) in ENDINGS]
+    more = f', and {len(files) - MOST_NAMED} more' if len(files) > MOST_NAMED else ''
+    return f'name one recording in it: {", ".join(files[:MOST_NAMED])}{more}' if files else (
+        'no file in it is a table or a recording')
+
+
+def _ending(place: Path) -> str:
+    """Return the ending of a name in small letters, without that of a compressed file."""
+    endings = [ending.lower() for ending in place.suffixes]
+    if endings and endings[-1] in COMPRESSED:
+        endings.pop()
+    return endings[-1] if endings else ''
+
+
 def kind_of(place: Path) -> str:
     """Return the module of a file by its name; InputError where no module fits."""
     if place.is_dir():
         return 'bag'
-    endings = [ending.lower() for ending in place.suffixes]
-    if endings and endings[-1] in COMPRESSED:
-        endings.pop()
-    kind = ENDINGS.get(endings[-1] if endings else '')
+    kind = ENDINGS.get(_ending(place))
     if kind is None:
         raise InputError(
             f'the ending {os.path.splitext(place.name)[1]!r} is unknown; allowed: '

@@ -1,0 +1,44 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What is shown before an import, and what cannot be asked for."""
+
+from pathlib import Path
+
+from pam_actuation.cli.main import main
+import pytest
+
+
+@pytest.fixture
+def table(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    rows = ''.join(f'{10 * k},{k % 9 / 3:.2f},{1 + k % 7},up,\n' for k in range(200))
+    Path('anna').mkdir()
+    Path('anna', 'run 1.csv').write_text(f't_ms,p_bar,F_N,state,left\n{rows}', encoding='utf-8')
+    return 'anna/run 1.csv'
+
+
+def test_a_folder_of_tables_is_called_that(table, capsys):
+    assert main(['import', 'anna']) == 2
+    assert capsys.readouterr().err == (
+        'pam import: anna: is a folder without the metadata.yaml of a bag; name one recording in '
+        "it: 'anna/run 1.csv'\n")
+    for name in ('run 2.csv.gz', 'run 3.mcap', 'run 4.mat', 'notes.md'):
+        Path('anna', name).touch()
+    assert main(['import', 'anna', '--preview']) == 2
+    assert capsys.readouterr().err.endswith(
+        "'anna/run 1.csv', 'anna/run 2.csv.gz', 'anna/run 3.mcap', and 1 more\n")
+    Path('empty').mkdir()
+    assert main(['import', 'empty']) == 2
+    assert 'no file in it is a table or a recording' in capsys.readouterr().err
