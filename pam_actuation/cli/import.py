@@ -99,8 +99,12 @@ def run(args: argparse.Namespace) -> int:
     from pam_actuation.tables.preview import may_be_signals, unread
     from pam_actuation.tables.repeats import without_repeats
     from pam_actuation.tables.resample import hint, resampled
+    from pam_sim.errors import InputError
     from pam_sim.files import write_text
     from pam_sim.joint import load_rig_or_joint
+    if args.preview and args.save_mapping:
+        raise InputError('--preview writes nothing, so it keeps no mapping; leave one of them out',
+                         f'--save-mapping {args.save_mapping}')
     model = load_rig_or_joint(args.rig) if args.rig else None
     rig: Any = getattr(model, 'flexor', model)      # of a joint: the lengths are checked by one
     out = args.out or os.path.join('runs', Path(args.files[0]).name.partition('.')[0])

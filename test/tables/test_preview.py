@@ -42,3 +42,8 @@ def test_a_folder_of_tables_is_called_that(table, capsys):
     Path('empty').mkdir()
     assert main(['import', 'empty']) == 2
     assert 'no file in it is a table or a recording' in capsys.readouterr().err
+
+
+def test_a_preview_says_that_it_keeps_no_mapping(table, capsys):
+    assert main(['import', table, '--preview', '--save-mapping', 'm.yaml']) == 2
+    assert '--preview writes nothing' in capsys.readouterr().err and not Path('m.yaml').exists()
