@@ -193,7 +193,7 @@ def _asked(question: 'Question') -> str | None:
 
 def _show(args: argparse.Namespace, tables: 'list[Table]', found: 'Guess') -> int:
     from pam_actuation.tables.preview import (
-        how_to_begin, may_be_signals, preview, questions_text, time_problems)
+        described, how_to_begin, may_be_signals, preview, questions_text, time_problems)
     as_it_is = _as_it_is(args)
     lines = [f'{args.files[0]}: {as_it_is}', ''] if as_it_is else []
     lines.append(preview(tables, found, args.missing))
@@ -210,12 +210,15 @@ def _show(args: argparse.Namespace, tables: 'list[Table]', found: 'Guess') -> in
     if (found.mapping.signals or found.questions) and (more := may_be_signals(tables, found)):
         lines += ['', 'not read, but by name and unit these may be signals:',
                   *(f'    {one}' for one in more)]
-    emit(args, {
+    payload = {
         'files': args.files, 'mapping': found.mapping.to_yaml(), 'time': problems,
         'questions': [{'signal': one.signal, 'column': one.column, 'text': one.text,
                        'answers': list(one.answers)} for one in found.questions],
-        'columns': [list(table.columns) for table in tables], 'as_it_is': as_it_is},
-        '\n'.join(lines))
+        'columns': [list(table.columns) for table in tables], 'as_it_is': as_it_is,
+        'tables': [{'source': table.source, 'topic': table.topic, 'rows': len(table),
+                    'columns': described(table, found, args.missing)}
+                   for table in tables] if args.json else []}
+    emit(args, payload, '\n'.join(lines))
     return EXIT_DONE
 
 

@@ -14,8 +14,9 @@
 
 """What a table holds and how it would be read, as lines for people."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 import re
+from typing import Any
 
 import numpy as np
 from pam_actuation.tables.clock import clock_of, time_column
@@ -55,20 +56,44 @@ def preview(tables: Collection[Table], found: Guess, missing: Collection[str] = 
     """
     lines = []
     for table in tables:
-        meant = _meaning(table, found)
         rows_are = f'{table.topic}, {len(table)} messages' if table.topic else f'{len(table)} rows'
         lines.append(f'{table.source}: {rows_are}, {len(table.columns)} columns')
         rows = [('', 'column', 'lowest', 'highest', 'first', 'read as')]
-        for number, name in enumerate(table.columns):
-            if number == _MOST_COLUMNS:
-                rows.append(('', f'and {len(table.columns) - number} more', '', '', '', ''))
-                break
-            rows.append((f'#{number + 1}', name, *_facts(table, name, missing),
-                         meant.get(name, '–')))
+        rows += [(f'#{number}', one['column'], *_range(one), one['first'], one['read_as'] or '–')
+                 for number, one in enumerate(
+                     described(table, found, missing, _MOST_COLUMNS), 1)]
+        if len(table.columns) > _MOST_COLUMNS:
+            rows.append(('', f'and {len(table.columns) - _MOST_COLUMNS} more', '', '', '', ''))
         widths = [max(len(row[place]) for row in rows) for place in range(5)]
         lines += ['  ' + '  '.join(f'{cell:{width}}' for cell, width in zip(row, widths))
                   + f'  {row[5]}' for row in rows]
     return '\n'.join(lines)
+
+
+def described(table: Table, found: Guess, missing: Collection[str] = (),
+              most: int | None = None) -> list[dict[str, Any]]:
+    """
+    Return what is known of each column of a table, as plain data.
+
+    Parameters
+    ----------
+    table : Table
+        The table.
+    found, missing
+        As ``preview``.
+    most : int, optional
+        Of so many columns.
+
+    Returns
+    -------
+    list of dict
+        ``column`` (name), ``lowest`` and ``highest`` (None where there is no number), ``first``
+        (value as text), ``is_text``, ``read_as`` ('' where it is not read).
+
+    """
+    meant = _meaning(table, found)
+    return [{'column': name, **_facts(table, name, missing), 'read_as': meant.get(name, '')}
+            for name in list(table.columns)[:most]]
 
 
 def time_problems(tables: Collection[Table], found: Guess, sort: bool = False,
@@ -217,17 +242,26 @@ def _meaning(table: Table, found: Guess) -> dict[str, str]:
     return meant
 
 
-def _facts(table: Table, name: str, missing: Collection[str]) -> tuple[str, str, str]:
-    """Return lowest, highest and first value of a column; '' for those of texts."""
-    first = str(table.columns[name].iloc[0])[:23] if len(table) else ''
+def _facts(table: Table, name: str, missing: Collection[str]) -> dict[str, Any]:
+    """Return lowest, highest and first value of a column, and whether it holds texts."""
+    found: dict[str, Any] = {
+        'lowest': None, 'highest': None, 'is_text': False,
+        'first': str(table.columns[name].iloc[0])[:23] if len(table) else ''}
     try:
         values = table.numbers(name, missing)
     except InputError:
-        return '', '', first
+        return found | {'is_text': True}
     finite = values[np.isfinite(values)]
     if not len(finite):
-        return 'no number', '', first
-    return f'{finite.min():.6g}', f'{finite.max():.6g}', first
+        return found
+    return found | {'lowest': float(finite.min()), 'highest': float(finite.max())}
+
+
+def _range(one: Mapping[str, Any]) -> tuple[str, str]:
+    """Return the lowest and highest value of a column for people, '' of one of texts."""
+    if one['lowest'] is None:
+        return '' if one['is_text'] else 'no number', ''
+    return f'{one["lowest"]:.6g}', f'{one["highest"]:.6g}'
 
 
 def _finite(table: Table, name: str) -> FloatArray:

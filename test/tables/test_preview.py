@@ -14,6 +14,7 @@
 
 """What is shown before an import, and what cannot be asked for."""
 
+import json
 from pathlib import Path
 
 from pam_actuation.cli.main import main
@@ -47,3 +48,23 @@ def test_a_folder_of_tables_is_called_that(table, capsys):
 def test_a_preview_says_that_it_keeps_no_mapping(table, capsys):
     assert main(['import', table, '--preview', '--save-mapping', 'm.yaml']) == 2
     assert '--preview writes nothing' in capsys.readouterr().err and not Path('m.yaml').exists()
+
+
+def test_a_preview_for_programs_says_how_each_column_is_read(table, capsys):
+    assert main(['import', table, '--preview']) == 0
+    shown = capsys.readouterr().out
+    assert main(['import', table, '--preview', '--json']) == 0
+    found, = json.loads(capsys.readouterr().out)['tables']
+    assert (found['source'], found['rows']) == (table, 200)
+    columns = {one.pop('column'): one for one in found['columns']}
+    assert columns['t_ms'] == {'lowest': 0.0, 'highest': 1990.0, 'first': '0', 'is_text': False,
+                               'read_as': 'time'}
+    assert columns['state'] == {'lowest': None, 'highest': None, 'first': 'up', 'is_text': True,
+                                'read_as': ''}
+    assert columns['left'] | {'first': ''} == {**columns['state'], 'first': '', 'is_text': False}
+    for one in columns.values():
+        assert one['read_as'] in shown
+    assert columns['F_N']['read_as'] == 'force in N (unit N by name)'
+    lines = {line.split()[1]: line for line in shown.splitlines() if line.startswith('  #')}
+    assert 'no number' in lines['left'] and 'no number' not in lines['state']
+    assert lines['t_ms'].split()[2:] == ['0', '1990', '0', 'time']
