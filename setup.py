@@ -23,7 +23,7 @@ VERSION = '1.0.0'
 HERE = Path(__file__).parent
 
 # Read or shown at run time; found again by pam_actuation/resources.py.
-SHARED_FOLDERS = ('config', 'launch', 'msg_docs', 'docs/reference/nodes')
+SHARED_FOLDERS = ('config', 'launch', 'msg_docs', 'docs/reference/nodes', 'docs/reference/files')
 
 # Everything but the live nodes works with these alone. The lower bounds are
 # the versions of Ubuntu 24.04, the platform of ROS 2 Jazzy, where it has them.

@@ -39,7 +39,8 @@ FOR_OTHER_RIGS = ('hardware_sensors', 'joint_simulator', 'joint_controller',
 PASSIVE = 'configured, not active'
 SOURCES = (
     'package.xml', 'setup.py', 'setup.cfg', 'pyproject.toml', 'README.md', 'LICENSE', 'resource',
-    'pam_actuation', 'pam_sim', 'config', 'launch', 'msg_docs', 'docs/reference/nodes')
+    'pam_actuation', 'pam_sim', 'config', 'launch', 'msg_docs', 'docs/reference/nodes',
+    'docs/reference/files')
 
 # Raises on any import of ROS, as on a machine without it.
 # Within a second, at the first use.

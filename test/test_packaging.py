@@ -163,7 +163,8 @@ def test_shared_files_are_installed(setup_keywords):
     installed = {
         f'{target}/{Path(file).name}'
         for target, files in setup_keywords['data_files'] for file in files}
-    for folder in ('config', 'launch', 'msg_docs', 'docs/reference/nodes'):
+    for folder in ('config', 'launch', 'msg_docs', 'docs/reference/nodes',
+                   'docs/reference/files'):
         for path in (ROOT / folder).rglob('*'):
             if path.is_file() and '__pycache__' not in path.parts:
                 assert f'share/pam_actuation/{path.relative_to(ROOT).as_posix()}' in installed

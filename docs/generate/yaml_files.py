@@ -15,6 +15,7 @@
 """A page for each kind of YAML file, with every key, made from the declarations in the code."""
 
 from collections.abc import Iterable
+from pathlib import Path
 
 from generate.command_line import BAR, plain
 from pam_actuation.control import config, made_for
@@ -47,6 +48,8 @@ from pam_sim.valve.regulator_presets import (
 _HEAD = ('key', 'holds', 'default', 'allowed', 'meaning')
 _KINDS = {float: 'number', int: 'whole number', str: 'text', bool: 'true or false',
           dict: 'mapping', list: 'list'}
+# A page that is kept in the repository as well, for readers without a build of the pages.
+KEPT = 'reference/files/mapping.md'
 _MADE = 'This page is made from the declarations in the code.'
 INDEX = f"""# YAML files
 
@@ -265,6 +268,8 @@ def _value(default):
 def _default(key):
     if key.required:
         return 'required'
+    if key.kind is bool:
+        return f'`{str(key.default).lower()}`'
     return _words(key.otherwise) or (f'`{key.default}`' if key.default not in (None, '') else '')
 
 
@@ -279,7 +284,8 @@ def _allowed(key):
 def _words(text):
     """Return a text as Markdown: what stands between backquotes is code."""
     parts = ' '.join((text or '').replace('``', '`').split()).split('`')
-    return '`'.join(plain(part) if k % 2 == 0 else part for k, part in enumerate(parts))
+    return '`'.join(part.replace(part.strip(), plain(part), 1) if part.strip() and k % 2 == 0
+                    else part for k, part in enumerate(parts))
 
 
 def _unit(unit):
@@ -300,3 +306,8 @@ def _yaml(*lines):
 
 def _joined(parts):
     return '\n\n'.join(part for part in parts if part) + '\n'
+
+
+if __name__ == '__main__':      # in docs/: python -m generate.yaml_files
+    Path(KEPT).parent.mkdir(exist_ok=True)
+    Path(KEPT).write_text(pages()[KEPT], encoding='utf-8')

@@ -32,7 +32,9 @@ if TYPE_CHECKING:
 HELP = """Make a bag of a table measured elsewhere: CSV, Excel, LabVIEW, MAT, or a foreign bag.
 
 Without --map the columns are found by name, unit and range; --preview shows how. What the file
-cannot tell is asked for. Several files are one recording: the next part, or other signals."""
+cannot tell is asked for. Several files are one recording: the next part, or other signals.
+
+docs/reference/files/mapping.md lists the signals, their units and the keys of a mapping file."""
 RIG_FILE = 'my_rig.yaml'            # that pam rig new writes
 _MOST_LEFT = 12                     # names of columns that are told
 EXAMPLE = 'pam import run7.csv --map pressure="p_bar:bar_gauge" --out runs/run7'

@@ -18,6 +18,7 @@ from pathlib import Path
 import re
 import sys
 
+from pam_actuation.cli.main import main
 from pam_actuation.control.config import load_controller
 from pam_actuation.control.laws import LAWS
 from pam_actuation.control.sofc.settings import SETTINGS
@@ -37,14 +38,20 @@ SOFC = 'controller: sofc\nmade_for: {valve: ppr}\n'
 
 
 @pytest.fixture(scope='module')
-def rows():
-    """Return by page the rows of its tables, by what the first cell names."""
+def pages():
+    """Return the text of each page by its path below docs/."""
     pytest.importorskip('sphinx', reason='Sphinx is not installed (the docs extra has it)')
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(ROOT / 'docs'))
         from generate import yaml_files
-        pages = yaml_files.pages()
+        made = yaml_files.pages()
         sys.modules.pop('generate', None)
+    return made
+
+
+@pytest.fixture(scope='module')
+def rows(pages):
+    """Return by page the rows of its tables, by what the first cell names."""
     found = {}
     for name, text in pages.items():
         kept = found.setdefault(Path(name).stem, {})
@@ -52,6 +59,17 @@ def rows():
             first, *rest = re.split(r'(?<!\\) \| ', row)
             kept.setdefault(first.strip('`*\\'), []).append(rest)
     return found
+
+
+def test_the_page_that_is_kept_in_the_repository_is_current(pages, capsys):
+    name = 'reference/files/mapping.md'
+    kept = (ROOT / 'docs' / name).read_text(encoding='utf-8')
+    assert kept == pages[name], 'run in docs/: python -m generate.yaml_files'
+    assert ' such as `#3`' in kept
+    guide = (ROOT / 'docs/guides/tables.md').read_text(encoding='utf-8')
+    assert f'](../{name})' in guide
+    assert main(['import', '--help']) == 0
+    assert f'docs/{name} lists the signals' in capsys.readouterr().out
 
 
 def allowed_in(load, *arguments):
