@@ -95,7 +95,7 @@ class RecordedRun(Run):
         """Return what cannot be right in the values, a tuple of Implausible; looked for once."""
         size_of = cache(lambda: recorded_size(self.metadata))
         return tuple(found for short, series in self.topics.items() for found in topic_findings(
-            f'{self.namespace}/{short}', series.values, size_of))
+            f'{self.namespace}/{short}', series.stamp_ns, series.values, size_of))
 
     @property
     def implausible(self) -> tuple[str, ...]:

@@ -21,6 +21,7 @@ from typing import NamedTuple, TYPE_CHECKING
 import numpy as np
 
 from pam_actuation.bags.rig_topics import side_of
+from pam_actuation.bags.sensor_faults import course_remarks
 from pam_actuation.topics.table import (
     BY_NAME, NEEDED, OF_A_RUN, OFTEN_EMPTY, RECORDED, RECORDED_OF_JOINT, short_name, Topic, USED)
 from pam_sim.annotations import FloatArray, IntArray
@@ -164,21 +165,26 @@ def topic_remarks(topic: 'TopicData', info: 'TopicInfo', stamp_ns: IntArray,
         return []
     remarks = _time_remarks(topic, info, stamp_ns) + repeat_remarks(
         topic.name, values, info.rate_hz)
-    return remarks + [one.sentence for one in topic_findings(topic.name, values, size_of)]
+    return remarks + [
+        one.sentence for one in topic_findings(topic.name, stamp_ns, values, size_of)]
 
 
-def topic_findings(topic: str, values: Mapping[str, FloatArray],
+def topic_findings(topic: str, stamp_ns: IntArray, values: Mapping[str, FloatArray],
                    size_of: SizeOf | None = None) -> list[Implausible]:
     """Return what cannot be right in the values of a topic, a list of Implausible."""
-    row = OF_A_RUN.get(short_name(topic))
+    row = BY_NAME.get(short_name(topic))
     # Internals may be undefined, such as the time since the tick before the first.
     if row is not None and row.internals:
         return []
     # A reference that asks for a force says nothing of a contraction.
     asks_force = topic.endswith('/reference') and 'force_n' in values
-    return [found for name, column in values.items()
-            if len(column) and (not asks_force or np.isfinite(column).any())
-            for found in value_findings(topic, name, column, size_of)]
+    findings = [found for name, column in values.items()
+                if len(column) and (not asks_force or np.isfinite(column).any())
+                for found in value_findings(topic, name, column, size_of)]
+    if row is not None and row.is_measured and not any(one.unusable for one in findings):
+        findings += [Implausible(f'{topic}: {text}') for name, column in values.items()
+                     for text in course_remarks(name, stamp_ns, column)]
+    return findings
 
 
 def missing_topics(namespaces: Mapping[str, Collection[str]],

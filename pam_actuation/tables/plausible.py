@@ -20,12 +20,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from pam_actuation.bags.plausibility import (
     GAUGE_HINT, Implausible, SHARE_HINT, Size, value_findings)
+from pam_actuation.bags.sensor_faults import course_remarks
 from pam_actuation.tables.lengths import LEAST_KEPT
 from pam_actuation.tables.mapping import ColumnMap
 from pam_actuation.tables.signals import BY_NAME, of_muscles, Signal
 from pam_actuation.tables.units import (
     ABSOLUTE, ANGLE, FORCE, GAUGE, LENGTH, names_of, of_output, PRESSURE, unit_of_text)
 from pam_actuation.tables.words import unit_in
+from pam_actuation.topics.table import topic_of
 from pam_sim.annotations import BoolArray, FloatArray, IntArray
 from pam_sim.units import P_ATM_PA
 
@@ -87,8 +89,11 @@ def doubts(signals: Mapping[str, tuple[IntArray, FloatArray]], mapped: Mapping[s
                 f'{replace(mapped[name], missing=0.0).option(name)}'))
             finite = column[np.isfinite(column) & ~dropped]
             whole[name] = stamp_ns, np.where(dropped, np.nan, column)
-        found += [Doubt(f'{said}: {one.sentence}', one.is_wrong)
-                  for one in _of_values(signal, mapped[name], finite, size)]
+        of_values = _of_values(signal, mapped[name], finite, size)
+        found += [Doubt(f'{said}: {one.sentence}', one.is_wrong) for one in of_values]
+        if topic_of(signal.topic).is_measured and not any(one.is_wrong for one in of_values):
+            found += [Doubt(f'{said}: {text.rstrip(".")}')
+                      for text in course_remarks(signal.field, *whole[name])]
     for place, names in of_muscles(signals).items():
         if {'pressure', 'contraction'} <= names:
             own = {name: whole[f'{place}{name}'] for name in names}

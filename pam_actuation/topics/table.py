@@ -123,6 +123,11 @@ class Topic:
         """Return the content if many messages of it are arrays, else None."""
         return self.content if isinstance(self.content, Numeric) else None
 
+    @property
+    def is_measured(self) -> bool:
+        """Return whether its values come from sensors."""
+        return 'hardware_sensors' in self.published_by
+
     def full_name(self, namespace: str) -> str:
         """Return the full name in a namespace such as ``/muscle``."""
         return f'/{self.name}' if self.place == ROOT else f'{namespace}/{self.name}'
