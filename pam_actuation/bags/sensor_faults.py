@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 from pam_sim.annotations import FloatArray, IntArray
+from pam_sim.units import P_ATM_PA
 
 # A load that moves so far within one sample is accelerated by more: of the end of a muscle, m/s²,
 # and of a limb, rad/s².
@@ -29,6 +30,13 @@ AROUND, LATER = 5, 50           # samples on either side that are still, and tha
 KEPT = 0.5                      # of a step, still there
 FEWEST_SAMPLES = 100
 FEWEST_CHANGES = 0.1            # the shortest tenth of the times between changes
+LEAST_CLIPPED, LEAST_HELD = 0.01, 10    # share of the samples at the limit, and in one stay
+MOST_REPEATED = 0.01            # of the other samples: those of a coarse sensor repeat
+LEAST_TURNS = 0.25              # of the bends elsewhere, that noise turns round one by one
+# Where a rig is at rest, and how far from it a sensor may begin: it is no fault to see no less.
+RESTS = {'pressure_pa': (P_ATM_PA, 5e3), 'contraction_m': (0.0, 1e-3), 'force_n': (0.0, 5.0)}
+_SHOWN = {'pressure_pa': (1e-3, -P_ATM_PA, 'kPa gauge'), 'contraction_m': (1e3, 0.0, 'mm'),
+          'force_n': (1.0, 0.0, 'N'), 'angle_rad': (1.0, 0.0, 'rad')}
 
 
 class Slip(NamedTuple):
@@ -52,7 +60,7 @@ def course_remarks(name: str, stamp_ns: IntArray, column: FloatArray) -> list[st
         Values, NaN where missing.
 
     """
-    return _slip_remarks(name, stamp_ns, column)
+    return _slip_remarks(name, stamp_ns, column) + _clip_remarks(name, column)
 
 
 def _slip_remarks(name: str, stamp_ns: IntArray, column: FloatArray) -> list[str]:
@@ -61,12 +69,58 @@ def _slip_remarks(name: str, stamp_ns: IntArray, column: FloatArray) -> list[str
     found = slips(stamp_ns, column, MOST_ACCELERATION[name])
     if not found:
         return []
-    factor, unit = (1e3, 'mm') if name == 'contraction_m' else (1.0, 'rad')
+    factor, _, unit = _SHOWN[name]
     jumps = ' and '.join(f'by {factor * one.size:+.3g} {unit} at {one.time_s:.3f} s'
                          for one in found)
     return [f'{name} jumps within one sample {jumps} after its first message and stays there, '
             'faster than any load moves. Did the encoder slip? Its zero is another from then on: '
             'use the part before or after.']
+
+
+def _clip_remarks(name: str, column: FloatArray) -> list[str]:
+    values = column[np.isfinite(column)]
+    if name not in _SHOWN or len(values) < FEWEST_SAMPLES:
+        return []
+    low, high = float(values.min()), float(values.max())
+    rest, margin = RESTS.get(name, (low, -1.0))
+    factor, zero, unit = _SHOWN[name]
+    return [
+        f'{name} is clipped: it stays at its {which} value, exactly '
+        f'{factor * (limit + zero):.5g} {unit}, for {100.0 * share:.0f} % of the time, and its '
+        'noise is gone there. What the sensor or its converter cannot read is lost: look for its '
+        'range.'
+        for which, limit in (('largest', high), ('smallest', low))
+        if not (limit == low and abs(limit - rest) <= margin)
+        and (share := clipped_share(values, limit))]
+
+
+def clipped_share(values: FloatArray, limit: float) -> float:
+    """
+    Return the share of the values at a limit of the sensor, 0 where it is not clipped.
+
+    A clipped sensor stays at the limit to the bit, although noise moves it all the time elsewhere.
+    A muscle at rest or on its stop has noise there too. A coarse sensor repeats elsewhere too, and
+    a simulated one without noise goes smoothly.
+
+    Parameters
+    ----------
+    values : ndarray
+        Finite values.
+    limit : float
+        The largest or the smallest of them.
+
+    """
+    is_there = values == limit
+    share = float(is_there.mean())
+    edges = np.flatnonzero(np.diff(is_there, prepend=False, append=False))
+    if share < LEAST_CLIPPED or int((edges[1::2] - edges[::2]).max()) < LEAST_HELD:
+        return 0.0
+    steps, is_other = np.diff(values), ~(is_there[1:] | is_there[:-1])
+    if is_other.sum() < FEWEST_SAMPLES or (steps[is_other] == 0.0).mean() > MOST_REPEATED:
+        return 0.0
+    bends = np.diff(steps)
+    turns = (bends[1:] * bends[:-1] < 0.0)[is_other[2:] & is_other[1:-1] & is_other[:-2]]
+    return share if len(turns) and turns.mean() > LEAST_TURNS else 0.0
 
 
 def slips(stamp_ns: IntArray, column: FloatArray, most_acceleration: float) -> list[Slip]:

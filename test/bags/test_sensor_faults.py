@@ -20,6 +20,7 @@ import re
 import numpy as np
 from pam_actuation.bags.sensor_faults import course_remarks
 from pam_actuation.cli.main import main
+from pam_sim.units import P_ATM_PA
 import pytest
 
 RATE_HZ = 1000.0
@@ -94,6 +95,38 @@ def test_a_step_across_a_gap_is_no_slip():
     assert told('contraction_m', column) == []
 
 
+PRESSURE_PA = P_ATM_PA + 200e3 - 190e3 * np.cos(TIME_S) + 300.0 * NOISE
+
+
+@pytest.mark.parametrize('name, column, words', [
+    ('pressure_pa', PRESSURE_PA.clip(max=P_ATM_PA + 350e3), 'largest value, exactly 350 kPa gaug'),
+    ('pressure_pa', PRESSURE_PA.clip(min=P_ATM_PA + 50e3), 'smallest value, exactly 50 kPa gauge'),
+    ('contraction_m', MOVED_M.clip(max=0.02), 'largest value, exactly 20 mm'),
+    ('force_n', 40.0 - 30.0 * np.cos(TIME_S) + NOISE.clip(max=0.0), ''),
+    ('force_n', (40.0 - 30.0 * np.cos(TIME_S) + NOISE).clip(max=60.0), 'exactly 60 N')])
+def test_a_clipped_sensor_is_told_with_value_and_share(name, column, words):
+    sentences = told(name, column)
+    assert len(sentences) == bool(words)
+    if words:
+        share = np.mean((column == column.max()) | (column == column.min()))
+        assert words in sentences[0] and f'for {100.0 * share:.0f} % of the time' in sentences[0]
+
+
+@pytest.mark.parametrize('name, column', [
+    ('pressure_pa', PRESSURE_PA), ('pressure_pa', PRESSURE_PA.clip(max=P_ATM_PA + 395e3)),
+    # A vented muscle, with and without noise; a coarse sensor; a simulation on its stop.
+    ('pressure_pa', (PRESSURE_PA - 50e3).clip(min=P_ATM_PA)),
+    ('pressure_pa', (PRESSURE_PA - 300.0 * NOISE - 50e3).clip(min=P_ATM_PA)),
+    ('pressure_pa', np.round(PRESSURE_PA, -3).clip(max=P_ATM_PA + 350e3)),
+    ('contraction_m', SMOOTH_M.clip(max=0.02)), ('contraction_m', SMOOTH_M.clip(min=0.005)),
+    ('contraction_m', np.round(MOVED_M, 5).clip(max=0.02)),
+    ('contraction_m', SMOOTH_M.clip(max=0.02) + 1e-5 * NOISE),
+    ('ppr_voltage', (4.0 - 6.0 * np.cos(TIME_S) + 0.1 * NOISE).clip(0.0, 10.0)),
+    ('force_n', np.repeat(40.0 - 30.0 * np.cos(TIME_S) + NOISE, 10)[:TIME_S.size].clip(max=55.0))])
+def test_what_rests_at_a_limit_by_nature_is_not_clipped(name, column):
+    assert told(name, column) == []
+
+
 def table_of(path, **columns):
     """Write a table of a hanging mass, with columns in place of the usual ones."""
     known = {'t_s': TIME_S, 'u_V': 4.0 - 3.0 * np.cos(TIME_S),
@@ -107,6 +140,8 @@ def table_of(path, **columns):
 MAPS = ['--map', 'ppr_voltage=u_V:V', '--map', 'pressure=p_kPa:kPa_gauge', '--map',
         'contraction=x_mm:mm']
 FAULTS = {
+    'clip': ({'p_kPa': 1e-3 * (PRESSURE_PA.clip(max=P_ATM_PA + 350e3) - P_ATM_PA)},
+             'largest value, exactly 350 kPa gauge'),
     'slip': ({'x_mm': 1e3 * (MOVED_M + stepped((15.0, 4e-3)))}, 'Did the encoder slip?')}
 
 
