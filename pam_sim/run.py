@@ -19,9 +19,10 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Self, TYPE_CHECKING
 
 import numpy as np
-from pam_sim.annotations import FloatArray, IntArray
+from pam_sim.annotations import BoolArray, FloatArray, IntArray
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.short_repr import short_repr
+from pam_sim.silence import most_held_ns
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -324,7 +325,7 @@ class Run:
         rate_hz : float, optional
             Rows at equal distances, as ``on_grid``, from and to ``ends_of_table``. By default
             there is a row for each stamp of any topic, and NaN where a topic has no message at
-            that stamp.
+            that stamp. A held value is NaN after a long silence of its topic, as of ``silences``.
         topics : collection of str, optional
             Short names; all with messages by default.
 
@@ -343,7 +344,9 @@ class Run:
             last = series[self.ends_of_table(topics)[1]]
             grid = self.on_grid(1.0 / rate_hz, end_ns=int(np.max(last.stamp_ns)), topics=series)
             stamp_ns = grid.start_ns + np.round(grid.time_s * 1e9).astype(np.int64)
-            columns = {f'{topic}.{name}': values for topic, fields in grid.values.items()
+            columns = {f'{topic}.{name}': np.where(_counts(topic, series[topic], stamp_ns),
+                                                   values, np.nan)
+                       for topic, fields in grid.values.items()
                        for name, values in fields.items()}
         else:
             stamp_ns = np.unique(np.concatenate([one.stamp_ns for one in series.values()]))
@@ -352,6 +355,16 @@ class Run:
         return pd.DataFrame({
             'stamp_ns': stamp_ns, 'time_s': _seconds(stamp_ns, self.start_ns),
             **{name: column for name, column in columns.items() if np.isfinite(column).any()}})
+
+
+def _counts(name: str, series: Series, stamp_ns: IntArray) -> BoolArray:
+    """Return at which stamps the value of a topic counts: a held one not after a long silence."""
+    if not _is_held(name, series):
+        return np.ones(len(stamp_ns), dtype=bool)
+    own_ns = np.sort(series.stamp_ns)
+    last_ns = own_ns[np.clip(np.searchsorted(own_ns, stamp_ns, 'right') - 1, 0, None)]
+    counts: BoolArray = stamp_ns - last_ns <= most_held_ns(own_ns)
+    return counts
 
 
 def _at(stamp_ns: IntArray, own_ns: IntArray, values: FloatArray) -> FloatArray:

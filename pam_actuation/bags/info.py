@@ -36,14 +36,16 @@ from pam_actuation.bags.facts import recorded_rig_title
 from pam_actuation.bags.info_text import render_text
 from pam_actuation.bags.load_joint import half_joints, MEASURED
 from pam_actuation.bags.markers import markers_of
+from pam_actuation.bags.oddities import heard_ns, silent_remarks
 from pam_actuation.bags.recorder import RECORDING_RECORD
 from pam_actuation.bags.recover import RECOVERY_RECORD
 from pam_actuation.bags.renamed import full_names
-from pam_actuation.bags.rig_topics import namespaces, of_another_type
+from pam_actuation.bags.rig_topics import namespaces, of_another_type, side_of
 from pam_actuation.bags.source import Bag, read_bag
 from pam_actuation.bags.topic_info import topic_info, TopicInfo
 from pam_actuation.bags.writer import EXPERIMENT_RECORD
 from pam_actuation.topics.table import DIAGNOSTICS, OF_A_RUN, short_name
+from pam_sim.annotations import IntArray
 from pam_sim.errors import InputError
 from pam_sim.files import StrPath
 
@@ -209,7 +211,8 @@ def _topic_infos(bag: Bag, remarks: list[str]) -> list[TopicInfo]:
     simulated = bool(experiment) and experiment.get('origin') != 'live'
     size_of = cache(lambda: plausibility.recorded_size(experiment))
     places = {name.rpartition('/')[0] for name in bag.topics if name != DIAGNOSTICS}
-    infos = []
+    infos: list[TopicInfo] = []
+    heard: dict[str, dict[str, IntArray]] = {}
     for _, topic in sorted(bag.topics.items()):
         info, stamp_ns, values = topic_info(topic, remarks)
         add_counts(info, topic, recording, published, places)
@@ -218,6 +221,12 @@ def _topic_infos(bag: Bag, remarks: list[str]) -> list[TopicInfo]:
         remarks += loss_remarks(info)
         remarks += plausibility.topic_remarks(topic, info, stamp_ns, values, size_of)
         infos.append(info)
+        if values and len(stamp_ns) == len(topic.log_time_ns):
+            place = topic.name.rpartition('/')[0]
+            rig = place.removesuffix(f'/{side_of(place, places)}'.rstrip('/'))
+            heard.setdefault(rig, {})[topic.name] = heard_ns(
+                topic.log_time_ns, values)
+    remarks += [text for one in heard.values() for text in silent_remarks(one)]
     return infos
 
 

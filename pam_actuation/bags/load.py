@@ -27,7 +27,7 @@ import numpy as np
 
 from pam_actuation.bags import renamed, series
 from pam_actuation.bags.markers import is_marker, markers_of
-from pam_actuation.bags.oddities import Oddities
+from pam_actuation.bags.oddities import heard_ns, Oddities
 from pam_actuation.bags.plausibility import (
     Implausible, not_finite, recorded_size, topic_findings)
 from pam_actuation.bags.rig_topics import (
@@ -162,6 +162,7 @@ def run_of(bag: Bag, path: StrPath, namespace: str | None = None) -> RecordedRun
             one = read_series(short, topic, odd)
             if len(one):
                 series_of[short] = one
+    odd.tell_silent()
     return RecordedRun(
         topics=series_of, metadata=bag.experiment, namespace=chosen, path=str(path),
         reference_trajectories=trajectories, remarks=tuple(odd.remarks),
@@ -227,8 +228,9 @@ def read_series(short: str, topic: TopicData, odd: Oddities) -> Series:
             odd.remarks.append(
                 f'{topic.name} has none of the signals {", ".join(_SIGNAL_NAMES)}: left out.')
             keep = np.zeros_like(keep)
-    stamp_ns = stamp_ns[keep]
+    stamp_ns, received_ns = stamp_ns[keep], topic.log_time_ns[keep]
     values = {name: column[keep] for name, column in values.items()}
+    odd.heard[topic.name] = heard_ns(received_ns, values)
     if odd.goes_back(topic.name, stamp_ns):
         order = np.argsort(stamp_ns, kind='stable')
         stamp_ns = stamp_ns[order]

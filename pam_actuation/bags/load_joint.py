@@ -79,6 +79,7 @@ def load_recording(path: str | os.PathLike[str], namespace: str | None = None,
             series = read_series(short_name(relative), topic, odd)
             if len(series):
                 found[relative] = series
+    odd.tell_silent()
     return RecordedRun(topics=found, metadata=bag.experiment, namespace=joints[0],
                        path=str(path), remarks=tuple(odd.remarks),
                        left_out=tuple(odd.left_out), notes=tuple(odd.notes),

@@ -19,14 +19,16 @@ What is odd in the messages of a recording, as sentences, and who is told of it.
 that belong beside every answer that rests on recordings.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from pam_actuation.bags.ending import ending_of
-from pam_sim.annotations import BoolArray, IntArray
+from pam_actuation.topics.table import BY_NAME, short_name
+from pam_sim.annotations import BoolArray, FloatArray, IntArray
 from pam_sim.run import Run
+from pam_sim.silence import silences
 
 # Messages of two senders, or of two threads, overtake each other by less.
 USUAL_BACK_S = 0.1
@@ -34,6 +36,9 @@ USUAL_BACK_S = 0.1
 STRAY_S, STRAY_PERIODS = 1.0, 10
 # The largest share of a topic that is stray; more is the work of a clock. One always may be.
 STRAY_SHARE = 0.01
+# Nodes stop one after the other: a topic may end before the others by so much, or by such a share.
+USUAL_END_S, USUAL_END_SHARE = 5.0, 0.25
+_MOST_SILENT = 3                # times in a sentence
 
 
 @dataclass
@@ -49,12 +54,16 @@ class Oddities:
         Those of the remarks that tell of lost messages.
     notes : list of str
         What is harmless.
+    heard : dict of str to ndarray of int64
+        Times at which a topic told something, by its full name. They are receive times, as a
+        clock that is set makes no silence.
 
     """
 
     remarks: list[str] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    heard: dict[str, IntArray] = field(default_factory=dict)
 
     def leave_out(self, sentence: str) -> None:
         """Take a sentence on messages that are left out."""
@@ -91,6 +100,49 @@ class Oddities:
         same = int((np.diff(stamp_ns) == 0).sum())
         if same:
             self.notes.append(f'{name}: {same} messages repeat the stamp before, kept.')
+
+    def tell_silent(self) -> None:
+        """Tell of topics that are silent for long, once all are heard."""
+        for sentence in silent_remarks(self.heard):
+            self.leave_out(sentence)
+
+
+def heard_ns(received_ns: IntArray, values: Mapping[str, FloatArray]) -> IntArray:
+    """Return the receive times of the messages of which something can be used."""
+    usable = np.zeros(len(received_ns), dtype=bool)
+    for column in values.values():
+        usable |= np.isfinite(column)
+    return received_ns[usable]
+
+
+def silent_remarks(heard: Mapping[str, IntArray]) -> list[str]:
+    """
+    Return a sentence on each topic that is silent for a long part, or ends long before the others.
+
+    A topic that rarely comes, such as a reference, is not judged.
+
+    Parameters
+    ----------
+    heard : dict of str to ndarray of int64
+        Full names of the topics of a muscle or joint, to times as of ``heard_ns``.
+
+    """
+    steady = {name: time_ns for name, time_ns in heard.items()
+              if len(time_ns) and BY_NAME[short_name(name)].steady}
+    start_ns = min((int(one.min()) for one in heard.values() if len(one)), default=0)
+    end_ns = max((int(one.max()) for one in steady.values()), default=0)
+    usual_end_s = min(USUAL_END_S, USUAL_END_SHARE * 1e-9 * (end_ns - start_ns))
+    remarks = []
+    for name, time_ns in steady.items():
+        last_ns = int(time_ns.max())
+        found = [f'from {1e-9 * (begin - start_ns):.3f} s to {1e-9 * (end - start_ns):.3f} s'
+                 for begin, end in silences(time_ns, end_ns)
+                 if begin < last_ns or 1e-9 * (end - begin) > usual_end_s]
+        if found:
+            more = f' and {len(found) - _MOST_SILENT} times more' * (len(found) > _MOST_SILENT)
+            remarks.append(f'{name}: no value that can be used {", ".join(found[:_MOST_SILENT])}'
+                           f'{more}, while others go on.')
+    return remarks
 
 
 def run_remarks(run: Run) -> list[str]:

@@ -18,6 +18,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from pam_actuation.bags.oddities import silent_remarks
 from pam_actuation.bags.plausibility import (
     GAUGE_HINT, Implausible, SHARE_HINT, Size, value_findings)
 from pam_actuation.bags.sensor_faults import course_remarks
@@ -75,12 +76,14 @@ def doubts(signals: Mapping[str, tuple[IntArray, FloatArray]], mapped: Mapping[s
 
     """
     found, whole = [], dict(signals)
+    heard: dict[str, IntArray] = {}
     for name, (stamp_ns, column) in signals.items():
         signal, finite = BY_NAME[name], column[np.isfinite(column)]
         said = f'{name} (column "{mapped[name].column}" in {mapped[name].unit.name})'
         if not len(finite):
             found.append(Doubt(f'{said} holds no number', True))
             continue
+        heard[signal.topic] = stamp_ns[np.isfinite(column)]
         dropped = _dropped(mapped[name], column)
         if dropped.any():
             found.append(Doubt(
@@ -94,6 +97,7 @@ def doubts(signals: Mapping[str, tuple[IntArray, FloatArray]], mapped: Mapping[s
         if topic_of(signal.topic).is_measured and not any(one.is_wrong for one in of_values):
             found += [Doubt(f'{said}: {text.rstrip(".")}')
                       for text in course_remarks(signal.field, *whole[name])]
+    found += [Doubt(text.rstrip('.')) for text in silent_remarks(heard)]
     for place, names in of_muscles(signals).items():
         if {'pressure', 'contraction'} <= names:
             own = {name: whole[f'{place}{name}'] for name in names}

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Faults of a sensor in the course of its values are told; fast motion of a rig is not."""
+"""Faults of sensors and of the command are told by every verb; fast motion of a rig is not."""
 
 import json
 import re
@@ -142,11 +142,13 @@ MAPS = ['--map', 'ppr_voltage=u_V:V', '--map', 'pressure=p_kPa:kPa_gauge', '--ma
 FAULTS = {
     'clip': ({'p_kPa': 1e-3 * (PRESSURE_PA.clip(max=P_ATM_PA + 350e3) - P_ATM_PA)},
              'largest value, exactly 350 kPa gauge'),
+    'silent': ({'u_V': np.where(TIME_S > 12.0, np.nan, 4.0 - 3.0 * np.cos(TIME_S))},
+               'valve_signal: no value that can be used from 12.000 s to 29.995 s'),
     'slip': ({'x_mm': 1e3 * (MOVED_M + stepped((15.0, 4e-3)))}, 'Did the encoder slip?')}
 
 
 @pytest.mark.parametrize('fault', ['', *FAULTS])
-def test_import_and_every_verb_tell_of_a_faulty_sensor(fault, tmp_path, capsys):
+def test_import_and_every_verb_tell_of_a_fault(fault, tmp_path, capsys):
     columns, words = FAULTS.get(fault, ({}, ''))
     table = table_of(tmp_path / 'a.csv', **columns)
     bag = str(tmp_path / 'bag')
