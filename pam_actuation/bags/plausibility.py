@@ -91,6 +91,8 @@ class Size(NamedTuple):
         What says so: the rig, or the length alone; '' where it is taken for a DMSP-5-300.
     simulated : bool
         Whether the values are of a simulation. A simulated muscle may be below the atmosphere.
+    is_held : bool
+        Whether the rig gives the contraction, as at a held length.
 
     """
 
@@ -98,6 +100,7 @@ class Size(NamedTuple):
     max_strain: float = MAX_CONTRACTION
     known_by: str = ''
     simulated: bool = False
+    is_held: bool = False
 
     @property
     def stroke_m(self) -> float:
@@ -119,7 +122,7 @@ class Size(NamedTuple):
 
 def size_of_rig(rig: 'Rig') -> Size:
     """Return the size of the muscle of a rig."""
-    return Size(rig.muscle.length_m, rig.muscle.max_strain, 'rig')
+    return Size(rig.muscle.length_m, rig.muscle.max_strain, 'rig', is_held=rig.is_driven)
 
 
 def recorded_size(metadata: Mapping[str, str]) -> Size:

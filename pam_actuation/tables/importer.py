@@ -32,7 +32,7 @@ from pam_actuation.tables.clock import clock_of
 from pam_actuation.tables.guess import is_exported, unit_of_column
 from pam_actuation.tables.lengths import size_of_mapping
 from pam_actuation.tables.mapping import TableMapping
-from pam_actuation.tables.plausible import Doubt, doubts, missing_values
+from pam_actuation.tables.plausible import Doubt, doubts, held_at_m, missing_values
 from pam_actuation.tables.signals import are_of_joint, BY_NAME, of_muscles, Signal
 from pam_actuation.tables.table import no_column_in, Table
 from pam_actuation.tables.units import ANGLE, LENGTH, of_output
@@ -225,6 +225,10 @@ def _check(result: Recording, size: Size, accept: bool) -> None:
     for place, names in of_muscles(result.signals).items():
         _check_muscle(place, names, result.is_of_joint)
     _check_rates([BY_NAME[name] for name in result.signals])
+    for name, (_, values) in result.signals.items():
+        if BY_NAME[name].topic.endswith('contraction') and (
+                held_m := held_at_m(values, size)) is not None:
+            result.told.append(f'{name}: the muscle is held at {1e3 * held_m:.4g} mm')
     found = doubts(result.signals, result.mapping.signals, size)
     wrong = next((one for one in found if one.is_wrong), None)
     if wrong is not None and not accept:

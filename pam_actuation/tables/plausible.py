@@ -49,6 +49,7 @@ EMPTY_PA = 10e3                      # gauge, below which no muscle holds a load
 FEWEST_EMPTY = 3                     # values there
 MOST_DROPPED = 0.1                   # of the values; more zeros are no sensor that drops out
 DROP_STEPS = 1.5                     # times the largest other step: into a zero and out of it
+FEWEST_HELD = 100                    # values of a muscle that is held
 KEPT_SHARE = 0.03                    # of the length: more than friction and creep keep
 
 
@@ -102,8 +103,10 @@ def doubts(signals: Mapping[str, tuple[IntArray, FloatArray]], mapped: Mapping[s
         if {'pressure', 'contraction'} <= names:
             own = {name: whole[f'{place}{name}'] for name in names}
             read = {name: mapped[f'{place}{name}'] for name in names}
-            both = _held(place, own, read, size), _zero(place, own, read, size)
-            found += [one for one in both if one is not None]
+            # A zero would make a held length 0.
+            doubt = None if held_at_m(own['contraction'][1], size) is not None else (
+                _held(place, own, read, size) or _zero(place, own, read, size))
+            found += [doubt] if doubt is not None else []
     return found
 
 
@@ -132,6 +135,28 @@ def _dropped(mapped: ColumnMap, column: FloatArray) -> BoolArray:
     is_apart = at_edge.any() and raw[others].min() * raw[others].max() > 0.0 and (
         np.nanmin(steps[at_edge]) > DROP_STEPS * usual)
     return is_zero & bool(is_apart and is_zero.mean() <= MOST_DROPPED)
+
+
+def held_at_m(contraction_m: FloatArray, size: Size) -> float | None:
+    """
+    Return the contraction at which a muscle is held [m], None where it moves.
+
+    It is held where noise alone moves the contraction. Where the rig holds its muscle, the
+    frame may give way.
+
+    Parameters
+    ----------
+    contraction_m : ndarray
+        NaN where missing.
+    size : Size
+        Of the muscle.
+
+    """
+    finite = contraction_m[np.isfinite(contraction_m)]
+    if len(finite) < FEWEST_HELD or np.ptp(finite) >= LITTLE * size.length_m:
+        return None
+    is_noise = 0.0 < np.var(finite) < np.var(np.diff(finite))
+    return float(np.median(finite)) if is_noise or size.is_held else None
 
 
 def _held(place: str, signals: Mapping[str, tuple[IntArray, FloatArray]],

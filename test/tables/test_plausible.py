@@ -248,6 +248,38 @@ def test_a_zero_that_is_off_shows_while_the_muscle_is_empty(text, shortening):
         assert (f'zero={column.zero + shortening * 31.4:.4g}' in said) == off
 
 
+NOISE = np.random.default_rng(2).standard_normal(600)
+
+
+@pytest.mark.parametrize('contraction_m, size, is_told', [
+    (0.025 + 1e-5 * NOISE, Size(), False), (1e-5 * NOISE, Size(), False),
+    (0.025 + np.linspace(0.0, 1e-3, 600), Size(), True),        # in the wrong unit, or a frame
+    (0.025 + np.linspace(0.0, 1e-3, 600), Size(is_held=True), False),
+    (np.linspace(0.0, 1e-3, 600), Size(is_held=True), False),
+    (np.repeat(SHORTENED_M, 10) / 20.0, Size(), True)])
+def test_a_muscle_that_is_held_is_no_doubt(contraction_m, size, is_told):
+    mapped = {'contraction': column_of_text('contraction', 'x:mm', 'here'),
+              'pressure': column_of_text('pressure', 'p:bar_abs', 'here')}
+    stamp_ns = 10**7 * np.arange(600)
+    said = [one.sentence for one in doubts(
+        {'pressure': (stamp_ns, np.repeat(PRESSURE_PA, 10) + 1e2 * NOISE),
+         'contraction': (stamp_ns, contraction_m)}, mapped, size)]
+    assert ['is the muscle held?' in one for one in said] == [True] * is_told
+    # Advice would make the held length 0.
+    assert not any('zero=' in one for one in said)
+
+
+@pytest.mark.parametrize('rig', [None, 'dmsp_5_300_isometric'])
+def test_a_table_of_a_held_muscle_is_imported_without_a_remark(rig, tmp_path, capsys):
+    rows = ''.join(f'{0.01 * k:.2f},{k % 9 / 2:.2f},{25 + 0.01 * one:.3f},{0.01 * k % 100:.2f}\n'
+                   for k, one in enumerate(NOISE))
+    (tmp_path / 'a.csv').write_text(f't_s,p_bar,x_mm,F_N\n{rows}')
+    assert main(['import', str(tmp_path / 'a.csv'), '--out', str(tmp_path / 'bag'),
+                 *(['--rig', rig] if rig else [])]) == 0
+    said = capsys.readouterr().out
+    assert 'contraction: the muscle is held at 25 mm' in said and 'remark' not in said
+
+
 @pytest.mark.parametrize('begin, end, zero, is_told', [
     (20, 24, ':zero=4', True), (0, 4, ':zero=4', True), (0, 4, '', False),
     (20, 40, ':zero=4', False)])
