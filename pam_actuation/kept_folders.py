@@ -62,8 +62,10 @@ def only_one(folder: Path, what: str, below: Iterable[Path] = ()) -> Iterator[No
             raise InputError(f'another {what} works in this folder', str(folder)) from None
         folders = (*below, folder)
         _remove_unfinished(folders)
-        yield
-        _remove_unfinished(folders)     # of workers that were lost meanwhile
+        try:
+            yield
+        finally:
+            _remove_unfinished(folders)     # of workers that were lost or stopped meanwhile
 
 
 def _remove_unfinished(folders: Iterable[Path]) -> None:

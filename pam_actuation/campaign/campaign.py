@@ -88,7 +88,9 @@ class Campaign:
 
 def run_campaign(cases: Sequence[Case], settings: Settings, out: StrPath, jobs: int = -1,
                  cluster: str | None = None,
-                 progress: Callable[[int], object] = lambda done: None) -> Campaign:
+                 progress: Callable[[int], object] = lambda done: None,
+                 case_done: Callable[[Case, str], object] = lambda case, verdict: None
+                 ) -> Campaign:
     """
     Work on every case that is not there yet; return all.
 
@@ -107,6 +109,8 @@ def run_campaign(cases: Sequence[Case], settings: Settings, out: StrPath, jobs: 
         Address of a Dask or Ray cluster, see ``pam_actuation.workers``.
     progress : callable
         Told how many cases are there.
+    case_done : callable
+        Told of each case that is worked on, and its verdict.
 
     Returns
     -------
@@ -145,6 +149,7 @@ def run_campaign(cases: Sequence[Case], settings: Settings, out: StrPath, jobs: 
             else:
                 store.told_time(key, *result)
             progress(known + count - len(todo))
+            case_done(task.case, (store.result(key) or {}).get('verdict', FAILED))
 
         if todo:
             _work(todo, settings, store, jobs, cluster, done)

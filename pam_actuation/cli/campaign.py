@@ -16,6 +16,7 @@
 
 import argparse
 import os
+import sys
 from typing import Any, TYPE_CHECKING
 
 from pam_actuation.cli.common import (
@@ -24,6 +25,7 @@ from pam_actuation.cli.options import count, number, out_path, Parser, source
 
 if TYPE_CHECKING:
     from pam_actuation.campaign.campaign import Campaign
+    from pam_actuation.campaign.cases import Case
     from pam_actuation.campaign.findings import Findings
 
 HELP = ('Work on every recording of a folder or list, keep what each gave, and say what changed '
@@ -76,10 +78,27 @@ def run(args: argparse.Namespace) -> int:
     cases = find_cases(args.recordings, args.out, joints=args.work not in NEED_A_MODEL)
     settings = Settings(args.work, args.model or '', effects, args.seconds, args.materiality,
                         tuple(args.unknown), args.seed)
+    done, lines_done = 0, []
     try:
         with progress(args, len(cases), ' cases', 'campaign') as bar:
-            campaign = run_campaign(cases, settings, args.out, args.jobs, args.cluster,
-                                    progress=lambda done: bar.update(max(done - bar.n, 0)))
+            def moved(count: int) -> None:
+                nonlocal done
+                done = max(count, done)
+                bar.update(done - bar.n)
+
+            def case_done(case: 'Case', verdict: str) -> None:
+                lines_done.append(f'{done} of {len(cases)}: {case.name}: {verdict}')
+                if bar.disable and not args.json:       # a log file
+                    print(lines_done.pop(), file=sys.stderr, flush=True)
+
+            campaign = run_campaign(cases, settings, args.out, args.jobs, args.cluster, moved,
+                                    case_done)
+    except KeyboardInterrupt:
+        if not args.json:
+            print(''.join(f'{line}\n' for line in lines_done), end='', file=sys.stderr)
+        raise KeyboardInterrupt(
+            f'stopped; {done} of {len(cases)} cases are done and kept in {args.out}: give the '
+            'same command again to go on') from None
     except ClusterLost as error:
         emit(args, {'schema': 1, 'error': str(error), 'out': args.out},
              f'{error}; what is done is kept: give the same command again to go on')

@@ -255,6 +255,43 @@ def test_a_full_disk_ends_the_campaign(lab, tmp_path, monkeypatch):
     assert not list((tmp_path / 'cases').iterdir())
 
 
+@pytest.mark.parametrize('form', [[], ['--json']])
+def test_an_interrupted_campaign_says_what_is_done_and_how_to_go_on(
+        lab, form, tmp_path, monkeypatch, capsys):
+    day = tmp_path / 'runs' / 'rig_1' / '2026-03-01'
+    for name in ('a', 'b', 'c'):
+        shutil.copytree(lab / 'rig_1' / '2026-03-01' / 'check', day / name)
+        (day / name / 'note.txt').write_text(name)      # so that no two are the same
+    left = iter([False, False, True])
+
+    def stopped(run, model, settings, folder):
+        if next(left):
+            raise KeyboardInterrupt
+        return {'verdict': 'reported', 'reason': '', 'sizes': [], 'ambiguous': [], 'least': {},
+                'bad': False}
+
+    monkeypatch.setattr(campaign, 'Workers', lambda *given, **more: Workers())
+    monkeypatch.setitem(WORKS, 'report', stopped)
+    arguments = ['campaign', str(tmp_path / 'runs'), '--work', 'report', '--out',
+                 str(tmp_path / 'out'), *form]
+    assert main(arguments) == 130
+    said = capsys.readouterr()
+    assert '2 of 3 cases are done and kept in' in said.err and 'same command again' in said.err
+    if not form:
+        one, two = said.err.splitlines()[:2]
+        assert one.startswith('1 of 3: rig_1') and two.startswith('2 of 3: rig_1')
+        assert two.endswith(': reported')
+    kept = list((tmp_path / 'out' / 'cases').iterdir())
+    assert len(kept) == 2 and not any(path.name.startswith(UNFINISHED) for path in kept)
+    monkeypatch.setitem(WORKS, 'report', lambda *given: {
+        'verdict': 'reported', 'reason': '', 'sizes': [], 'ambiguous': [], 'least': {},
+        'bad': False})
+    assert main(arguments) == 0
+    said = capsys.readouterr()
+    assert ('"worked_on": 1' if form else '1 worked on now') in said.out
+    assert said.err == '' if form else said.err.startswith('3 of 3: ')
+
+
 def test_what_a_kill_left_half_done_is_removed(tmp_path):
     code = ('import os, signal, sys\nfrom pathlib import Path\n'
             'from pam_actuation.kept_folders import kept_folder\n'
