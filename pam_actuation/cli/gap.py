@@ -18,7 +18,9 @@ import argparse
 import json
 import os
 import shlex
-from typing import TYPE_CHECKING
+import sys
+import time
+from typing import Any, TYPE_CHECKING
 
 from pam_actuation.cli.common import (
     add_overwrite_option, add_topic_option, effect_names, emit, EXIT_DONE, EXIT_FINDING,
@@ -26,7 +28,7 @@ from pam_actuation.cli.common import (
 from pam_actuation.cli.options import number, out_path, Parser, source
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from pam_actuation.report.joint_gap import Question
     from pam_sim.gap.result import GapResult
@@ -35,6 +37,7 @@ if TYPE_CHECKING:
 HELP = 'Find what a model misses in recorded runs, name it, add it and prove that the gap shrank.'
 EXAMPLE = 'pam gap runs/first --model dmsp_5_300_hanging_mass --certify runs/second --out gap'
 SECONDS = 120.0
+LEAST_SAID = 0.02               # of the whole, between two lines on the progress
 MODEL = 'dmsp_5_300_hanging_mass'
 # Options that a question of the other kind needs: here they would change nothing.
 UNUSED = {
@@ -148,11 +151,26 @@ def _ask(args: argparse.Namespace, question: 'Question', out: str, model: str
     runs = [question.load(path) for path in args.run]
     certify = question.load(args.certify) if args.certify else None
     note_implausible(args, [*runs, *([certify] if certify else [])])
-    with progress(args, 1.0, '', question.side or 'gap') as bar:
+    name = question.side or 'gap'
+    with progress(args, 1.0, '', name) as bar:
         return write_gap(
             runs, question.model, out, certify, of, _joint_model(question, model),
             joint=question.joint, effects=names, seconds=args.seconds,
-            materiality=args.materiality, progress=lambda done: bar.update(done - bar.n)), runs
+            materiality=args.materiality, progress=_reporter(args, bar, name)), runs
+
+
+def _reporter(args: argparse.Namespace, bar: Any, name: str) -> 'Callable[[float], None]':
+    """Return what tells the progress: on the bar, or as a few lines on stderr in a log file."""
+    began, said = time.perf_counter(), 0.0
+
+    def report(done: float) -> None:
+        nonlocal said
+        bar.update(done - bar.n)
+        if bar.disable and not args.json and done - said >= LEAST_SAID:
+            said = done
+            print(f'{name}: {100.0 * done:.0f} % after {time.perf_counter() - began:.0f} s',
+                  file=sys.stderr, flush=True)
+    return report
 
 
 def _next_lines(result: 'GapResult', out: str, runs: 'Sequence[Run]' = (),

@@ -149,9 +149,11 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     estimator.use = (FIT, SELECT)
     # What a fit does not touch stays as calibrated now.
     base = estimator.base = estimator.fit_base()
+    progress(0.84)
     final = base
     if outcome.final.hypothesis.names:
         final = within_ranges(context, estimator.polish(outcome.final))
+    progress(0.88)
     one_speed = moves_at_one_speed(recordings, criteria)
     # A proof at another speed tells creep from hysteresis, one at the same speed does not.
     same_speed = one_speed and moves_at_one_speed([*recordings, held_out], criteria)
@@ -160,6 +162,7 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     outcome.named, validation, harms, unconfirmed = confirmed(
         outcome.named, Validation(held_out, is_certify, estimator, base, final, seed))
     result.remarks += unconfirmed
+    progress(0.92)
     if same_speed:
         outcome.named = as_sets(context, outcome.named, validation.final)
     own_runs = decide(result, outcome, validation, materiality)
@@ -178,8 +181,10 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
         result.reason += CUT_SHORT.format(seconds)
     result.simulations = sum(
         one.simulations for one in (estimator, validation, own_runs))
+    progress(0.96)
     if 'term' in unnamed:
         propose(result, validation, context.out_of_time)
+    progress(0.98)
     if 'surrogate' in unnamed:
         add_surrogate(result, context, validation)
     progress(1.0)

@@ -103,8 +103,9 @@ def test_every_verb_tells_what_is_odd(bags, how, verb, tmp_path, capsys):
     for form in ([], ['--json', '--overwrite']):
         arguments = asked(verb, bags[how], tmp_path)
         code = main([*arguments, *form])
-        shown = capsys.readouterr().out
+        shown, progress = capsys.readouterr()
         told = json.loads(shown)['remarks'] if form else shown.splitlines()
+        assert ('gap: 84 % after' in progress) == (verb == 'gap' and not form)
         assert sum(sentence in one for one in told) == 1
         assert code == 1 or not lost
     if page:

@@ -48,9 +48,12 @@ def shares(result, signal, condition='all'):
 
 
 def test_noise_alone_is_no_gap():
-    result = find_gap(recorded(nominal(), voltages(11.0)), nominal())
+    told = []
+    result = find_gap(recorded(nominal(), voltages(11.0)), nominal(), progress=told.append)
     assert result.verdict == 'no_gap'
     assert_form(result)
+    # The validation comes on top of the budget, so its steps are told.
+    assert told == sorted(told) and told[-1] == 1.0 and sum(0.8 < one < 1.0 for one in told) > 3
     assert result.parameters == [] and result.unexplained_fraction == 0.0
     for signal in result.signals.values():
         assert signal.rmse_before < 1.1 * signal.noise_floor
