@@ -21,7 +21,7 @@ documentation prints them (``fault_table_markdown``).
 
 from dataclasses import dataclass
 
-from pam_actuation.drivers import limits, monitors, unmoved
+from pam_actuation.drivers import limits, monitors, not_emptied, unmoved
 from pam_actuation.drivers.monitors import AirMonitor, MOST_RELAPSES, RELAPSES_WITHIN_S
 from pam_actuation.drivers.senders import CLEAR_S
 from pam_sim.units import P_ATM_PA
@@ -156,6 +156,12 @@ FAULT_TABLE = (
           IGNORE, False,
           'warning that names sensor, air supply and gain; the pressure rises slowly from '
           'atmospheric pressure, as the air returns'),
+    Fault('not_emptied', 'Muscle keeps its pressure',
+          f'measured pressure at least {not_emptied.ABOVE_PA * 1e-3:g} kPa above what is followed '
+          f'(HSV: while the vent is open), above {not_emptied.LEAST_GAUGE_PA * 1e-3:g} kPa gauge, '
+          f'and not falling by {not_emptied.LEAST_FALL_PA * 1e-3:g} kPa within '
+          f'{not_emptied.AFTER_S:g} s (valve stuck, vent blocked)', IGNORE, False,
+          'error: shut the supply and open the dump valve; ends when the pressure falls'),
     Fault('supply_low', 'Supply loss',
           f'measured supply pressure less than {_LIMITS.supply_margin_pa * 1e-3:g} kPa above the '
           'command', IGNORE, False,

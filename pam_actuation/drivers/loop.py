@@ -20,16 +20,18 @@ A node, the offline simulation and the tests feed it messages and call ``tick`` 
 """
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 import math
 from typing import Any
 
 from pam_actuation.drivers.config import check_valve_type, DriverConfig
 from pam_actuation.drivers.decision import Decision
 from pam_actuation.drivers.hsv import HsvLaw
+from pam_actuation.drivers.not_emptied import NotEmptiedMonitor, OPEN_DUTY
 from pam_actuation.drivers.ppr import PprLaw
 from pam_actuation.drivers.safety import SafetySupervisor
 from pam_actuation.messages import (
-    Contraction, Pressure, SAFE_EFFORTS, Status, VALVE_NAMES, ValveSignal)
+    Contraction, LEVEL_ERROR, Pressure, SAFE_EFFORTS, Status, VALVE_NAMES, ValveSignal)
 from pam_sim.units import gauge_kpa, NS_PER_S, P_ATM_PA
 
 _MOST_MISSED = 20        # periods the model catches up after a late tick
@@ -76,6 +78,7 @@ class DriverLoop:
         else:
             spare.step(P_ATM_PA)
         self.law = self._new_law()
+        self._emptied = NotEmptiedMonitor()
         self.ticks = 0
         self.late_ticks = 0
         self.saturated_ticks = 0
@@ -197,7 +200,13 @@ class DriverLoop:
 
     def act(self, now_ns: int) -> ValveSignal:
         """Decide for ``now_ns``; return the signal. ``status`` then tells of it."""
-        decision = self._decision = self.safety.tick(now_ns)
+        self._emptied.judge(now_ns, self._emptied_to_pa(), self._valid_pa(now_ns))
+        decision = self.safety.tick(now_ns)
+        if self._emptied.problem:
+            decision = replace(
+                decision, level=LEVEL_ERROR, warnings=(*decision.warnings, 'not_emptied'),
+                message=f'{decision.message}; {self._emptied.problem}')
+        self._decision = decision
         self._count(now_ns)
         if isinstance(self.law, HsvLaw):
             efforts = self._hsv(self.law, decision, now_ns)
@@ -295,6 +304,18 @@ class DriverLoop:
         if duty is None:
             return self._safe_efforts()
         return max(duty, 0.0), max(-duty, 0.0)
+
+    def _emptied_to_pa(self) -> float:
+        """Return down to which pressure the valve has emptied the muscle, NaN where it has not."""
+        if self.is_hsv:
+            return P_ATM_PA if self._efforts[1] >= OPEN_DUTY else math.nan
+        return math.nan if self._followed_pa is None else self._followed_pa
+
+    def _valid_pa(self, now_ns: int) -> float:
+        """Return the newest valid reading, NaN where it is old or none."""
+        channel = self.safety.pressure
+        return channel.pressure_pa if (
+            channel.age_s(now_ns) <= self.config.safety.measurement_timeout_s) else math.nan
 
     def _new_measurement(self) -> float:
         channel = self.safety.pressure

@@ -19,7 +19,7 @@ import runpy
 
 from pam_actuation.control import effort_buffer, inputs, reference_buffer, tick
 from pam_actuation.control.effort_buffer import EffortBuffer
-from pam_actuation.drivers import faults, limits, monitors, senders
+from pam_actuation.drivers import faults, limits, monitors, not_emptied, senders
 from pam_actuation.drivers.limits import SafetyLimits
 from pam_actuation.messages import NamedEfforts, START_NS
 import pytest
@@ -67,6 +67,8 @@ def test_the_table_tells_the_limits_of_the_supervisor(monkeypatch, name, value, 
     (monitors.AirMonitor, 'FALLS_S', 0.04, {'air_missing'}),
     (monitors.AirMonitor, 'EMPTY_GAUGE_PA', 30e3, {'air_missing'}),
     (monitors.AirMonitor, 'EMPTY_S', 0.3, {'air_missing'}),
+    *((not_emptied, name, value, {'not_emptied'}) for name, value in (
+        ('ABOVE_PA', 60e3), ('LEAST_GAUGE_PA', 90e3), ('LEAST_FALL_PA', 2e4), ('AFTER_S', 2.0))),
     (senders, 'CLEAR_S', 2.0, {'two_publishers', 'second_driver', 'two_sensors'})])
 def test_the_table_tells_the_constants_of_the_monitors(monkeypatch, module, name, value, rows):
     monkeypatch.setattr(module, name, value)

@@ -472,7 +472,7 @@ def test_every_fault_that_the_driver_names_is_a_row_and_every_row_is_named():
     folder = Path(safety.__file__).parent
     keys, strings = (set().union(*found) for found in zip(*(
         named_in((folder / name).read_text(encoding='utf-8'))
-        for name in ('safety.py', 'monitors.py', 'senders.py'))))
+        for name in ('safety.py', 'monitors.py', 'senders.py', 'loop.py'))))
     assert len(keys) > 15 and keys <= set(FAULTS)
     assert set(FAULTS) - strings == {'driver_ends', 'driver_killed', 'reference_lost'}
 
