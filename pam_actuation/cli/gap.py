@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 HELP = 'Find what a model misses in recorded runs, name it, add it and prove that the gap shrank.'
 EXAMPLE = 'pam gap runs/first --model dmsp_5_300_hanging_mass --certify runs/second --out gap'
 SECONDS = 120.0
-LEAST_SAID = 0.02               # of the whole, between two lines on the progress
+SAID_EVERY_S = 10.0             # between two lines on the progress in a log file
 MODEL = 'dmsp_5_300_hanging_mass'
 # Options that a question of the other kind needs: here they would change nothing.
 UNUSED = {
@@ -161,14 +161,15 @@ def _ask(args: argparse.Namespace, question: 'Question', out: str, model: str
 
 def _reporter(args: argparse.Namespace, bar: Any, name: str) -> 'Callable[[float], None]':
     """Return what tells the progress: on the bar, or as a few lines on stderr in a log file."""
-    began, said = time.perf_counter(), 0.0
+    began = said = time.perf_counter()
 
     def report(done: float) -> None:
         nonlocal said
         bar.update(done - bar.n)
-        if bar.disable and not args.json and done - said >= LEAST_SAID:
-            said = done
-            print(f'{name}: {100.0 * done:.0f} % after {time.perf_counter() - began:.0f} s',
+        now = time.perf_counter()
+        if bar.disable and not args.json and now - said >= SAID_EVERY_S:
+            said = now
+            print(f'{name}: {100.0 * done:.0f} % after {now - began:.0f} s',
                   file=sys.stderr, flush=True)
     return report
 

@@ -111,6 +111,9 @@ class Fitting:
         or ``other``.
     sensor_parameter : str
         Parameter that is the bias, the gain error or the lag; the amplitude by default.
+    reservoir : tuple of str
+        Of a supply that empties: parameters that are its volume [m³], which is fitted first, and
+        band [Pa] and flow [kg/s] of its compressor.
     is_limit : callable, optional
         ``is_limit(values) -> bool``: whether values make it a limit although no shape is at
         the end of its range.
@@ -129,6 +132,7 @@ class Fitting:
     sensor_signal: str = ''
     sensor_change: str = ''
     sensor_parameter: str = ''
+    reservoir: tuple[str, ...] = ()
     is_limit: Callable[[Mapping[str, float]], bool] | None = None
 
     def __post_init__(self) -> None:

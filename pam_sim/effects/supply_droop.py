@@ -76,6 +76,7 @@ EFFECT = Effect(
     initial=_initial,
     valves=('hsv',),
     fitting=Fitting(
+        reservoir=('reservoir_volume_m3', 'band_pa', 'compressor_flow_kg_per_s'),
         free=(
             # A compressor that starts once more or less makes other valleys of the misfit.
             FreeParameter('reservoir_volume_m3', 1e-3, 2e-5, 0.1, True,

@@ -74,7 +74,7 @@ def test_ctrl_c_leaves_a_bag_that_says_so(tmp_path):
     process = subprocess.Popen(
         [sys.executable, '-m', 'pam_actuation.cli.main', 'simulate', 'long.yaml', '--out', 'bag'],
         cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    file, deadline = tmp_path / 'bag' / 'bag_0.mcap', time.monotonic() + 60.0
+    file, deadline = tmp_path / '.unfinished-bag' / 'bag_0.mcap', time.monotonic() + 60.0
     while not (file.exists() and file.stat().st_size > 300_000) and time.monotonic() < deadline:
         time.sleep(0.02)
     process.send_signal(signal.SIGINT)

@@ -98,7 +98,8 @@ VERBS = {'replay': '', 'report': 'page.html', 'rules': '', 'gap': 'gap/report.ht
     *(('damaged', verb) for verb in VERBS),
     # All tell by the same function.
     *((how, verb) for how in ('stepped', 'unstamped') for verb in ('replay', 'report', 'rules'))])
-def test_every_verb_tells_what_is_odd(bags, how, verb, tmp_path, capsys):
+def test_every_verb_tells_what_is_odd(bags, how, verb, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr('pam_actuation.cli.gap.SAID_EVERY_S', 0.0)
     page, (sentence, lost) = VERBS[verb], SPOILED[how]
     for form in ([], ['--json', '--overwrite']):
         arguments = asked(verb, bags[how], tmp_path)

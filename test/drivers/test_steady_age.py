@@ -150,7 +150,7 @@ def driven(valve, commands, ticks_ns, **changes):
         now_ns = int(now_ns)
         while left and left[0].stamp_ns + WAY_NS <= now_ns:
             driver.on_command(left.pop(0))
-        driver.on_pressure(Pressure(now_ns - MS, P_ATM_PA + 2e5 + now_ns % 977))
+        driver.on_pressure(Pressure(now_ns - MS, P_ATM_PA + 3e5 + now_ns % 977))
         driver.act(now_ns)
         followed.append(driver.followed().pressure_pa)
     return np.array(followed), driver

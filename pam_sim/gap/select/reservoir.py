@@ -33,8 +33,6 @@ from pam_sim.gap.fit.candidate import Candidate
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.units import GAS_CONSTANT_AIR, TEMPERATURE_K
 
-EFFECT, VOLUME, BAND, FLOW = (
-    'supply_droop', 'reservoir_volume_m3', 'band_pa', 'compressor_flow_kg_per_s')
 STEP_S = 0.02                # of the pressure that is followed
 LEAST_MOVE_PA = 2e3          # standard deviation; a supply that moves less tells nothing
 LEFT_SHARE = 0.5             # of that deviation, which a reservoir may leave at most
@@ -45,13 +43,13 @@ BETTER = 1.2                 # by which a compressor must follow, in what is lef
 BANDS = (0.4, 0.55, 0.7, 0.85, 0.95, 1.05)         # in parts of the range that was seen
 SPARE = 1.2                  # of a compressor, at least, over the mean of what is taken
 DRAWS = (1.3, 2.0, 4.0)      # of that mean, the flows that are tried
-FOUND = ('supply_droop was tried with the compressor that the recorded supply pressure shows: '
+FOUND = ('{} was tried with the compressor that the recorded supply pressure shows: '
          '{:.2g} g/s within {:.3g} kPa')
-FITTED = ('supply_droop was tried with a band of {:.3g} kPa and a compressor of some g/s that the '
-          'search fits, for the valves take {:.2g} g/s; state compressor_flow_kg_per_s and '
-          'band_pa in the model, or record the supply pressure')
-NOMINAL = ('supply_droop was tried with a compressor of {:.2g} g/s within {:.3g} kPa alone; state '
-           'compressor_flow_kg_per_s and band_pa in the model if yours differs')
+FITTED = ('{} was tried with a band of {:.3g} kPa and a compressor of some g/s that the '
+          'search fits, for the valves take {:.2g} g/s; state {} and {} in the model, or record '
+          'the supply pressure')
+NOMINAL = ('{} was tried with a compressor of {:.2g} g/s within {:.3g} kPa alone; state {} and {} '
+           'in the model if yours differs')
 
 
 @dataclass(frozen=True)
@@ -71,46 +69,50 @@ class Reservoir:
 def with_compressor(pool: Sequence[Candidate], estimator: Estimator
                     ) -> tuple[list[Candidate], str]:
     """Return the candidates, that of a reservoir with its compressor, and a sentence on it."""
-    if not any(c.effect == EFFECT for c in pool):
+    tried = next((c for c in pool if get_effect(c.effect).fitting.reservoir), None)
+    if tried is None:
         return list(pool), ''
+    effect = get_effect(tried.effect)
+    _, band, flow = effect.fitting.reservoir
     problem = next(p for p in estimator.problems if p.subsystem == 'valve')
     runs = problem.responses(*problem.calibrated(
         estimator.rig, estimator.base.known_z[problem.subsystem]))
     taken = [run.filled_kg for run in runs]
-    nominal = {p.name: p.default for p in get_effect(EFFECT).parameters}
-    seen = reservoir_seen(problem.recordings, taken)
+    nominal = {p.name: p.default for p in effect.parameters}
+    seen = reservoir_seen(problem.recordings, taken, tried.free[0])
     mean = sum(kg[-1] for kg in taken) / sum(GRID_S * (len(kg) - 1) for kg in taken)
     if seen is not None and seen.flow_kg_per_s == 0.0:
-        told, seen = '', replace(seen, flow_kg_per_s=nominal[FLOW], band_pa=max(
-            seen.band_pa, nominal[BAND]))
+        told, seen = '', replace(seen, flow_kg_per_s=nominal[flow], band_pa=max(
+            seen.band_pa, nominal[band]))
     elif seen is not None:
-        told = FOUND.format(1e3 * seen.flow_kg_per_s, 1e-3 * seen.band_pa)
-    elif SPARE * mean > nominal[FLOW]:
-        told = FITTED.format(1e-3 * nominal[BAND], 1e3 * mean)
+        told = FOUND.format(effect.name, 1e3 * seen.flow_kg_per_s, 1e-3 * seen.band_pa)
+    elif SPARE * mean > nominal[flow]:
+        told = FITTED.format(effect.name, 1e-3 * nominal[band], 1e3 * mean, flow, band)
     else:
-        return list(pool), NOMINAL.format(1e3 * nominal[FLOW], 1e-3 * nominal[BAND])
+        return list(pool), NOMINAL.format(
+            effect.name, 1e3 * nominal[flow], 1e-3 * nominal[band], flow, band)
 
     def of(c: Candidate) -> Candidate:
-        if c.effect != EFFECT:
+        if c != tried:
             return c
         if seen is None:
             return replace(c, free=(*c.free, FreeParameter(
-                FLOW, DRAWS[1] * mean, mean / SPARE, 10.0 * mean, True,
+                flow, DRAWS[1] * mean, mean / SPARE, 10.0 * mean, True,
                 tuple(n * mean for n in DRAWS))))
         volume = min(max(seen.volume_m3, c.free[0].lower), c.free[0].upper)
         of_volume = replace(c.free[0], typical=volume, starts=(volume,))
         if not told:
             return replace(c, free=(of_volume,), held=(
-                (BAND, seen.band_pa), (FLOW, seen.flow_kg_per_s)))
+                (band, seen.band_pa), (flow, seen.flow_kg_per_s)))
         return replace(c, free=(of_volume, *(FreeParameter(
             name, value, value / NEAR, value * NEAR, True) for name, value in (
-                (BAND, seen.band_pa), (FLOW, seen.flow_kg_per_s)))))
+                (band, seen.band_pa), (flow, seen.flow_kg_per_s)))))
 
     return [of(c) for c in pool], told
 
 
-def reservoir_seen(recordings: Sequence[Recording], taken_kg: Sequence[FloatArray]
-                   ) -> Reservoir | None:
+def reservoir_seen(recordings: Sequence[Recording], taken_kg: Sequence[FloatArray],
+                   volume: FreeParameter) -> Reservoir | None:
     """
     Return the Reservoir that follows recorded supply pressures best; None where none does.
 
@@ -120,6 +122,8 @@ def reservoir_seen(recordings: Sequence[Recording], taken_kg: Sequence[FloatArra
         With the supply pressure, all of them.
     taken_kg : list of numpy.ndarray
         What went through the fill valve since the start, on the grid of each recording.
+    volume : FreeParameter
+        Volume of the reservoir [m³] with its range.
 
     """
     pieces = []
@@ -137,8 +141,7 @@ def reservoir_seen(recordings: Sequence[Recording], taken_kg: Sequence[FloatArra
         return None
     rate = total_kg / sum(STEP_S * used.size for used, _, _ in pieces)
     high, low = float(means.max()), float(means.min())
-    free = get_effect(EFFECT).fitting.free[0]
-    volumes = np.geomspace(free.lower, free.upper, VOLUMES)
+    volumes = np.geomspace(volume.lower, volume.upper, VOLUMES)
 
     def best(grids: Sequence[FloatArray]) -> Reservoir:
         """Return the one that follows best, of a grid and of finer ones around that."""
@@ -150,8 +153,8 @@ def reservoir_seen(recordings: Sequence[Recording], taken_kg: Sequence[FloatArra
             grids = [np.linspace(g[max(i - 1, 0)], g[min(i + 1, g.size - 1)], FINE)
                      if g.size > 1 else g for g, i in zip(grids, (int(i) for i in index))]
         rms = np.sqrt(squares[place] / sum(read.size for _, read, _ in pieces))
-        volume, band, flow = tried[:, place].tolist()
-        return Reservoir(volume, band, flow, float(rms) / moved_pa)
+        volume_m3, band_pa, flow_kg_per_s = tried[:, place].tolist()
+        return Reservoir(volume_m3, band_pa, flow_kg_per_s, float(rms) / moved_pa)
 
     off = best([volumes, np.array([BANDS[-1] * (high - low)]), np.zeros(1)])
     found = best([volumes, (high - low) * np.array(BANDS), rate * np.geomspace(0.3, 30.0, FLOWS)])
