@@ -26,8 +26,8 @@ from pam_actuation.held_signal import HeldSignal
 from pam_actuation.nodes.endpoints import PolledSubscription
 from pam_actuation.topics.codec import Reader
 import rclpy
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import FluidPressure
 from sensor_msgs.msg import JointState
 
@@ -97,10 +97,12 @@ def main():
     """Run the node; whatever ends it, the regulator gets 0 V."""
     converter = Converter()
     try:
-        rclpy.init()
-        signal.signal(signal.SIGHUP, signal.default_int_handler)
+        # The handlers of rclpy would end the context while a tick publishes.
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, signal.default_int_handler)
         rclpy.spin(OwnHardware(converter))
-    except (KeyboardInterrupt, ExternalShutdownException):
+    except KeyboardInterrupt:
         pass
     finally:
         converter.write(0.0)
