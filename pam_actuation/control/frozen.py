@@ -129,7 +129,7 @@ class FrozenMeasurement:
         if not 0.0 <= passed_s < 1.0 or not math.isfinite(self._mean):
             self._mean = value
         else:
-            self._mean += (value - self._mean) * -math.expm1(-passed_s / MEAN_S)
+            self._mean += (value - self._mean) * passed_s / (MEAN_S + passed_s)
         self._mean_ns = stamp_ns
         return self._mean
 

@@ -171,14 +171,14 @@ class Measurement:
             The same as it should be, None where the measured one is to be believed.
 
         """
+        both = self._frozen_both
         if expected_pa is None:
-            for judge in self._frozen_both:
+            for judge in both:
                 judge.pause()
-            expected_pa = math.nan
+            both, expected_pa = both[:1], math.nan
         # All are to be asked, whatever the first one says.
         found = [judge.judge(now_ns, self.stamp_ns, self.value, pressure_pa)
-                 for judges, pressure_pa in ((self._frozen, measured_pa),
-                                             (self._frozen_both, expected_pa))
+                 for judges, pressure_pa in ((self._frozen, measured_pa), (both, expected_pa))
                  for judge in judges]
         return any(found)
 

@@ -55,9 +55,10 @@ class UnmovedMonitor:
 
     def forget(self) -> None:
         """Begin anew: what was expected and found before counts no more."""
-        # Time [s], pressure expected of all pulses and of long ones, smoothed reading.
-        self._ticks: deque[tuple[float, float, float, float]] = deque()
-        self._filled_pa = self._proven_pa = 0.0
+        # Time [s], pressure expected of all pulses and of long ones, smoothed reading, and what
+        # all that fill would have made alone.
+        self._ticks: deque[tuple[float, float, float, float, float]] = deque()
+        self._filled_pa = self._proven_pa = self._let_in_pa = 0.0
         self._smooth_pa = math.nan
         self._stamp_s = -math.inf
         self._probe_s = -math.inf       # when the last probe began
@@ -79,6 +80,7 @@ class UnmovedMonitor:
         if math.isfinite(change_pa):
             change_pa = min(max(change_pa, -_MOST_PA), _MOST_PA)
             self._filled_pa += change_pa
+            self._let_in_pa += max(change_pa, 0.0)
             self._proven_pa += change_pa * long_share
 
     def problem(self, now_ns: int, pressure_pa: float, follows: bool) -> str:
@@ -94,13 +96,16 @@ class UnmovedMonitor:
         ticks = self._ticks
         if not follows:
             ticks.clear()
-        ticks.append((now_s, self._filled_pa, self._proven_pa, self._smooth_pa))
+        ticks.append((
+            now_s, self._filled_pa, self._proven_pa, self._smooth_pa, self._let_in_pa))
         while now_s - ticks[0][0] > WINDOW_S:
             ticks.popleft()
+        self._suspect = False
+        if self._let_in_pa - ticks[0][4] < MISSED_PA:       # in most ticks
+            return ''
         answered_s = min(self._stamp_s, now_s) - LATE_S
         highest_pa, moved_pa = -math.inf, 0.0
-        end: tuple[float, float, float, float] | None = None
-        self._suspect = False
+        end: tuple[float, float, float, float, float] | None = None
         for one in reversed(ticks):
             moved_pa = max(moved_pa, highest_pa - one[3])
             highest_pa = max(highest_pa, one[3])
