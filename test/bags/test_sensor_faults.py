@@ -158,7 +158,9 @@ def test_import_and_every_verb_tell_of_a_fault(fault, tmp_path, capsys):
         assert main(call) == bool(fault)
         said = capsys.readouterr().out
         assert said.count(words) == 1 if fault else 'remark' not in said, said
+    if fault != 'slip':         # all tell by the same function
+        return
     assert main(['gap', bag, '--model', 'dmsp_5_300_hanging_mass', '--seconds', '1', '--effects',
                  'coulomb_friction', '--out', str(tmp_path / 'gap'), '--json']) in (0, 1)
     remarks = json.loads(capsys.readouterr().out)['remarks']
-    assert sum(words in one for one in remarks) == 1 or not fault
+    assert sum(words in one for one in remarks) == 1

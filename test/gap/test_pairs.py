@@ -71,7 +71,7 @@ def test_what_was_dropped_does_not_keep_the_place_of_another(monkeypatch):
     assert {e['name'] for e in found.effects} == {'creep', 'contraction_bias'}
 
 
-def pulses(seconds=14.0, seed=5):
+def pulses(seconds=9.0, seed=5):
     """Return duties of both valves per millisecond: trains of short pulses, then none."""
     random = np.random.default_rng(seed)
     found = np.zeros((int(1000 * seconds), 2))
