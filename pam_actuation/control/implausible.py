@@ -44,15 +44,18 @@ class Implausible:
     def forget(self) -> None:
         """Begin anew."""
         self.holds, self._is = False, False
-        self._until_ns = 0
+        self._held_ns: int | None = None    # since when it was kept so the last time
         self._relapses.forget()
 
     def judge(self, now_ns: int, implausible: bool) -> bool:
         """Take whether the newest reading is implausible; return whether it counts as that."""
         began, self._is = implausible and not self._is, implausible
-        if self.holds and now_ns >= self._until_ns:
-            self.holds = False
+        self.holds = self._held_within(now_ns, HELD_NS)
         if began and not self.holds and (
-                self._relapses.too_often(now_ns) or 0 < now_ns - self._until_ns < HELD_NS):
-            self.holds, self._until_ns = True, now_ns + HELD_NS
+                self._relapses.too_often(now_ns) or self._held_within(now_ns, 2 * HELD_NS)):
+            self.holds, self._held_ns = True, now_ns
         return implausible or self.holds
+
+    def _held_within(self, now_ns: int, time_ns: int) -> bool:
+        """Return whether it began to be kept so within this time; not by a clock that was set."""
+        return self._held_ns is not None and 0 <= now_ns - self._held_ns <= time_ns
