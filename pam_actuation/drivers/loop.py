@@ -269,16 +269,14 @@ class DriverLoop:
         for _ in range(min(elapsed - 1, _MOST_MISSED)):
             law.hold(fill, vent, supply_pa=supply_pa)
             self.safety.flow(law.flow_pa, law.long_share)
-        if decision.pressure_pa is None or self._empties(decision.pressure_pa, now_ns):
-            fill, vent = self._imposed(decision.duty)
-            if elapsed != 0:
-                law.hold(fill, vent, measured, supply_pa, age_s, *motion)
-        elif (probe := self.safety.unmoved.probe(now_ns, decision.pressure_pa)) is not None:
-            fill, vent = probe, 0.0
-            if elapsed != 0:
-                law.hold(fill, vent, measured, supply_pa, age_s, *motion)
-        else:
+        imposed = self._imposed(decision, now_ns)
+        if imposed is None:
+            assert decision.pressure_pa is not None
             fill, vent = law.step(decision.pressure_pa, measured, supply_pa, age_s, *motion)
+        else:
+            fill, vent = imposed
+            if elapsed != 0:
+                law.hold(fill, vent, measured, supply_pa, age_s, *motion)
         if not law.sound:       # on a rig unlike the model: begin anew with the next reading
             self.law = self._new_law()
             if decision.pressure_pa is not None:
@@ -300,10 +298,15 @@ class DriverLoop:
         since = self._under_pressure_ns
         return since is not None and not 0 <= now_ns - since < _EMPTIES_AFTER_S * NS_PER_S
 
-    def _imposed(self, duty: float | None) -> tuple[float, ...]:
-        if duty is None:
+    def _imposed(self, decision: Decision, now_ns: int) -> tuple[float, ...] | None:
+        """Return the duties that are sent in place of what the law wants, None for its own."""
+        if decision.duty is not None:
+            return max(decision.duty, 0.0), max(-decision.duty, 0.0)
+        target_pa = decision.pressure_pa
+        if target_pa is None or self._empties(target_pa, now_ns):
             return self._safe_efforts()
-        return max(duty, 0.0), max(-duty, 0.0)
+        probe = self.safety.unmoved.probe(now_ns, target_pa)
+        return None if probe is None else (probe, 0.0)
 
     def _emptied_to_pa(self) -> float:
         """Return down to which pressure the valve has emptied the muscle, NaN where it has not."""

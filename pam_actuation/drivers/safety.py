@@ -346,8 +346,8 @@ class SafetySupervisor:
             if self.needs_pressure:
                 return 'pressure_frozen', text
             self._warn('pressure_frozen_ppr', text, now_ns)
-        why = self.unmoved.problem(now_ns, channel.pressure_pa, self._fault is None)
-        if why and self.needs_pressure:
+        if self.needs_pressure and (why := self.unmoved.problem(
+                now_ns, channel.pressure_pa, self._fault is None)):
             return 'pressure_unmoved', why
         return None
 
