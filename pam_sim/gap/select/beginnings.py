@@ -73,7 +73,7 @@ def _better(context: SearchContext, problem: SubsystemProblem, selected: Selecte
             best: NamedEffect, rival: Rival) -> Selected:
     """Return what is selected from a beginning with a rival, or what was selected before."""
     s, estimator = problem.subsystem, context.estimator
-    levels, slopes = [p.level for p in context.problems], dict(estimator.slopes)
+    back = context.bookmark()
     without = selected.fit
     for w in selected.named:
         if w.subsystem == s:
@@ -87,7 +87,5 @@ def _better(context: SearchContext, problem: SubsystemProblem, selected: Selecte
             and not _leaves_clear_rest(context, problem, found)
             and is_missed(context, problem, found.fit, selected.fit)):
         return found
-    estimator.slopes = slopes
-    for p, level in zip(context.problems, levels):
-        p.level = level
+    back()
     return selected

@@ -106,6 +106,16 @@ class SearchContext:
         return {s: explained for s, explained in self.ranking.shares(current).items()
                 if self.first_gap[s] > self.least_gap}
 
+    def bookmark(self) -> Callable[[], None]:
+        """Return what puts the levels of noise and the slopes back to what they are now."""
+        levels, slopes = [p.level for p in self.problems], dict(self.estimator.slopes)
+
+        def back() -> None:
+            self.estimator.slopes = slopes
+            for problem, level in zip(self.problems, levels):
+                problem.level = level
+        return back
+
     def set_levels(self, rivals: Sequence[Rival], problems: Iterable[SubsystemProblem]) -> None:
         """Lower the level of noise to what the best rival reaches."""
         for problem in problems:

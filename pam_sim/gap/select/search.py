@@ -99,7 +99,7 @@ def _paired(context: SearchContext, selected: Selected) -> Selected:
     if selected.named or problem is None or selected.mistaken or context.out_of_time():
         return selected
     estimator = context.estimator
-    level, slopes = problem.level, dict(estimator.slopes)
+    back = context.bookmark()
     pair = pair_of(context, problem)
     if pair is not None:
         found, named = pair
@@ -109,7 +109,7 @@ def _paired(context: SearchContext, selected: Selected) -> Selected:
             if len(both.named) == len(named):
                 return both
             selected = replace(selected, mistaken=both.mistaken)
-    problem.level, estimator.slopes = level, slopes
+    back()
     return selected
 
 
@@ -126,7 +126,7 @@ def _grouped(context: SearchContext, selected: Selected) -> Selected:
                 or any(w.subsystem == s for w in selected.named) or context.out_of_time()):
             continue
         estimator = context.estimator
-        level, slopes = problem.level, dict(estimator.slopes)
+        back = context.bookmark()
         group = group_of(context, selected.fit, problem)
         if group is not None:
             found, named = group
@@ -137,5 +137,5 @@ def _grouped(context: SearchContext, selected: Selected) -> Selected:
                 if sum(w.subsystem == s for w in several.named) > 1:
                     selected = several
                     continue
-        problem.level, estimator.slopes = level, slopes
+        back()
     return selected
