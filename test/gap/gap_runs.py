@@ -37,6 +37,16 @@ def voltages(seconds=24.0, seed=3):
     return np.where(t < 1.0, 3.0, np.where(t > 0.6 * seconds, held, u))
 
 
+def duties(seconds=8.0, seed=5, lasts_ms=(40, 120), openings=(0.25, 0.6)):
+    """Return duties of both valves per millisecond: one of them for a while, then none."""
+    random = np.random.default_rng(seed)
+    found = np.zeros((int(1000 * seconds), 2))
+    for start in range(500, len(found) - 300, 300):
+        side = int(random.integers(2)) if 1500 < start else 0
+        found[start:start + int(random.integers(*lasts_ms)), side] = random.uniform(*openings)
+    return found
+
+
 def recorded(rig, valve_signal, rate_hz=200, seed=0, noise=1.0, topics=tuple(NOISE),
              initial_pressure_pa=401_325.0, jitter_s=5e-5):
     """Return a Run of the rig's answer: noise as on the realistic rig, stamps jittered."""

@@ -14,7 +14,7 @@
 
 """95 % intervals: along what the data leave open, within the allowed range, one for a name."""
 
-from gap_runs import assert_form, NOMINAL, nominal, recorded, voltages
+from gap_runs import assert_form, duties, NOMINAL, nominal, recorded, voltages
 import numpy as np
 from pam_sim import load_rig
 from pam_sim.gap import find_gap
@@ -123,16 +123,6 @@ def switching(**effect):
     """Return the rig with on/off valves and dead zone, and duties that are 0 or long."""
     rig = load_rig(NOMINAL, valve='hsv')
     return rig, rig.with_(effects=[{'name': 'valve_dead_zone', 'parameters': effect}])
-
-
-def duties(seconds=8.0, seed=5):
-    """Return duties of both valves per millisecond: one of them for a while, then none."""
-    random = np.random.default_rng(seed)
-    found = np.zeros((int(1000 * seconds), 2))
-    for start in range(500, len(found) - 300, 300):
-        side = int(random.integers(2)) if 1500 < start else 0
-        found[start:start + int(random.integers(40, 120)), side] = random.uniform(0.25, 0.6)
-    return found
 
 
 def test_of_opening_and_closing_times_only_the_difference_is_told():

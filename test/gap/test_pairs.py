@@ -14,8 +14,7 @@
 
 """Effects that another one looks like as long as they are tried one by one."""
 
-from gap_runs import NOMINAL, nominal, recorded, voltages
-import numpy as np
+from gap_runs import duties, NOMINAL, nominal, recorded, voltages
 from pam_sim import load_rig
 from pam_sim.gap import find_gap
 from pam_sim.gap.data.recording import Recording
@@ -71,23 +70,13 @@ def test_what_was_dropped_does_not_keep_the_place_of_another(monkeypatch):
     assert {e['name'] for e in found.effects} == {'creep', 'contraction_bias'}
 
 
-def pulses(seconds=9.0, seed=5):
-    """Return duties of both valves per millisecond: trains of short pulses, then none."""
-    random = np.random.default_rng(seed)
-    found = np.zeros((int(1000 * seconds), 2))
-    for start in range(500, len(found) - 300, 300):
-        side = int(random.integers(2)) if 1500 < start else 0
-        found[start:start + int(random.integers(60, 200)), side] = random.uniform(0.2, 0.6)
-    return found
-
-
 def test_a_wrong_number_beside_effects_is_no_further_effect():
     """A smaller orifice with slow valves looks like more air in the tube, to nine tenths."""
     given = load_rig(NOMINAL, valve='hsv')
     true = given.with_(parameters={'C': 1.5e-10}, effects=[
         {'name': 'valve_dead_zone', 'parameters': {'open_time_s': 1.7e-3, 'close_time_s': 2e-3}},
         {'name': 'valve_dead_time', 'parameters': {'delay_s': 0.035}}, CREEP])
-    run = recorded(true, pulses())
+    run = recorded(true, duties(9.0, lasts_ms=(60, 200), openings=(0.2, 0.6)))
     tried = ['valve_dead_zone', 'valve_dead_time', 'dead_volume', 'creep']
     found = find_gap(run, given, effects=tried, unnamed=())
     assert {e['name'] for e in found.effects} == {'valve_dead_zone', 'valve_dead_time', 'creep'}
