@@ -38,7 +38,8 @@ from typing import Any
 
 from pam_actuation.rigging.processes import begin_session, node_environment
 
-OF_A_SESSION = ('ROS_DOMAIN_ID', 'ROS_LOG_DIR')     # differ from node to node
+# Differ from node to node, or from test to test: all share one template.
+OF_A_SESSION = ('ROS_DOMAIN_ID', 'ROS_LOG_DIR', 'PYTEST_CURRENT_TEST')
 # Imported by a template that is started before the rig is known.
 OF_A_RUN = ('experiment_recorder', 'plant_simulator', 'valve_watchdog', 'valve_driver',
             'sofc_controller', 'reference_generator')

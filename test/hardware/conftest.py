@@ -17,4 +17,21 @@
 from pathlib import Path
 import sys
 
+from own_dac import write_metadata
+import pytest
+
 sys.path.append(str(Path(__file__).parent.parent / 'nodes'))
+
+
+@pytest.fixture(scope='session')
+def metadata_of_own_dac(tmp_path_factory):
+    """Return a folder that is the same for all tests, so that they share a template of nodes."""
+    folder = tmp_path_factory.mktemp('own_dac')
+    write_metadata(folder)
+    return folder
+
+
+@pytest.fixture
+def own_dac_installed(metadata_of_own_dac, monkeypatch):
+    """Let Python find ``own_dac`` as if it were installed, in this process and its children."""
+    monkeypatch.setenv('PYTHONPATH', f'{metadata_of_own_dac}:{Path(__file__).parent}')

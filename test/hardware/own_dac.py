@@ -52,11 +52,10 @@ class WriteOnly(ValveOutput):
         return self._fault.read_text() if self._fault.exists() else ''
 
 
-def installed(folder, monkeypatch):
-    """Let Python find this module as if it were installed, in this process and its children."""
+def write_metadata(folder):
+    """Write what an installation of this module would: the entry point of the back end."""
     about = folder / 'own_dac-0.1.0.dist-info'
     about.mkdir()
     (about / 'METADATA').write_text('Metadata-Version: 2.1\nName: own-dac\nVersion: 0.1.0\n')
     (about / 'entry_points.txt').write_text(
         '[pam_actuation.valve_outputs]\nown_dac = own_dac:WriteOnly\n')
-    monkeypatch.setenv('PYTHONPATH', f'{folder}:{Path(__file__).parent}')

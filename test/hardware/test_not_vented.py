@@ -22,7 +22,7 @@ pytest.importorskip('rclpy')
 
 from fake_sysfs import make_dac, number_in                                  # noqa: E402, I100
 from live_rig import Commander, LiveRig, wait_for                           # noqa: E402
-from own_dac import BLOCKED, installed, TIMED_OUT                           # noqa: E402
+from own_dac import BLOCKED, TIMED_OUT                           # noqa: E402
 from pam_actuation.rigging.node_spec import NodeSpec                        # noqa: E402
 from pam_actuation.rigging.supervisor import Supervisor                     # noqa: E402
 from pam_actuation.rigging.transitions import SessionFailed                 # noqa: E402
@@ -73,11 +73,10 @@ class Watched:
 
 
 @pytest.fixture
-def own(tmp_path, monkeypatch):
+def own(tmp_path, own_dac_installed):
     """Return a rig on a back end that has ``write`` alone, and the file of what goes wrong."""
-    installed(tmp_path, monkeypatch)
     file = tmp_path / 'signal'
-    with Watched(tmp_path, lambda: float(file.read_text()) > 2.0, **{
+    with Watched(tmp_path, lambda: float(file.read_text()) > 0.5, **{
             'backend': 'own_dac', 'own_dac.file': str(file)}) as rig:
         rig.fault = tmp_path / 'fault'
         yield rig

@@ -18,7 +18,7 @@ import gc
 import signal
 import time
 
-from own_dac import BLOCKED, CANCELLED, EXITS, installed, OPENINGS, TIMED_OUT, WriteOnly
+from own_dac import BLOCKED, CANCELLED, EXITS, OPENINGS, TIMED_OUT, WriteOnly
 from pam_actuation.drivers.config import DriverConfig
 from pam_actuation.hardware import back_ends
 from pam_actuation.messages import SAFE_EFFORTS
@@ -156,18 +156,17 @@ def test_a_mistake_in_its_code_is_told_with_its_line(opened, monkeypatch):
 
 
 @pytest.fixture
-def rig(bench, tmp_path, monkeypatch):
+def rig(bench, tmp_path, own_dac_installed):
     """Start a driver on the back end and a sender of commands; the muscle is under pressure."""
     pytest.importorskip('rclpy')
     from live_rig import Commander, LiveRig, wait_for
-    installed(tmp_path, monkeypatch)
     live = LiveRig(tmp_path)
     live.wait_for = wait_for
     live.start('valve_driver', **{'backend': 'own_dac', 'own_dac.file': str(bench.file)})
     live.listen()
     wait_for(lambda: live.health['valve_driver'], 60.0, 'the driver')
     live.commander = Commander(live, COMMAND_PA)
-    live.follows = lambda: wait_for(lambda: bench.signal()[0] > 2.0, 20.0, 'the wanted voltage')
+    live.follows = lambda: wait_for(lambda: bench.signal()[0] > 0.5, 20.0, 'the wanted voltage')
     live.follows()
     yield live
     bench.is_well()

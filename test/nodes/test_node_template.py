@@ -197,7 +197,8 @@ def test_nodes_end_with_the_process_that_asked_for_them(environment, tmp_path):
 
 def test_one_template_for_all_sessions_of_a_process(environment):
     one = template_for(OF_A_RUN, environment)
-    assert one is template_for((), {**environment, 'ROS_DOMAIN_ID': '7', 'ROS_LOG_DIR': '/'})
+    for own in ({'ROS_DOMAIN_ID': '7', 'ROS_LOG_DIR': '/'}, {'PYTEST_CURRENT_TEST': 'another'}):
+        assert one is template_for((), {**environment, **own})
     other = template_for((), {**environment, 'RMW_IMPLEMENTATION': 'another'})
     assert other is not one
     other.close()
