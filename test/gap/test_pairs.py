@@ -84,3 +84,15 @@ def test_a_wrong_number_beside_effects_is_no_further_effect():
     assert number.name == 'C' and number.ci95[0] <= 1.5e-10 <= number.ci95[1]
     delay = next(e for e in found.effects if e['name'] == 'valve_dead_time')
     assert delay['parameters']['delay_s']['value'] == pytest.approx(0.035, abs=0.003)
+
+
+def test_a_dead_time_beside_a_wrong_lag_is_no_lag_of_the_line():
+    """A lag of two stages in the line looks like both, to a hundredth."""
+    lag_s = 1.2 * nominal().parameters['T_m']
+    true = nominal().with_(parameters={'T_m': lag_s}, effects=[
+        {'name': 'valve_dead_time', 'parameters': {'delay_s': 0.025}}])
+    found = find_gap(recorded(true, voltages(12.0)), nominal(),
+                     effects=['valve_dead_time', 'tube_lag'], unnamed=())
+    assert [e['name'] for e in found.effects] == ['valve_dead_time']
+    number, = found.parameters
+    assert number.name == 'T_m' and number.ci95[0] <= lag_s <= number.ci95[1]

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Other beginnings of the forward selection, where the best one leaves a clear rest.
+Other beginnings of the forward selection, where the best one leaves something to explain.
 
 The effect that explains most alone need not be one of those that explain all together: a wrong
 number and an effect may look like a third effect. The search then begins with another of the first
@@ -23,7 +23,6 @@ rivals, as a beam search does.
 from collections.abc import Sequence
 
 from pam_sim.gap.select.backward import backward_elimination, is_missed, Selected
-from pam_sim.gap.select.comparison import gap
 from pam_sim.gap.select.context import SearchContext
 from pam_sim.gap.select.forward import forward_selection
 from pam_sim.gap.select.refit import fit_without
@@ -36,7 +35,7 @@ BEGINNINGS = 2               # effort: so many other first effects of a subsyste
 def begun_otherwise(context: SearchContext, selected: Selected, first: Sequence[NamedEffect]
                     ) -> Selected:
     """
-    Return what a search finds that begins with another effect, if that leaves no clear rest.
+    Return what a search finds that begins with another effect, if that leaves nothing open.
 
     Parameters
     ----------
@@ -57,16 +56,9 @@ def begun_otherwise(context: SearchContext, selected: Selected, first: Sequence[
                          and r.share.get(s, 0.0) >= context.criteria.first_gain),
                         key=lambda r: -r.share[s])
         for rival in likely[:BEGINNINGS]:
-            if _leaves_clear_rest(context, problem, selected) and not context.out_of_time():
+            if context.is_open(problem, selected.fit) and not context.out_of_time():
                 selected = _better(context, problem, selected, best, rival)
     return selected
-
-
-def _leaves_clear_rest(context: SearchContext, problem: SubsystemProblem, selected: Selected
-                       ) -> bool:
-    """Return whether names leave more of a subsystem than their formulations do, for certain."""
-    rest = gap(problem, selected.fit.errors[problem.subsystem])
-    return rest > context.criteria.clear_rest and context.is_open(problem, selected.fit)
 
 
 def _better(context: SearchContext, problem: SubsystemProblem, selected: Selected,
@@ -84,7 +76,7 @@ def _better(context: SearchContext, problem: SubsystemProblem, selected: Selecte
              NamedEffect(rival.name, s, best.rivals, (rival.name,), [rival])]
     found = backward_elimination(context, *forward_selection(context, begun, named))
     if (any(w.subsystem == s for w in found.named)
-            and not _leaves_clear_rest(context, problem, found)
+            and not context.is_open(problem, found.fit)
             and is_missed(context, problem, found.fit, selected.fit)):
         return found
     back()
