@@ -29,55 +29,15 @@ from typing import Any, Self
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.files import refuse_pipe, StrPath
 from pam_sim.units import allowed_range
+from pam_sim.yaml_nodes import composed, Loader, MAX_DEPTH
 import yaml
 
 # Bounds of what is read at all. The largest file of this kind holds some 10 kB and 500 values.
 MAX_BYTES = 300_000
 MAX_VALUES = 50_000       # counted where aliases put them, so that few bytes cannot become many
-MAX_DEPTH = 50
 _WHOLE = re.compile(r'[-+]?[0-9]+')
 _COMMA = re.compile(r'[-+]?[0-9]+,[0-9]+')
 _NO_TEXT = re.compile('[\0\ud800-\udfff]')
-MAX_DIGITS = 300          # of a whole number; such a number still fits a float
-
-
-class _Loader(yaml.SafeLoader):
-    """Safe loader with the YAML 1.2 core scalars only."""
-
-    yaml_implicit_resolvers: dict[str, list[tuple[str, re.Pattern[str]]]] = {}
-    depth = 0
-
-    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
-        """Compose a node as the base class does, unless it is nested too deeply."""
-        self.depth += 1
-        if self.depth > MAX_DEPTH:
-            raise yaml.composer.ComposerError(
-                problem=f'nested deeper than {MAX_DEPTH} levels',
-                problem_mark=self.peek_event().start_mark)
-        node = super().compose_node(parent, index)
-        self.depth -= 1
-        return node
-
-
-def _construct_int(loader: _Loader, node: yaml.ScalarNode) -> int:
-    text = loader.construct_scalar(node)
-    if len(text) > MAX_DIGITS:
-        raise yaml.constructor.ConstructorError(
-            problem=f'a whole number of {len(text)} digits is too large',
-            problem_mark=node.start_mark)
-    return int(text)       # YAML 1.2: a leading zero is not octal
-
-
-_Loader.add_constructor('tag:yaml.org,2002:int', _construct_int)
-for _tag, _pattern, _first in (
-    ('bool', r'^(?:true|True|TRUE|false|False|FALSE)$', 'tTfF'),
-    ('null', r'^(?:~|null|Null|NULL|)$', ['~', 'n', 'N', '']),
-    ('int', r'^[-+]?[0-9]+$', '-+0123456789'),
-    ('float', r'^(?:[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?'
-              r'|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))$', '-+.0123456789'),
-):
-    _Loader.add_implicit_resolver(
-        f'tag:yaml.org,2002:{_tag}', re.compile(_pattern), list(_first))
 
 
 class Located(Mapping[str, Any]):
@@ -356,8 +316,7 @@ def load_yaml(path_or_text: StrPath, name: str | None = None) -> Located:
 def _parsed(text: str, name: str) -> Located:
     """Return the mapping that a text is."""
     try:
-        loader = _Loader(text)
-        node = loader.get_single_node()
+        loader, node = composed(text)
         if node is None:
             raise InputError('is empty; a mapping (key: value) is expected', f'{name}:1')
         if not isinstance(node, yaml.MappingNode):
@@ -393,7 +352,7 @@ def _line_at(name: str, before: bytes) -> str:
 class _Conversion:
     """YAML nodes to located values, with a limit on their number and depth."""
 
-    def __init__(self, loader: _Loader, name: str) -> None:
+    def __init__(self, loader: Loader, name: str) -> None:
         self._loader, self._name = loader, name
         self._left = MAX_VALUES
 
@@ -445,7 +404,7 @@ class _Conversion:
 
     def _scalar(self, node: yaml.ScalarNode) -> Any:
         where = f'{self._name}:{node.start_mark.line + 1}'
-        if node.style is None and _COMMA.fullmatch(node.value):
+        if not node.style and _COMMA.fullmatch(node.value):
             raise InputError(
                 f'`{node.value}` has a comma; write a decimal point and no separators: '
                 f'{node.value.replace(",", ".", 1)}', where)

@@ -14,8 +14,9 @@
 
 """A sample of wrong YAML files: loaded, or refused with file and line, and never anything else."""
 
+from pam_sim import yaml_nodes
 from pam_sim.errors import InputError
-from pam_sim.located_yaml import dump_yaml, load_yaml, MAX_BYTES
+from pam_sim.located_yaml import _parsed, dump_yaml, load_yaml, Located, MAX_BYTES
 import pytest
 import yaml
 from yaml_mutations import BOMB, mutated, outcome, run, sources
@@ -89,6 +90,35 @@ def test_a_text_read_twice_is_not_shared():
     again = load_yaml(text, name='again')
     assert load_yaml(text).plain() == again.plain() == {'a': 1, 'b': [1, {'c': [2, 3]}]}
     assert again['b'][1].where('c') == 'again:2' and first.where('b') == '<text>:2'
+
+
+def read_in(way, text, monkeypatch):
+    """Return the values and their lines as they are read in one way, or the sentence."""
+    monkeypatch.setattr(yaml_nodes, '_quick_loader', way)
+    try:
+        return with_lines(_parsed.__wrapped__(text, 'file'))
+    except InputError as error:
+        return str(error)
+
+
+def with_lines(value):
+    if isinstance(value, Located):
+        return {key: (value.where(key), with_lines(one)) for key, one in value.items()}
+    if isinstance(value, list):
+        return [(value.where(k), with_lines(one)) for k, one in enumerate(value)]
+    return repr(value)
+
+
+def test_what_is_read_fast_is_the_same(monkeypatch):
+    found, quick = sources(), yaml_nodes._quick_loader
+    texts = [made.decode(errors='replace')
+             for _, made, _ in (mutated(k, found) for k in range(120))]
+    texts += ['a:\t1', 'a: \t', 'a: {b: ?c}', 'a: {b?c: 1}', 'a: !{b: 1}', '{a: !0.1, b: 1}',
+              'a: 1\n\ufeff', 'a: 1\r\nb: "\x85"', 'a: # µ°\n- {b: é}', 'a: >\n b\n\n c', '',
+              'a: 3,5', 'a: "3,5"', "a: [{b: 3,5}, '3,5']"]
+    for text in texts:
+        assert read_in(quick, text, monkeypatch) == read_in(
+            yaml_nodes.Loader, text, monkeypatch), text
 
 
 @pytest.mark.parametrize('tree', [
