@@ -70,12 +70,12 @@ def copy_sources(target):
     return target
 
 
-def copy_machine_code(target):
-    """Hand on what was compiled here: numba takes it for files of the same age and size."""
+def copy_compiled(target):
+    """Hand on byte code and machine code: both are taken for files of the same age and size."""
     for name in ('pam_actuation', 'pam_sim'):
         for source in (ROOT / name).rglob('*.py'):
             shutil.copystat(source, target / source.relative_to(ROOT))
-        for stored in (ROOT / name).rglob('__pycache__/*.nb[ci]'):
+        for stored in (ROOT / name).rglob('__pycache__/*'):
             copy = target / stored.relative_to(ROOT)
             copy.parent.mkdir(exist_ok=True)
             shutil.copy2(stored, copy)
@@ -153,7 +153,7 @@ def test_every_executable_starts_and_ends_from_the_colcon_install(isolated_insta
     folder = isolated_install / 'pam_actuation' / 'lib' / 'pam_actuation'
     environment = environment_of(isolated_install / 'setup.bash', ROS_LOG_DIR=str(tmp_path))
     packages, = isolated_install.glob('pam_actuation/lib/python3*/site-packages')
-    copy_machine_code(packages)
+    copy_compiled(packages)
     started = {}
     try:
         for name in NODES:
