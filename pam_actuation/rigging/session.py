@@ -32,6 +32,7 @@ from typing import Any, Self, TYPE_CHECKING
 
 from pam_actuation.bags.ending import (
     ERROR, FINISHED, INTERRUPTED, RECORDED_FILE, tell_recorder)
+from pam_actuation.bags.layout import METADATA_FILE, read_metadata
 from pam_actuation.drivers.watchdog import VENTS
 from pam_actuation.interrupts import undisturbed
 from pam_actuation.messages import LEVEL_ERROR
@@ -42,7 +43,6 @@ from pam_actuation.rigging.plan import make_plan, RECORDER, REFERENCE, RigPlan
 from pam_actuation.rigging.transitions import SessionFailed, termination_as_interrupt
 from pam_sim.errors import InputError
 from pam_sim.files import StrPath
-import yaml
 
 if TYPE_CHECKING:
     from pam_actuation.control.config import Controller
@@ -291,12 +291,10 @@ class RigSession:
 
 def recorded_counts(bag: StrPath) -> dict[str, int]:
     """Return full topic name to number of messages of a bag, {} if it was not finished."""
-    path = Path(bag) / 'metadata.yaml'
-    if not path.is_file():
+    if not (Path(bag) / METADATA_FILE).is_file():
         return {}
-    information = yaml.safe_load(path.read_text())['rosbag2_bagfile_information']
     return {topic['topic_metadata']['name']: topic['message_count']
-            for topic in information['topics_with_message_count']}
+            for topic in read_metadata(bag)['topics_with_message_count']}
 
 
 def run_experiment(experiment: 'StrPath | Experiment',
