@@ -250,7 +250,7 @@ class Weighted:
 
 def used(problem: SubsystemProblem) -> BoolArray:
     """Return which samples count: those of the certify part and of no part do not."""
-    return np.isin(problem.part, (FIT, SELECT))
+    return problem.in_parts((FIT, SELECT))
 
 
 def fit(weighted: Weighted, seed: int = 0,
