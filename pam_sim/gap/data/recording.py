@@ -34,6 +34,7 @@ GRID_S = 0.001
 STAMP_S = 1e-9               # stamps count nanoseconds
 START_S = 0.05               # the state at the start is read from this stretch
 SMOOTH_STEPS = 21            # of a measured signal whose rate is needed
+MOTION_STEPS = 101           # window of the derivatives of measured contraction
 START_SAMPLES = 3            # or from so many samples of a slow log
 EMPTY_PA = 5e3               # above the atmosphere, below which a muscle is empty
 
@@ -181,6 +182,7 @@ class Recording:
     def hold(self, contraction_m: float) -> None:
         """Set the contraction [m] at which the muscle is held, where nobody recorded it."""
         self.measured['contraction'].fill(contraction_m)
+        vars(self).pop('motion', None)
         self._given = (np.full(self.grid_s.size, contraction_m),
                        np.zeros(self.grid_s.size, dtype=bool))
 
@@ -188,6 +190,13 @@ class Recording:
     def given_contraction_m(self) -> FloatArray:
         """Return the contraction that a driven load prescribes [m], on the grid, without noise."""
         return self._given[0]
+
+    @cached_property
+    def motion(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return contraction [m], rate [m/s] and acceleration [m/s^2] on the grid, smoothed."""
+        from scipy.signal import savgol_filter       # slow to import
+        x = np.interp(self.grid_s, self.time_s['contraction'], self.measured['contraction'])
+        return tuple(savgol_filter(x, MOTION_STEPS, 3, deriv=k, delta=GRID_S) for k in range(3))
 
     def tells(self, signal: str, time_s: FloatArray) -> BoolArray:
         """Return at which instants a signal tells of the model: a driven force, in motion."""

@@ -21,7 +21,6 @@ from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.split import FIT
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit
-from pam_sim.gap.report.location import smooth_motion
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.gap.verify.model import model_of
 from pam_sim.units import P_ATM_PA
@@ -47,7 +46,7 @@ def ranges_of(recordings: Sequence[Recording], estimator: Estimator, found: Fit
         pressure = np.interp(r.grid_s, r.time_s['pressure'], r.measured['pressure']) - P_ATM_PA
         add('p', pressure)
         add('t', r.grid_s)
-        x, v, _ = smooth_motion(r)
+        x, v, _ = r.motion
         add('x', np.maximum(x, 0.0))
         add('v', v)
         if 'force' in r.signals:

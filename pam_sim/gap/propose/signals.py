@@ -34,7 +34,7 @@ from pam_sim.gap.fit.hypothesis import Fit
 from pam_sim.gap.propose.factors import columns_of, EVERY
 from pam_sim.gap.propose.library import moved_to, StandIn, Term
 from pam_sim.gap.propose.ranges import waves_of
-from pam_sim.gap.report.location import AT_STOP_M, MOVING_M_PER_S, smooth_motion
+from pam_sim.gap.report.location import AT_STOP_M, MOVING_M_PER_S
 from pam_sim.gap.subsystems.simulation import pressure_driven, simulate_driven
 from pam_sim.gap.verify.model import model_of
 from pam_sim.rig import Rig
@@ -168,7 +168,7 @@ def force_error(estimator: Estimator, recordings: Sequence[Recording], now: Fit,
 
 def _inputs(rig: Rig, r: Recording) -> dict[str, FloatArray]:
     """Return by symbol the measured inputs of terms at the samples of a recording."""
-    x, v, _ = smooth_motion(r)
+    x, v, _ = r.motion
     p = np.interp(r.grid_s, r.time_s['pressure'], r.measured['pressure']) - P_ATM_PA
     return {'p': _thinned(p), 'x': _thinned(np.maximum(x, 0.0)), 'v': _thinned(v),
             't': r.grid_s[::EVERY], 'F': _cell(rig, r)}
@@ -182,7 +182,7 @@ def _cell(rig: Rig, r: Recording) -> FloatArray:
 
 
 def _weight(rig: Rig, r: Recording) -> FloatArray:
-    force = rig.force_of_motion_n(*smooth_motion(r))
+    force = rig.force_of_motion_n(*r.motion)
     if r.external_force_n is not None:
         force = force + np.append(r.external_force_n, 0.0)
     return _thinned(force)
@@ -192,7 +192,7 @@ def _error(rig: Rig, r: Recording, side: str) -> FloatArray:
     """Return what a term must add to the model's side of the balance [N]."""
     if side == 'load':
         return _cell(rig, r) - _weight(rig, r)
-    x, _, _ = smooth_motion(r)
+    x, _, _ = r.motion
     return _cell(rig, r) - _thinned(simulate_driven(pressure_driven(rig), r, x).force_n)
 
 

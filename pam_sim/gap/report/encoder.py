@@ -27,7 +27,7 @@ from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.gap.criteria import Criteria
 from pam_sim.gap.data.means import behind
 from pam_sim.gap.data.recording import GRID_S, Recording
-from pam_sim.gap.report.location import AT_STOP_M, smooth_motion
+from pam_sim.gap.report.location import AT_STOP_M
 from pam_sim.gap.subsystems.simulation import pressure_driven, simulate_driven
 from pam_sim.rig import Rig
 
@@ -60,7 +60,7 @@ def sensor_part(rig: Rig, recording: Recording, time_s: FloatArray, errors: Floa
         None where it follows a force over a stiffness as well, or neither.
 
     """
-    x, v, _ = smooth_motion(recording)
+    x, v, _ = recording.motion
     lifted = x > AT_STOP_M
     driven = pressure_driven(rig)
     tension, further = (simulate_driven(driven, recording, x + step).force_n

@@ -40,7 +40,7 @@ from pam_sim.gap.data.signals import UNIT
 from pam_sim.gap.data.split import FIT, SELECT
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit
-from pam_sim.gap.report.location import AT_STOP_M, smooth_motion
+from pam_sim.gap.report.location import AT_STOP_M
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.gap.subsystems.simulation import pressure_driven, simulate_driven
 from pam_sim.gap.verify.model import model_of
@@ -283,7 +283,7 @@ def _force_errors(estimator: Estimator, problem: SubsystemProblem, index: int, f
 
 def _sides(rig: Rig, recording: Recording, subsystem: str) -> tuple[FloatArray, FloatArray, float]:
     """Return both sides of a balance of forces [N] on the grid, and the noise of their error."""
-    x, v, a = smooth_motion(recording)
+    x, v, a = recording.motion
     cell = None
     if 'force' in recording.signals:
         cell = np.interp(recording.grid_s, recording.time_s['force'],

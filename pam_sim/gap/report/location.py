@@ -34,7 +34,6 @@ from pam_sim.gap.subsystems.simulation import (
 from pam_sim.rig import Rig
 from pam_sim.units import P_ATM_PA
 
-SMOOTH_S = 0.1               # window of the derivatives of measured contraction
 MOVING_M_PER_S = 1e-3
 AT_STOP_M = 3e-4             # nearer to the lower stop the force balance is not the muscle's
 BANDS = 3
@@ -211,15 +210,6 @@ def _unscaled(one: FloatArray, other: FloatArray, rate: FloatArray) -> FloatArra
     return one - other - columns @ np.clip(factors, -most, most)
 
 
-def smooth_motion(recording: Recording) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return contraction [m], its rate [m/s] and acceleration [m/s^2] on the grid, smoothed."""
-    from scipy.signal import savgol_filter       # slow to import
-    x = np.interp(recording.grid_s, recording.time_s['contraction'],
-                  recording.measured['contraction'])
-    window = 2 * int(0.5 * SMOOTH_S / GRID_S) + 1
-    return tuple(savgol_filter(x, window, 3, deriv=k, delta=GRID_S) for k in range(3))
-
-
 def signal_conditions(recording: Recording, time_s: FloatArray) -> list[dict[str, BoolArray]]:
     """Return divisions of instants [s], each condition name -> mask: motion, pressure, thirds."""
     third = recording.grid_s[-1] / BANDS
@@ -230,7 +220,7 @@ def signal_conditions(recording: Recording, time_s: FloatArray) -> list[dict[str
 
 def _directions(recording: Recording, time_s: FloatArray) -> dict[str, BoolArray]:
     """Return condition name -> mask of instants, by direction of motion."""
-    _, v, _ = smooth_motion(recording)
+    _, v, _ = recording.motion
     v = np.interp(time_s, recording.grid_s, v)
     return {'contracting': v > MOVING_M_PER_S, 'extending': v < -MOVING_M_PER_S,
             'at rest': np.abs(v) <= MOVING_M_PER_S}
