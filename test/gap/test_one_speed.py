@@ -38,7 +38,7 @@ def triangle(period_s, time_s=TIME_S):
     return np.abs(2.0 * np.mod(time_s / period_s, 1.0) - 1.0)
 
 
-def loop(period_s, seconds=12.0):
+def loop(period_s, seconds=8.0):
     """Return a voltage per millisecond: a second of rest, then one triangle after another."""
     t = np.arange(int(seconds * 1000)) * 1e-3
     return np.where(t < 1.0, 3.0, 3.0 + 2.4 * (1.0 - triangle(period_s, t - 1.0)))
@@ -74,7 +74,7 @@ def test_the_speed_of_a_stroke_is_that_of_its_middle():
 @pytest.fixture(scope='module', params=MEMORY)
 def one_loop(request):
     rig = nominal().with_(effects=[{'name': request.param}])
-    return request.param, rig, recorded(rig, loop(5.0))
+    return request.param, rig, recorded(rig, loop(3.0))
 
 
 def test_one_speed_gives_a_set_and_the_experiment_at_a_second_one(one_loop, tmp_path):
@@ -94,9 +94,9 @@ def test_one_speed_gives_a_set_and_the_experiment_at_a_second_one(one_loop, tmp_
 
 def test_a_proof_at_the_same_speed_does_not_tell_and_a_second_speed_does(one_loop):
     truth, rig, run = one_loop
-    same = find_gap(run, nominal(), recorded(rig, loop(5.0), seed=4), effects=MEMORY)
+    same = find_gap(run, nominal(), recorded(rig, loop(3.0), seed=4), effects=MEMORY)
     assert same.verdict == 'ambiguous' and sorted(same.ambiguity_set) == MEMORY
-    two = find_gap([run, recorded(rig, loop(1.2), seed=5)], nominal(), effects=MEMORY)
+    two = find_gap([run, recorded(rig, loop(0.8), seed=5)], nominal(), effects=MEMORY)
     assert two.verdict == 'effects' and two.ambiguity_set == [truth]
 
 
