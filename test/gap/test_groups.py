@@ -31,7 +31,7 @@ def recorded_with(seed, **effects):
     """Return a record of the nominal rig with effects, each name=parameters."""
     rig = nominal().with_(effects=[
         {'name': name, 'parameters': values} for name, values in effects.items()])
-    return recorded(rig, voltages(24.0, seed=seed), seed=seed)
+    return recorded(rig, voltages(16.0, seed=seed), seed=seed)
 
 
 def test_three_habits_of_a_regulator_are_named_with_their_sizes():

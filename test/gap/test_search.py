@@ -290,7 +290,7 @@ def test_a_leak_beside_a_lag_of_two_stages_is_named():
             'time_constant_s': 0.014, 'second_stage_share': 0.35}},
         {'name': 'leakage_slit', 'parameters': {
             'conductance_m3_per_s_pa': 1.2e-11, 'slit_flow_at_400kpa_kg_per_s': 3e-6}}])
-    result = find_gap(recorded(rig, voltages(30.0)), nominal())
+    result = find_gap(recorded(rig, voltages(15.0)), nominal())
     assert sorted(e['name'] for e in result.effects) == ['leakage', 'tube_lag']
     lag = next(e for e in result.effects if e['name'] == 'tube_lag')
     assert lag['formulation'] == 'tube_lag_two_stage'
