@@ -64,7 +64,7 @@ def test_both_are_named_where_one_by_one_fails(run, monkeypatch):
 
 def test_what_was_dropped_does_not_keep_the_place_of_another(monkeypatch):
     """One by one, a third one is taken for both, then one of them; when it goes, the other."""
-    run = recorded(nominal().with_(effects=[CREEP, SMALLER]), voltages(24.0))
+    run = recorded(nominal().with_(effects=[CREEP, SMALLER]), voltages(12.0))
     monkeypatch.setattr('pam_sim.gap.select.search.pair_of', lambda search, problem: None)
     found = find_gap(run, nominal(), effects=LOOK_ALIKES)
     assert {e['name'] for e in found.effects} == {'creep', 'contraction_bias'}
