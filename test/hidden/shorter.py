@@ -19,12 +19,12 @@ from truth_commands import protocol
 START_S = 1.5                # of a way to the first level, which is left whole
 
 
-def halved(name, seed):
-    """Return a protocol of which each motion lasts half as long, or has half the cycles."""
+def shortened(name, seed):
+    """Return a protocol with a third of the length, or of the cycles, of each motion."""
     experiment = protocol(name, seed)
     for segment in experiment['segments']:
         for keys in segment.values():
             for key in {'duration_s', 'cycles'} & set(keys):
                 if keys[key] > START_S:
-                    keys[key] //= 2
+                    keys[key] //= 3
     return experiment

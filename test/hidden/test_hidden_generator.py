@@ -25,7 +25,7 @@ from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.subsystems.simulation import free_run
 from pam_sim.model_file import load_rig
 import pytest
-from shorter import halved
+from shorter import shortened
 import truth_bags
 import truth_cases
 import truth_commands
@@ -166,8 +166,8 @@ def test_every_effect_moves_what_is_measured(effect):
 
 
 def short_runs(numbers, names):
-    """Return a Truth behind the regulator of each protocol, half as long as it is."""
-    return [truth_run.run_rig(numbers, 'ppr', halved(name, 3)) for name in names]
+    """Return a Truth behind the regulator of each protocol, a third as long as it is."""
+    return [truth_run.run_rig(numbers, 'ppr', shortened(name, 3)) for name in names]
 
 
 def test_a_gap_after_refit_is_small_for_a_wrong_number_and_large_for_friction():
@@ -218,7 +218,8 @@ def test_a_run_without_the_effect_starts_at_what_is_read():
     assert rows[0, truth_sensors.rig.O_P] == pytest.approx(start_pa + 2e3, abs=200.0)
 
 
-def test_cases_repeat_and_differ_by_seed(tmp_path):
+def test_cases_repeat_and_differ_by_seed(tmp_path, monkeypatch):
+    monkeypatch.setattr('truth_cases.commands.protocol', shortened)
     case = next(c for c in truth_cases.plan(40, 11) if c.protocol == 'steps')
     keys = [truth_cases.build(case, tmp_path / name, with_gap=False) for name in 'ab']
     assert json.dumps(keys[0]) == json.dumps(keys[1])

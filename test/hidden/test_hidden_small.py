@@ -17,10 +17,10 @@
 from asking import pam_gap
 import pytest
 from scoring_judge import is_false_alarm, is_right, read_answer, wrong_names
-from shorter import halved
+from shorter import shortened
 from truth_cases import build, Case
 
-# Recordings of half the length that the examination has: each is searched in a few seconds.
+# Recordings of a third of the length that the examination has: each is searched in seconds.
 CASES = (
     Case('null', 'null', 'ppr', (77, 1), protocol='steps'),
     Case('parameter', 'parameter', 'ppr', (77, 2), ('K_m',), 'triangle'),
@@ -31,7 +31,7 @@ CASES = (
 
 @pytest.mark.parametrize('case', CASES, ids=lambda case: case.name)
 def test_pam_gap_finds_what_is_hidden(case, tmp_path, monkeypatch):
-    monkeypatch.setattr('truth_cases.commands.protocol', halved)
+    monkeypatch.setattr('truth_cases.commands.protocol', shortened)
     key = build(case, tmp_path / 'case', with_gap=False)
     answer = read_answer(pam_gap(tmp_path / 'case', [tmp_path / 'case' / 'fit'], tmp_path / 'out'))
     assert not wrong_names(answer, key)
