@@ -346,7 +346,7 @@ class Rig:
         return mass_kg * acceleration_m_per_s2 + load_force_n(
             LOADS[self.load], self.parameters, contraction_m, velocity_m_per_s)
 
-    def load_stiffness_n_per_m(self, contraction_m: float) -> float:
+    def load_stiffness_n_per_m(self, contraction_m: Number) -> Number | float:
         """Return by how much the force of a free load rises with contraction, N/m."""
         if not has_force(LOADS[self.load]):
             return self.parameters['spring_n_per_m']

@@ -31,6 +31,7 @@ from pam_actuation.drivers.config import DriverConfig
 from pam_actuation.drivers.hsv_config import HsvConfig
 from pam_actuation.drivers.loop import DriverLoop
 from pam_actuation.drivers.ppr import PprConfig
+from pam_sim.annotations import FloatArray
 from pam_sim.effects.setting import equivalent
 from pam_sim.units import P_ATM_PA
 
@@ -44,6 +45,7 @@ _GAIN, _GAIN_AT_ONCE = HsvConfig.gain, 0.7
 _SLOPE_OVER_M = 1e-3
 _SWING_M_PER_S = 0.05            # a speed of a load that swings on its muscle
 _GAUGES_PA = np.arange(10e3, 601e3, 10e3)
+_PARTS = np.arange(1, 11) / 10      # of the pressures that lift the load: where it swings
 
 
 def driver_config(rig: 'Rig', changes: Mapping[str, object] | None = None,
@@ -108,24 +110,24 @@ def _load(rig: 'Rig') -> dict[str, float]:
     lifted = rig.static_contraction_m(P_ATM_PA + _GAUGES_PA) > 0.0
     lift_off = (float(_GAUGES_PA[lifted][0]) if lifted.any() else 550e3) - 10e3
     lift_off = min(max(lift_off, 0.0), 550_000.0)
-    swings = [(_swing_hz(rig, lift_off + part * (600_000.0 - lift_off)),
-               lift_off + part * (600_000.0 - lift_off)) for part in
-              (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)]
-    lowest_hz = min(swings)[0]
-    highest_hz = max(swings)[0]
+    gauges_pa = lift_off + _PARTS * (600_000.0 - lift_off)
+    swings_hz = _swings_hz(rig, gauges_pa)
+    lowest_hz, highest_hz = float(swings_hz.min()), float(swings_hz.max())
     # The frequency falls fast, then stays: take the bend for the end of the fall.
-    lowest_at = next(gauge for hz, gauge in swings if hz <= 1.05 * lowest_hz)
-    slope = (_volume(rig, lift_off + 30e3) - _volume(rig, lift_off + 10e3)) / 20e3
-    full_m = float(rig.static_contraction_m(P_ATM_PA + 600e3))
+    lowest_at = float(gauges_pa[swings_hz <= 1.05 * lowest_hz][0])
+    points_pa = P_ATM_PA + np.array([0.0, lift_off + 10e3, lift_off + 30e3, 600e3])
+    at_rest_m = rig.static_contraction_m(points_pa)
+    empty_m3, below_m3, above_m3, full_m3 = rig.volume_m3(at_rest_m, points_pa).tolist()
+    full_m = float(at_rest_m[-1])
     at_lift_off_pa = P_ATM_PA + lift_off
     return {
         'hsv.volume_slope_m3_per_m': float(
             rig.volume_m3(_SLOPE_OVER_M, at_lift_off_pa)
             - rig.volume_m3(0.0, at_lift_off_pa)) / _SLOPE_OVER_M,
         'hsv.contraction_at_600kpa_m': max(full_m, _SLOPE_OVER_M),
-        'hsv.volume_m3': _volume(rig, 0.0),
-        'hsv.volume_at_600kpa_m3': _volume(rig, 600e3),
-        'hsv.volume_slope_m3_per_pa': max(slope, 0.0),
+        'hsv.volume_m3': empty_m3,
+        'hsv.volume_at_600kpa_m3': full_m3,
+        'hsv.volume_slope_m3_per_pa': max((above_m3 - below_m3) / 20e3, 0.0),
         'hsv.lift_off_gauge_pa': lift_off,
         'hsv.swing_hz': highest_hz,
         'hsv.swing_lowest_hz': lowest_hz,
@@ -136,20 +138,17 @@ def _load(rig: 'Rig') -> dict[str, float]:
     }
 
 
-def _volume(rig: 'Rig', gauge_pa: float) -> float:
-    pressure_pa = P_ATM_PA + gauge_pa
-    return float(rig.volume_m3(rig.static_contraction_m(pressure_pa), pressure_pa))
-
-
-def _swing_hz(rig: 'Rig', gauge_pa: float) -> float:
-    """Return the natural frequency [Hz] of the load at constant pressure."""
-    x_m = rig.static_contraction_m(P_ATM_PA + gauge_pa)
+def _swings_hz(rig: 'Rig', gauges_pa: FloatArray) -> FloatArray:
+    """Return the natural frequency [Hz] of the load at each pressure, held constant."""
+    x_m = rig.static_contraction_m(P_ATM_PA + gauges_pa)
     held_n = rig.tension_n(x_m)
     h_n = 0.01 * held_n
     # dF/dx at constant pressure from two static points of the same pressure.
-    up = rig.static_contraction_m(P_ATM_PA + gauge_pa, held_n - h_n)
-    down = rig.static_contraction_m(P_ATM_PA + gauge_pa, held_n + h_n)
-    if up <= down or x_m <= 0.0:
-        return _UNKNOWN_SWING_HZ
-    stiffness = 2.0 * h_n / (up - down) + rig.load_stiffness_n_per_m(x_m)
-    return math.sqrt(stiffness / rig.parameters['mass_kg']) / (2.0 * math.pi)
+    up_m = rig.static_contraction_m(P_ATM_PA + gauges_pa, held_n - h_n)
+    down_m = rig.static_contraction_m(P_ATM_PA + gauges_pa, held_n + h_n)
+    known = (up_m > down_m) & (x_m > 0.0)
+    stiffness = (2.0 * h_n[known] / (up_m - down_m)[known]
+                 + rig.load_stiffness_n_per_m(x_m[known]))
+    swings_hz = np.full(gauges_pa.shape, _UNKNOWN_SWING_HZ)
+    swings_hz[known] = np.sqrt(stiffness / rig.parameters['mass_kg']) / (2.0 * math.pi)
+    return swings_hz
