@@ -26,7 +26,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 LINE = "    setting('extra_gain_pa_per_m', 'Pa/m', 25.0, 0.0, 100.0, 'gain of the test'),\n"
 LAWS = {'sofc': 'pam_actuation.control.sofc.settings', 'pid': 'pam_actuation.control.pid'}
-# What a controller makes of the setting: values, its compiled array, text in a bag, a mistake.
+# What each controller makes of the setting: values, its compiled array, text in a bag, a mistake.
 LOAD = """
 import importlib, json, sys
 from pathlib import Path
@@ -36,47 +36,56 @@ from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.records import size_of
 
-kind, law, folder = sys.argv[1], importlib.import_module(sys.argv[2]), Path(sys.argv[3])
+file, laws = Path(sys.argv[1]), json.loads(sys.argv[2])
 rig, name = load_rig('dmsp_5_300_realistic'), 'extra_gain_pa_per_m'
 
-def loaded(text):
-    file = folder / 'own.yaml'
+def loaded(kind, text):
     file.write_text(f'controller: {kind}\\n{text}')
     return load_controller(file, rig)
 
-def compiled(controller):
+def compiled(controller, parameters):
     array, = (one for one in controller.compiled_arguments()
-              if getattr(one, 'shape', ()) == (size_of(law.PARAMETERS),))
-    return float(array.view(law.PARAMETERS)[name][0])
+              if getattr(one, 'shape', ()) == (size_of(parameters),))
+    return float(array.view(parameters)[name][0])
 
-usual, own = loaded(''), loaded(f'settings: {{{name}: 42.0}}\\n')
-all_three = usual, own, load_controller(controller_to_yaml(own))
-try:
-    loaded(f'settings:\\n  {name}: 100.5\\n')
-except InputError as error:
-    mistake = str(error)
-print(json.dumps({
-    'values': [one.settings[name] for one in all_three],
-    'compiled': [compiled(one) for one in all_three], 'mistake': mistake}))
+found = {}
+for kind, law in laws.items():
+    parameters = importlib.import_module(law).PARAMETERS
+    usual, own = loaded(kind, ''), loaded(kind, f'settings: {{{name}: 42.0}}\\n')
+    all_three = usual, own, load_controller(controller_to_yaml(own))
+    try:
+        loaded(kind, f'settings:\\n  {name}: 100.5\\n')
+    except InputError as error:
+        mistake = str(error)
+    found[kind] = {
+        'values': [one.settings[name] for one in all_three],
+        'compiled': [compiled(one, parameters) for one in all_three], 'mistake': mistake}
+print(json.dumps(found))
 """
-# The node with a file that sets it, then its page.
-NODE = """
-import sys
+# Each node with a file that sets it, then its page.
+NODES = """
+import contextlib, io, json, sys
+from pathlib import Path
 from pam_actuation.cli.main import main
 from pam_actuation.nodes.interfaces import node_class
 from pam_actuation.rigging.client import local_context
 from pam_actuation.rigging.domain import DomainLock
 from rclpy.parameter import Parameter
 
-lock = DomainLock()
-node = node_class(sys.argv[1])(
-    context=local_context(lock.domain_id), namespace='/ns', enable_rosout=False,
-    parameter_overrides=[Parameter('controller', value=sys.argv[2])])
-node.trigger_configure()
-print(node.controller.settings['extra_gain_pa_per_m'])
-node.destroy_node()
+file, found, lock = Path(sys.argv[1]), {}, DomainLock()
+for kind in sys.argv[2:]:
+    file.write_text(f'controller: {kind}\\nsettings: {{extra_gain_pa_per_m: 42.0}}\\n')
+    node = node_class(f'{kind}_controller')(
+        context=local_context(lock.domain_id), namespace='/ns', enable_rosout=False,
+        parameter_overrides=[Parameter('controller', value=str(file))])
+    node.trigger_configure()
+    gain = node.controller.settings['extra_gain_pa_per_m']
+    node.destroy_node()
+    with contextlib.redirect_stdout(io.StringIO()) as page:
+        assert main(['nodes', f'{kind}_controller']) == 0
+    found[kind] = gain, page.getvalue()
 lock.release()
-assert main(['nodes', sys.argv[1]]) == 0
+print(json.dumps(found))
 """
 
 
@@ -97,30 +106,30 @@ def house(tmp_path_factory):
 
 
 def run(house, *arguments):
-    """Run Python in the copy; return what it printed."""
+    """Run Python in the copy; return what it found, by the kind of controller."""
     done = subprocess.run(
-        [sys.executable, *map(str, arguments)], cwd=house, capture_output=True, text=True,
+        [sys.executable, '-c', *map(str, arguments)], cwd=house, capture_output=True, text=True,
         # A copy would be compiled anew, and no number of this test depends on machine code.
         env={**os.environ, 'PYTHONPATH': str(house), 'NUMBA_DISABLE_JIT': '1'})
     assert done.returncode == 0, done.stderr[-3000:]
-    return done.stdout
+    return json.loads(done.stdout)
 
 
-@pytest.mark.parametrize('kind', LAWS)
-def test_it_is_read_checked_compiled_and_written(house, tmp_path, kind):
-    found = json.loads(run(house, '-c', LOAD, kind, LAWS[kind], tmp_path))
-    assert found['values'] == found['compiled'] == [25.0, 42.0, 42.0]
-    assert found['mistake'].endswith(
-        'own.yaml:3: `extra_gain_pa_per_m` is 100.5; allowed 0 to 100 Pa/m')
+def test_it_is_read_checked_compiled_and_written(house, tmp_path):
+    found = run(house, LOAD, tmp_path / 'own.yaml', json.dumps(LAWS))
+    assert {*found} == {*LAWS}
+    for told in found.values():
+        assert told['values'] == told['compiled'] == [25.0, 42.0, 42.0]
+        assert told['mistake'].endswith(
+            'own.yaml:3: `extra_gain_pa_per_m` is 100.5; allowed 0 to 100 Pa/m')
 
 
 @pytest.mark.ros
 @pytest.mark.shared
-@pytest.mark.parametrize('kind', LAWS)
-def test_the_node_takes_it_and_its_page_has_it(house, tmp_path, kind):
+def test_the_node_takes_it_and_its_page_has_it(house, tmp_path):
     pytest.importorskip('rclpy')
-    file = tmp_path / 'own.yaml'
-    file.write_text(f'controller: {kind}\nsettings: {{extra_gain_pa_per_m: 42.0}}\n')
-    gain, _, page = run(house, '-c', NODE, f'{kind}_controller', file).partition('\n')
-    assert gain == '42.0'
-    assert '| `extra_gain_pa_per_m` | `25` | Pa/m | 0 to 100 | gain of the test |' in page
+    found = run(house, NODES, tmp_path / 'own.yaml', *LAWS)
+    assert {*found} == {*LAWS}
+    for gain, page in found.values():
+        assert gain == 42.0
+        assert '| `extra_gain_pa_per_m` | `25` | Pa/m | 0 to 100 | gain of the test |' in page
