@@ -220,7 +220,7 @@ class _SentCommands:
 
 def _same(a: float, b: float) -> bool:
     """Return whether two floats are the same bits, all NaN being one."""
-    return a == b and np.signbit(a) == np.signbit(b) or (a != a and b != b)
+    return a == b and math.copysign(1.0, a) == math.copysign(1.0, b) or (a != a and b != b)
 
 
 def columns_of(states: 'Series') -> dict[str, FloatArray]:
