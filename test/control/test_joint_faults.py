@@ -157,7 +157,7 @@ def _wrong_sign(rig, side):
     """Let a reading be believable at the atmosphere only: the muscle is tried five times."""
     _pressure(rig, side, lambda sound: Pressure(
         sound.stamp_ns, P_ATM_PA - 2.0 * (sound.pressure_pa - P_ATM_PA)))
-    rig.run(15.0)
+    rig.run(5.0)
 
 
 def _clock_right(rig, side):
