@@ -14,6 +14,7 @@
 
 """The guard over learning: slower at the floor, full for a changed plant, roll-back if worse."""
 
+import numba
 import numpy as np
 from pam_actuation.control.config import load_controller
 from pam_actuation.control.sofc import guard
@@ -29,6 +30,15 @@ from straight_rig import sofc
 PERIOD_TICKS = 400         # 2 s to and fro at 200 Hz
 
 
+@numba.njit
+def _window(par, st, error_m, speed, values, kept):
+    rolled = False
+    for k in range(PERIOD_TICKS):
+        rate = speed if k < PERIOD_TICKS // 2 else -speed
+        rolled |= guard.watch(par, st, error_m, rate, values, kept)
+    return rolled
+
+
 class Watched:
     """A guard fed with windows of a chosen error."""
 
@@ -42,12 +52,7 @@ class Watched:
 
     def window(self, error_m, speed=0.02):
         """Feed one movement to and fro; return whether it was rolled back."""
-        rolled = False
-        for k in range(PERIOD_TICKS):
-            rate = speed if k < PERIOD_TICKS // 2 else -speed
-            rolled |= guard.watch(
-                self.parameters, self.state, error_m, rate, self.values, self.kept)
-        return rolled
+        return _window(self.parameters, self.state, error_m, speed, self.values, self.kept)
 
     def learn(self, change_pa):
         """Change a rule as learning would."""
