@@ -256,7 +256,7 @@ def test_missing_measurements(rig):
     assert plant.pressure_pa - P_ATM_PA == pytest.approx(300e3, abs=3e3)
 
 
-@numba.njit
+@numba.njit(_dbg_optnone=True)      # what it calls is optimised; once more takes seconds
 def _closed_loop(state, par, law_state, law_par, periods, command_pa, pressures):
     inp = np.zeros(4)
     out = np.zeros(13)
