@@ -29,14 +29,14 @@ from pam_sim.located_yaml import dump_yaml, load_yaml
 import pytest
 
 MS = 1_000_000
-SECONDS, AMPLITUDE_M = 14.0, 0.010
+SECONDS, AMPLITUDE_M = 13.0, 0.010
 SPEED_MM_PER_S = 2.0 * math.pi * AMPLITUDE_M * 1e3      # of the sine of 1 Hz, at most
 SINE = """
 name: one_hertz
 domain: contraction
 segments:
   - ramp: {to_m: 0.004, duration_s: 1.0}
-  - sine: {center_m: 0.014, amplitude_m: 0.010, frequency_hz: 1.0, cycles: 13}
+  - sine: {center_m: 0.014, amplitude_m: 0.010, frequency_hz: 1.0, cycles: 12}
 """
 RATES_HZ = {'plant': 250.0, 'controller': 200.0, 'driver': None, 'reference': 100.0}
 
@@ -44,7 +44,7 @@ RATES_HZ = {'plant': 250.0, 'controller': 200.0, 'driver': None, 'reference': 10
 def stalls_of(seed, shortest_ms=20, longest_ms=90):
     """Return (begin, end) of stalls of random length [ns since the start], 1.7 s apart."""
     draw = np.random.default_rng(seed)
-    begins_s = np.arange(5.0, SECONDS - 4.0, 1.7) + draw.uniform(0.0, 0.5, 3)
+    begins_s = np.arange(5.0, SECONDS - 3.0, 1.7) + draw.uniform(0.0, 0.5, 3)
     return [(int(begin_s * 1e9), int(begin_s * 1e9 + draw.uniform(shortest_ms, longest_ms) * MS))
             for begin_s in begins_s]
 
