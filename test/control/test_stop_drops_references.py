@@ -102,7 +102,7 @@ def _two_senders(rig):
 
 @pytest.mark.parametrize('valve', ['ppr', 'hsv'])
 @pytest.mark.parametrize('interrupt', [_stop, _kill, _two_senders])
-@pytest.mark.parametrize('lasts_s', [0.5, 5.0])
+@pytest.mark.parametrize('lasts_s', [0.5, 3.0])
 def test_a_movement_sent_once_does_not_go_on_after_its_driver_was_interrupted(
         valve, interrupt, lasts_s):
     rig = OneMuscle(valve).run(0.1)
@@ -179,7 +179,7 @@ def test_a_movement_of_a_joint_does_not_go_on_after_a_stop_and_its_reset(valve, 
     rig, move = moved_once(valve)
     for side in stopped:
         rig.drivers[side].emergency_stop()
-    rig.run(5.0)
+    rig.run(3.0)
     for side in stopped:
         assert rig.drivers[side].reset()[0]
         rig.run(0.1)
