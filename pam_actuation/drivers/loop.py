@@ -125,17 +125,18 @@ class DriverLoop:
         """
         Take a valve_command: the wanted raw signal, supervised like a pressure command.
 
-        PPR: the voltage is the pressure command of its static gain. HSV: both valves are
-        never open together, what counts is filling minus venting duty; a missing entry
-        makes the command invalid.
+        PPR: the voltage is the pressure command of its static gain and input zero. HSV: both
+        valves are never open together, what counts is filling minus venting duty. An entry that
+        is missing or not finite makes the command invalid.
         """
-        efforts = dict(zip(message.names, message.efforts))
+        efforts = {name: effort for name, effort in zip(message.names, message.efforts)
+                   if math.isfinite(effort)}
         wanted = [efforts.get(name, math.nan) for name in self._names]
         if self.is_hsv:
             self.safety.on_duty(message.stamp_ns, wanted[0] - wanted[1])
         else:
-            pressure_pa = P_ATM_PA + self.config.ppr.gain_pa_per_v * wanted[0]
-            self.safety.on_command(message.stamp_ns, pressure_pa)
+            self.safety.on_command(
+                message.stamp_ns, P_ATM_PA + self.config.ppr.gauge_pa(wanted[0]))
 
     def on_pressure(self, message: Pressure) -> None:
         """Take a measured pressure."""

@@ -126,8 +126,11 @@ class PprConfig:
     @property
     def left_gauge_pa(self) -> float:
         """Return the gauge pressure [Pa] that 0 V, the signal that vents, leaves in the muscle."""
-        volts = min(max(0.0, self.lowest_v), self.highest_v)
-        return self.gain_pa_per_v * (volts - self.atmospheric_v)
+        return self.gauge_pa(min(max(0.0, self.lowest_v), self.highest_v))
+
+    def gauge_pa(self, volts: float) -> float:
+        """Return the gauge pressure [Pa] of an input, 0 where the muscle is vented."""
+        return max(self.gain_pa_per_v * (volts - self.atmospheric_v), 0.0)
 
     def par(self) -> FloatArray:
         """Return the parameter array of ``ppr_step``."""

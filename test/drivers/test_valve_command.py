@@ -87,6 +87,27 @@ def test_voltage_is_sent_as_commanded_within_the_limit():
     assert efforts == (pytest.approx(4.0),) and 'cut to the limit' in status.message
 
 
+@pytest.mark.parametrize('lowest_v, zero_v, wanted_v, sent_v', [
+    (1.0, 1.0, 3.0, 3.0), (0.12, 0.12, 0.0, 0.12), (0.0, 0.04, 0.0, 0.04), (0.0, -0.05, 2.0, 2.0)])
+def test_voltage_is_sent_as_commanded_where_the_input_has_a_zero(
+        lowest_v, zero_v, wanted_v, sent_v):
+    """A voltage below the zero asks for no less than the atmosphere."""
+    bench = Bench('ppr', **{'ppr.lowest_v': lowest_v, 'ppr.atmospheric_v': zero_v})
+    bench.efforts, bench.kpa = (wanted_v,), 100.0 * (sent_v - zero_v)
+    efforts, status = bench.run(2000)
+    assert efforts == (pytest.approx(sent_v),)
+    assert status.level == 0 and status.message == 'following the pressure command'
+
+
+@pytest.mark.parametrize('valve', ['ppr', 'hsv'])
+@pytest.mark.parametrize('wanted', [math.nan, math.inf, -math.inf])
+def test_a_value_that_is_not_finite_is_ignored(valve, wanted):
+    bench = Bench(valve)
+    bench.efforts = (wanted,) if valve == 'ppr' else (wanted, 0.0)
+    bench.run(50)
+    assert bench.loop.safety.commands_ignored == 5
+
+
 @pytest.mark.parametrize('valve, wanted, safe', [
     ('hsv', (0.0, 0.0), SAFE), ('ppr', (3.0,), (0.0,))])
 def test_vents_when_the_sender_stops(valve, wanted, safe):
