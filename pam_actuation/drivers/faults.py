@@ -67,8 +67,14 @@ FAULT_TABLE = (
           'the safe signal is tried again with every tick; service ~/reset, refused while '
           'that fails; ' + _RAMP),
     Fault('signal_not_finite', 'Signal is not a number',
-          'the driver calculated a voltage or duty that is not finite', VENT, True,
-          'service ~/reset; ' + _RAMP),
+          'the driver calculated a voltage or duty that is not finite, or its model of the air '
+          f'ran away {monitors.MOST_RESTARTS} times within {RELAPSES_WITHIN_S:g} s (HSV)',
+          VENT, True, 'service ~/reset, ' + _RAMP),
+    Fault('model_restarted', 'Model of the air ran away (HSV)',
+          'a pressure or volume of the model is not finite (readings much later than the dead '
+          'time, numbers of another rig)', IGNORE, False,
+          'warning; both valves are shut for one period, then the model begins anew with the next '
+          'reading'),
     Fault('no_command', 'No command yet',
           'no valid pressure_command since start or reset', VENT, False,
           'first valid command, ' + _RAMP),

@@ -81,7 +81,7 @@ class HsvLaw:
         """Note a period in which these duties were sent whatever the law says."""
         self._see(age_s, contraction_m, contraction_age_s)
         hsv_hold(self.state, self.par, fill_duty, vent_duty, p_meas_pa, supply_pa)
-        self._out.saturated[...] = 0.0
+        self.out[:] = 0.0
 
     def _see(self, age_s: float, contraction_m: float, contraction_age_s: float) -> None:
         """Set what the compiled law reads of the measurements beside their pressure."""
@@ -103,11 +103,11 @@ class HsvLaw:
 
     @property
     def sound(self) -> bool:
-        """Return whether the model is finite; a law of another plant may run away."""
-        state, out = self._state, self._out
-        return math.isfinite(
-            state.model_pa.item() + state.flow_pa.item() + state.volume_m3.item()
-            + self.dead_time_s + out.fill_duty.item() + out.vent_duty.item())
+        """Return whether model and prediction are finite; with another plant they may run away."""
+        state = self._state
+        predicted_pa = self.predicted_pa if state.started.item() else 0.0
+        return math.isfinite(state.model_pa.item() + state.flow_pa.item() + state.volume_m3.item()
+                             + self.dead_time_s + predicted_pa)
 
     @property
     def predicted_pa(self) -> float:

@@ -27,6 +27,7 @@ from typing import Any
 from pam_actuation.drivers.config import check_valve_type, DriverConfig
 from pam_actuation.drivers.decision import Decision
 from pam_actuation.drivers.hsv import HsvLaw
+from pam_actuation.drivers.monitors import MOST_RESTARTS, Relapses, RELAPSES_WITHIN_S
 from pam_actuation.drivers.not_emptied import NotEmptiedMonitor, OPEN_DUTY
 from pam_actuation.drivers.ppr import PprLaw
 from pam_actuation.drivers.safety import SafetySupervisor
@@ -79,6 +80,7 @@ class DriverLoop:
             spare.step(P_ATM_PA)
         self.law = self._new_law()
         self._emptied = NotEmptiedMonitor()
+        self._restarts = Relapses(MOST_RESTARTS, RELAPSES_WITHIN_S)      # of the model of the air
         self.ticks = 0
         self.late_ticks = 0
         self.saturated_ticks = 0
@@ -280,13 +282,20 @@ class DriverLoop:
                 law.hold(fill, vent, measured, supply_pa, age_s, *motion)
         if not law.sound:       # on a rig unlike the model: begin anew with the next reading
             self.law = self._new_law()
-            if decision.pressure_pa is not None:
-                fill = vent = 0.0
+            if imposed is None:
+                fill = vent = self._restarted(now_ns)
         elif elapsed != 0:
             self._law_ns = now_ns
             self.safety.flow(law.flow_pa, law.long_share)
         self._used_stamp_ns = self.safety.pressure.stamp_ns
         return float(fill), float(vent)
+
+    def _restarted(self, now_ns: int) -> float:
+        """Tell that the model began anew; return the duty for now, not a number if too often."""
+        self.safety.warn('model_restarted', (
+            'the model of the air ran away and began anew: late readings, or numbers of another '
+            f'rig? If it does so again within {RELAPSES_WITHIN_S:g} s, the driver vents'), now_ns)
+        return math.nan if self._restarts.too_often(now_ns) else 0.0
 
     def _empties(self, target_pa: float, now_ns: int) -> bool:
         """

@@ -30,6 +30,7 @@ _NO_SEQUENCE = 2 ** 63     # middleware without sequence numbers gives 0 or all 
 _SAFE_ROOM = 1.5
 LEAST_CHANGE, SHORTEST = 0.1, 0.3
 MOST_RELAPSES, RELAPSES_WITHIN_S = 5, 30.0
+MOST_RESTARTS = 2           # of the model of the air, within the same time
 WARNING_HOLD_S = 1.0        # a warning stays in the message after its last cause
 
 

@@ -148,7 +148,7 @@ class SafetySupervisor:
         why = 'the watchdog vented, since this driver fell silent for a moment (busy machine?)'
         self._rise.begin()
         self._latched_if_raw(('watchdog_vented', why))
-        self._warn('watchdog_vented', why, now_ns)
+        self.warn('watchdog_vented', why, now_ns)
 
     def stop(self) -> None:
         """Tell that the driver vented and ticks no more: once it does it begins with a vent."""
@@ -281,7 +281,7 @@ class SafetySupervisor:
             self.commands_ignored += 1
             self.command_problem = problem
             what = 'valve' if is_duty else 'pressure'
-            self._warn(key, f'a {what} command was ignored: it {problem}', now_ns)
+            self.warn(key, f'a {what} command was ignored: it {problem}', now_ns)
             return
         self.command_stamp_ns, self.command_pa = stamp_ns, value
         self.command_problem = ''
@@ -295,12 +295,12 @@ class SafetySupervisor:
         highest = P_ATM_PA + lim.max_pressure_gauge_pa
         if value > highest:
             self.commands_clamped += 1
-            self._warn('command_above_limit', (
+            self.warn('command_above_limit', (
                 f'command of {gauge_kpa(value):.0f} kPa gauge cut to the limit of '
                 f'{gauge_kpa(highest):.0f} kPa'), now_ns)
         elif value < P_ATM_PA - 1.0:
             self.commands_clamped += 1
-            self._warn('command_below_atmosphere', (
+            self.warn('command_below_atmosphere', (
                 f'command of {value * 1e-3:.0f} kPa absolute is below the atmosphere and taken '
                 'as 0 kPa gauge (commands are absolute pressures)'), now_ns)
 
@@ -330,8 +330,8 @@ class SafetySupervisor:
                 return 'no_pressure', 'waiting for the first measured pressure' + why
             if channel.received:        # nor is one that is broken
                 return 'pressure_timeout', 'no valid measured pressure since the start' + why
-            self._warn('no_pressure_ppr',
-                       'no measured pressure, so over-pressure is not supervised', now_ns)
+            self.warn('no_pressure_ppr',
+                      'no measured pressure, so over-pressure is not supervised', now_ns)
             return None
         age_s = channel.age_s(now_ns)
         if age_s > lim.measurement_timeout_s + grace_s:
@@ -345,7 +345,7 @@ class SafetySupervisor:
                     'although the valve moved air: sensor frozen or valve without effect')
             if self.needs_pressure:
                 return 'pressure_frozen', text
-            self._warn('pressure_frozen_ppr', text, now_ns)
+            self.warn('pressure_frozen_ppr', text, now_ns)
         if self.needs_pressure and (why := self.unmoved.problem(
                 now_ns, channel.pressure_pa, self._fault is None)):
             return 'pressure_unmoved', why
@@ -414,7 +414,7 @@ class SafetySupervisor:
         self._rise.hold()
         if duty > 0.0 and gauge_pa >= self.limits.max_pressure_gauge_pa:
             duty = 0.0
-            self._warn('valve_command_at_limit', (
+            self.warn('valve_command_at_limit', (
                 f'the filling valve stays shut: {gauge_pa * 1e-3:.0f} kPa gauge measured, '
                 f'limit {self.limits.max_pressure_gauge_pa * 1e-3:.0f} kPa'), now_ns)
         return self._following('following the valve command', now_ns, duty=duty)
@@ -426,7 +426,7 @@ class SafetySupervisor:
         measured = self.pressure.pressure_pa
         target = self._rise.limited(target, self._dt_s, measured)
         if not self.needs_pressure and self.air.missing(target, measured, self._dt_s):
-            self._warn('air_missing', (
+            self.warn('air_missing', (
                 f'the measured pressure does not rise: {_CAUSES}? {gauge_kpa(measured):.0f} kPa '
                 f'gauge measured at a command of {gauge_kpa(target):.0f} kPa; with a faulty '
                 'sensor the muscle is under pressure'), now_ns)
@@ -442,7 +442,7 @@ class SafetySupervisor:
                    duty: float | None = None) -> Decision:
         lim = self.limits
         if self.publishers > 1:
-            self._warn('second_publisher_seen', (
+            self.warn('second_publisher_seen', (
                 f'{self.publishers} publishers of pressure_command are on the graph'
                 f'{self.publisher_names}'), now_ns)
         texts = []
@@ -476,10 +476,10 @@ class SafetySupervisor:
             return
         age_s = channel.age_s(now_ns)
         if age_s > self.limits.supply_timeout_s:
-            self._warn('supply_stale', 'no valid supply pressure reading, the nominal one is '
-                       'assumed', now_ns)
+            self.warn('supply_stale', 'no valid supply pressure reading, the nominal one is '
+                      'assumed', now_ns)
         elif channel.pressure_pa < target_pa + self.limits.supply_margin_pa:
-            self._warn('supply_low', (
+            self.warn('supply_low', (
                 f'supply of {gauge_kpa(channel.pressure_pa):.0f} kPa gauge is too low for the '
                 f'command of {gauge_kpa(target_pa):.0f} kPa'), now_ns)
 
@@ -489,8 +489,8 @@ class SafetySupervisor:
             return math.nan
         return self.supply.pressure_pa
 
-    def _warn(self, key: str, text: str, now_ns: int) -> None:
-        # Keep the first text while the warning lasts; only its time is renewed.
+    def warn(self, key: str, text: str, now_ns: int) -> None:
+        """Warn for a while: the first text stays, only its time is renewed."""
         if key in self._warnings and now_ns - self._warnings[key][1] <= _WARNING_HOLD_NS:
             text = self._warnings[key][0]
         self._warnings[key] = (text, now_ns)

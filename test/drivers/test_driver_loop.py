@@ -14,6 +14,7 @@
 
 """The driver loop with the simulated rig: whole chain, venting, status, bad input."""
 
+from collections import deque
 import math
 import random
 
@@ -21,11 +22,12 @@ import numpy as np
 from pam_actuation.drivers.config import DRIVER_PARAMETERS, DriverConfig
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.drivers.hsv import HsvLaw
+from pam_actuation.drivers.hsv_config import PARAMETERS
 from pam_actuation.drivers.hsv_model import STATE
 from pam_actuation.drivers.loop import DriverLoop
 from pam_actuation.loops.bus import Bus
 from pam_actuation.loops.wiring import attach_plant, driver_tick
-from pam_actuation.messages import Pressure
+from pam_actuation.messages import Pressure, ValveSignal
 from pam_actuation.plant_loop import PlantLoop
 import pam_sim
 from pam_sim.errors import InputError
@@ -239,14 +241,18 @@ def test_a_signal_that_is_not_a_number_is_never_sent(valve):
     """It vents, latched, and begins with a new law after the reset."""
     chain = Chain(valve)
     chain.run(1000)
-    broken = math.nan if valve == 'ppr' else (0.0, math.nan)
-    chain.loop.law.step = lambda *inputs: broken
+    if valve == 'ppr':
+        chain.loop.law.step = lambda *inputs: math.nan
+    else:
+        chain.loop.law.par.view(PARAMETERS)['gain'] = math.nan
+        chain.command_kpa = 310.0
     status = chain.run(100)
     assert all(math.isfinite(effort) for signal in chain.signals for effort in signal.efforts)
     assert chain.signals[-1].efforts == SAFE[valve]
     assert status.level == 2 and dict(status.values)['fault'] == 'signal_not_finite'
     assert 'calculated a signal that is not a number' in status.message
     assert chain.loop.reset()[0]
+    chain.command_kpa = 300.0
     assert chain.run(1500).level == 0
     assert chain.pressures_kpa[-1] == pytest.approx(300.0, abs=3.0)
 
@@ -256,9 +262,54 @@ def test_a_law_whose_model_runs_away_begins_anew():
     chain = Chain('hsv')
     chain.run(1500)
     chain.loop.law.state.view(STATE)['model_pa'] = math.nan
-    assert chain.run(10).level == 0 and chain.signals[-1].efforts == (0.0, 0.0)
-    assert chain.run(500).level == 0
+    chain.run(10)
+    assert chain.signals[-1].efforts == (0.0, 0.0)
+    status = chain.run(500)
+    assert status.level == 1 and 'the model of the air ran away' in status.message
+    assert chain.run(600).level == 0
     assert chain.pressures_kpa[-1] == pytest.approx(300.0, abs=3.0)
+
+
+def test_a_law_whose_model_runs_away_again_vents_and_latches():
+    chain = Chain('hsv')
+    chain.run(1500)
+    for _ in range(2):
+        chain.run(500)
+        chain.loop.law.state.view(STATE)['model_pa'] = math.nan
+        status = chain.run(10)
+    assert chain.signals[-1].efforts == SAFE['hsv']
+    assert status.level == 2 and dict(status.values)['fault'] == 'signal_not_finite'
+    assert 'call the service reset' in chain.run(1000).message and chain.pressures_kpa[-1] < 15.0
+
+
+def test_readings_much_too_late_on_another_rig_vent_and_latch():
+    """The model runs away there again and again; the muscle swung between empty and full."""
+    chain = Chain('hsv', **{'hsv.swing_hz': 20.0, 'hsv.swing_lowest_hz': 15.0})
+    take, under_way = chain.loop.safety.on_pressure, deque()
+
+    def late(stamp_ns, pressure_pa):
+        under_way.append((stamp_ns, pressure_pa))
+        if len(under_way) > 16:     # of 5 ms
+            take(*under_way.popleft())
+
+    chain.loop.safety.on_pressure = late
+    status = chain.run(10_000)
+    assert dict(status.values)['fault'] == 'signal_not_finite'
+    assert chain.signals[-1].efforts == SAFE['hsv'] and chain.pressures_kpa[-1] < 15.0
+
+
+def test_the_model_of_the_air_does_not_stop_commanded_duties():
+    """They do not come from it, and a rig that is yet to be identified may be unlike it."""
+    chain = Chain('hsv')
+    chain.run(500)
+    chain.command_kpa = None
+    chain.run(10)
+    for _ in range(3):
+        chain.loop.law.state.view(STATE)['model_pa'] = math.nan
+        chain.loop.on_valve_command(ValveSignal(
+            chain.now + MS, ('fill_duty', 'vent_duty'), (0.0, 0.2)))
+        status = chain.run(20)
+        assert chain.signals[-1].efforts == (0.0, 0.2) and status.level == 0
 
 
 def test_safe_signal():

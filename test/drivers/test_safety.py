@@ -460,7 +460,7 @@ def named_in(source):
         first = []
         if isinstance(node, ast.Return) and isinstance(node.value, ast.Tuple):
             first = node.value.elts[:1]
-        elif isinstance(node, ast.Call) and getattr(node.func, 'attr', '') in ('_warn', '_latch'):
+        elif isinstance(node, ast.Call) and getattr(node.func, 'attr', '') in ('warn', '_latch'):
             first = node.args[:1]
         keys |= {one.value for one in first if isinstance(getattr(one, 'value', 0), str)}
         if isinstance(node, ast.Constant):
