@@ -43,7 +43,10 @@ a reference or trajectory that is not finite,  that message is ignored and count
 out of reach, from the future, long ago, or    held goes on
 older than the reference that is held
 co-contraction out of reach or not finite      ignored and counted; what was held goes on
-pressure, force missing, stale or not finite   not used (they only guard start and learning)
+pressure missing, stale or not finite          valve and model of the muscle stay as they are
+                                               known; start and learning go on without it
+force, where it is not tracked, missing,       learning goes on also where the muscle is slack
+stale or not finite
 followed pressure below or above the command,  integral and rules stand still: the error is
 or silent; pressure lost, where it is unknown  that of a driver that vents or limits
 followed pressure stands still below the       that is the limit of the driver: commands stay
