@@ -76,7 +76,8 @@ RUNNING = (OK, REFERENCE_HELD)      # reasons with which the controller runs
 HELD_BACK = 'held_back'     # not 0 while the driver does not follow the command
 # From the stamps of what a law tracks and of the pressure to the tick; of two pressures the mean.
 AGES = ('measurement_age_s', 'pressure_age_s')
-LIMIT = 'driver_limit_pa'     # to which a driver cuts the commands, absolute; NaN: none known
+# To which a driver cuts the commands, plus 1 kPa (``BEYOND_PA``), absolute; NaN: none known.
+LIMIT = 'driver_limit_pa'
 # Of which topics ``controller_state`` tells the stamps.
 STAMPED: tuple[str, ...] = (
     'contraction', 'pressure', 'force', 'reference', 'reference_trajectory')
@@ -121,7 +122,8 @@ class TickInputs:
     tracks. Pressures and forces are one of each muscle. ``proves`` tells which muscle of a joint
     is asked for a little pressure while all are vented. ``co_contraction_pa`` is the one asked
     for by message, absolute, NaN before the first. Other fields: see ``step`` of the controller.
-    ``limit_pa``: to which a driver cuts the commands, absolute; NaN: none is known.
+    ``limit_pa``: to which a driver cuts the commands, plus 1 kPa, absolute; NaN: none is known.
+    The commands stay at or below it.
     ``ages_s``: of what the law tracks, and of the pressure; of several pressures their mean.
     ``restarted``: the loop stood still, so that the motion known from before means nothing.
     """
