@@ -31,7 +31,7 @@ from pam_sim.units import P_ATM_PA
 if TYPE_CHECKING:
     from pam_actuation.messages import Pressure
 
-FOLLOWS, LESS, MORE, UNKNOWN = 0.0, 1.0, -1.0, 2.0      # what the driver does; ``IN_HELD_BACK``
+FOLLOWS, LESS, MORE, UNKNOWN = 0.0, 1.0, -1.0, 2.0      # what the driver does: ``held_back``
 TOLERANCE_PA = 2_000.0
 ON_THE_WAY_NS = 40_000_000  # a period of either, and what a busy machine takes
 _STANDS_NS = 200_000_000

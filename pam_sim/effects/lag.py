@@ -35,8 +35,6 @@ SAMPLED = record('decay', 'steps')          # of samples: exp(-dt / tau); tau / 
 READING = record('reading', 'true')         # of a sensor: lagged, and the sample it follows
 HELD = record('decay', 'mean_share')        # of a held input, over a physics step
 
-_MEAN = 1                           # of a held input, behind the decay over a physics step
-
 
 def pack_sampled(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
     """Return the packed values of a lag of samples: decay over a step, steps per tau."""
