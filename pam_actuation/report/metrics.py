@@ -35,7 +35,7 @@ from pam_actuation.report.errors import (
 from pam_actuation.report.learning import learned_worse, times_rolled_back
 from pam_sim.annotations import FloatArray
 from pam_sim.short_repr import short_repr
-from pam_sim.units import RHO_REFERENCE
+from pam_sim.units import GAS_CONSTANT_AIR, RHO_REFERENCE, TEMPERATURE_K
 
 if TYPE_CHECKING:
     from pam_actuation.control.delay_estimate import PathEstimate
@@ -250,8 +250,7 @@ def loop_timing(run: 'Run', topic: str) -> LoopTiming | None:
 
 
 def air_use(pressure_pa: ArrayLike, contraction_m: ArrayLike,
-            volume_m3: Callable[[FloatArray, FloatArray], FloatArray],
-            temperature_k: float = 293.15) -> float:
+            volume_m3: Callable[[FloatArray, FloatArray], FloatArray]) -> float:
     """
     Return the air [kg] filled in over a record, by mass balance of the muscle.
 
@@ -265,13 +264,11 @@ def air_use(pressure_pa: ArrayLike, contraction_m: ArrayLike,
         Absolute pressure and contraction at the same instants.
     volume_m3 : callable
         Volume of muscle and fittings at a contraction [m] and a pressure [Pa].
-    temperature_k : float
-        Of the air.
 
     """
     pressure = np.asarray(pressure_pa)
     mass = pressure * volume_m3(np.asarray(contraction_m), pressure) / (
-        287.05 * temperature_k)
+        GAS_CONSTANT_AIR * TEMPERATURE_K)
     if mass.size < 2:
         return 0.0
     play = 0.005 * float(np.ptp(mass))

@@ -20,13 +20,12 @@ from typing import TYPE_CHECKING
 from pam_actuation.report.errors import by_part
 from pam_actuation.report.page import paragraph, Section, signed, table
 from pam_sim.annotations import FloatArray
+from pam_sim.units import RHO_REFERENCE
 
 if TYPE_CHECKING:
     from pam_actuation.report.errors import Cycles
     from pam_actuation.report.joint_page import JointMetrics
     from pam_actuation.report.metrics import RunMetrics
-
-AIR_DENSITY = 1.185          # kg/m^3 at the reference atmosphere of ISO 8778
 
 
 def metrics(named: 'Sequence[tuple[str, RunMetrics]]', key: str = 'metrics',
@@ -130,7 +129,7 @@ def told_of_learning(named: 'Sequence[tuple[str, RunMetrics | JointMetrics]]') -
 def _air(value: float | None) -> str | None:
     if value is None:
         return None
-    return f'{value * 1e3:.2f} g ({value / AIR_DENSITY * 1e3:.2f} l)'
+    return f'{value * 1e3:.2f} g ({value / RHO_REFERENCE * 1e3:.2f} l)'
 
 
 def _loop(m: 'RunMetrics', topic: str) -> str | None:
