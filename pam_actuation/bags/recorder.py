@@ -337,7 +337,8 @@ class RecorderCore:
 
     def _fail(self, error: Exception) -> None:
         """Note the first error; the caller has the writer for itself."""
-        self._look()
+        with contextlib.suppress(OSError):
+            self._look()
         if not self.write_error:
             reason = getattr(error, 'strerror', None) or error
             advice = ', free some space or record elsewhere' * (
@@ -391,17 +392,19 @@ class RecorderCore:
         A slow disk must not hold up the writing.
         """
         while not self._ended.wait(self._flush_every_s):
-            with self._disk:
-                self._look()
-                handle = self._writer.handle_to_sync()
-            if handle is not None:
-                try:
-                    disk.sync(handle)
-                except OSError as error:
-                    with self._disk:
-                        self._fail(error)
-                finally:
-                    os.close(handle)
+            try:
+                with self._disk:
+                    self._look()
+                    handle = self._writer.handle_to_sync()
+                if handle is not None:
+                    try:
+                        disk.sync(handle)
+                    finally:
+                        os.close(handle)
+            # As in ``_write``: no thread may die silently.
+            except Exception as error:
+                with self._disk:
+                    self._fail(error)
 
     def _write(self, batch: Batch, flush: bool) -> None:
         written: dict[str, int] = {}

@@ -204,6 +204,26 @@ def test_a_bag_that_is_renamed_while_recording_is_noticed(tmp_path):
     assert not (tmp_path / 'run').exists()
 
 
+def no_handle(_):
+    raise OSError(errno.EMFILE, 'Too many open files')
+
+
+@pytest.mark.parametrize('name, broken', (
+    ('handle_to_sync', no_handle), ('loss', property(no_handle))))
+def test_a_bag_that_cannot_be_brought_onto_the_disk_is_told(tmp_path, monkeypatch, name, broken):
+    """The thread that waits for the disk lives on, and notes why."""
+    core = recorder_on(BagWriter(tmp_path / 'run', METADATA), flush_every_s=0.02)
+    written_to(core, 20)
+    with monkeypatch.context() as patched:
+        patched.setattr(BagWriter, name, broken)
+        assert 'Too many open files' in noticed(core)
+        time.sleep(0.1)
+        assert core._syncing.is_alive()
+    summary = core.close()
+    assert 'Too many open files' in summary.write_error and not summary.complete
+    assert len(load_run(tmp_path / 'run').topics['pressure']) == summary.written >= 20
+
+
 def test_a_bag_that_is_removed_at_the_last_moment_is_lost(tmp_path):
     core = recorder_on(BagWriter(tmp_path / 'run', METADATA), flush_every_s=60.0)
     written_to(core, 20)
