@@ -67,9 +67,13 @@ class DataFile:
                 index=self._open_index(path.parent))
             begin(self)
         except OSError:
-            self._closing.close()
-            path.unlink()
+            self.discard()
             raise
+
+    def discard(self) -> None:
+        """Close and remove the file."""
+        self._closing.close()
+        self.path.unlink(missing_ok=True)
 
     def _open_index(self, folder: Path) -> BinaryIO | None:
         """Return a file without a name, so that a killed process leaves nothing."""

@@ -319,10 +319,10 @@ class McapWriter:
         return self._start_ns, self._end_ns
 
     def finish(self) -> None:
-        """Close the last chunk; write summary, footer and end mark."""
+        """Close the last chunk; write summary, footer and end mark, in one piece."""
         self.close_chunk()
-        self._write(_bytes(DataEnd(data_section_crc=0)))
-        start = self.offset
+        end = _bytes(DataEnd(data_section_crc=0))
+        start = self.offset + len(end)
         summary, offsets = b'', b''
         for opcode, group in (
                 (Opcode.SCHEMA, _all_bytes(self._schemas.values())),
@@ -341,7 +341,7 @@ class McapWriter:
                          zlib.crc32(body))
         footer = Footer(
             summary_start=start, summary_offset_start=offset_start, summary_crc=crc)
-        self._write(body + _bytes(footer) + MAGIC)
+        self._write(end + body + _bytes(footer) + MAGIC)
 
     def _all_chunks(self) -> bytes:
         self._chunk_index.seek(0)

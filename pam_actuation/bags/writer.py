@@ -119,7 +119,11 @@ class BagWriter:
     def _split(self) -> None:
         # The next file first: where it cannot be made, the present one can still be finished.
         following = self._next_file()
-        self._finish_file()
+        try:
+            self._finish_file()
+        except BaseException:
+            following.discard()
+            raise
         self._current = following
         self._in_former_files = self.counts
 

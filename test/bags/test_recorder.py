@@ -20,10 +20,15 @@ import shutil
 import threading
 import time
 
+from mcap.records import DataEnd
+from mcap.stream_reader import StreamReader
+from pam_actuation.bags import disk
 from pam_actuation.bags.check import independent_readers
 from pam_actuation.bags.info import bag_info
 from pam_actuation.bags.load import load_run
 from pam_actuation.bags.mcap_scan import scan
+from pam_actuation.bags.mcap_write import MAGIC
+from pam_actuation.bags.place import check_bag_target
 from pam_actuation.bags.recorder import RecorderCore, SequenceCheck
 from pam_actuation.bags.source import read_bag
 from pam_actuation.bags.writer import BagWriter
@@ -361,6 +366,33 @@ def test_a_full_disk_between_two_files_keeps_the_first(tmp_path, monkeypatch):
     assert [path.name for path in (tmp_path / 'run').glob('*.mcap')] == ['run_0.mcap']
     assert len(load_run(tmp_path / 'run').topics['pressure']) == 100
     assert bag_info(tmp_path / 'run').dropped == 100
+
+
+def test_a_disk_too_full_for_the_end_of_a_file_leaves_a_whole_bag(tmp_path, monkeypatch):
+    """The next file is there by then: it goes, and the room with it."""
+    write_all, refused = disk.write_all, []
+
+    def small_disk(stream, data):
+        if data.endswith(MAGIC) and not refused:
+            refused.append(stream.name)
+            raise OSError(errno.ENOSPC, 'No space left on device')
+        write_all(stream, data)
+
+    monkeypatch.setattr(disk, 'write_all', small_disk)
+    core = recorder_on(BagWriter(tmp_path / 'run', METADATA, max_file_s=0.5))
+    for i in range(100):
+        core.receive(TOPIC, payload(i), START_NS, START_NS + i * 10_000_000, i + 1)
+    summary = core.close()
+    assert refused == [str(tmp_path / 'run' / 'run_0.mcap')]
+    assert 'No space left' in summary.write_error and summary.written == 50
+    assert sorted(path.name for path in (tmp_path / 'run').iterdir()) == [
+        'metadata.yaml', 'run_0.mcap']
+    assert check_bag_target(tmp_path / 'run', overwrite=True)
+    for counts in independent_readers(tmp_path / 'run').values():
+        assert counts == {TOPIC: 50}
+    with open(tmp_path / 'run' / 'run_0.mcap', 'rb') as stream:
+        assert [type(one) for one in StreamReader(stream).records].count(DataEnd) == 1
+    assert bag_info(tmp_path / 'run').dropped == 50
 
 
 def test_a_disk_too_full_for_the_index_keeps_what_is_indexed(tmp_path, monkeypatch):
