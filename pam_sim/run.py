@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 # Signals that hold their value until the next message (zero-order hold).
 HELD_TOPICS = (
     'valve_signal', 'valve_command', 'reference', 'pressure_command', 'followed_pressure',
-    'controller_state')
+    'controller_state', 'joint_reference', 'joint_effort', 'co_contraction')
 MEASURED_TOPICS = ('pressure', 'contraction', 'force')
 # A day at 1 kHz; stamps of a broken clock would ask for far more than memory holds.
 MAX_GRID_POINTS = 100_000_000
@@ -273,7 +273,7 @@ class Run:
             stamp_ns = np.asarray(one.stamp_ns, dtype=np.int64)
             order = np.argsort(stamp_ns, kind='stable')
             seconds = (stamp_ns[order] - int(start_ns)) * 1e-9
-            held = _is_held(name, one)
+            held = is_held(name, one)
             values[name] = {
                 key: _held(time_s, seconds, np.asarray(samples, float)[order]) if held
                 else _interpolated(time_s, seconds, np.asarray(samples, float)[order], max_gap_s)
@@ -300,7 +300,7 @@ class Run:
         """
         series = self._chosen(topics)
         ends_ns = {name: int(np.max(one.stamp_ns)) for name, one in series.items()}
-        measured = [name for name, one in series.items() if not _is_held(name, one)]
+        measured = [name for name, one in series.items() if not is_held(name, one)]
         return (max(series, key=lambda name: int(np.min(series[name].stamp_ns))),
                 min(measured, key=ends_ns.__getitem__) if measured
                 else max(series, key=ends_ns.__getitem__))
@@ -359,7 +359,7 @@ class Run:
 
 def _counts(name: str, series: Series, stamp_ns: IntArray) -> BoolArray:
     """Return at which stamps the value of a topic counts: a held one not after a long silence."""
-    if not _is_held(name, series):
+    if not is_held(name, series):
         return np.ones(len(stamp_ns), dtype=bool)
     own_ns = np.sort(series.stamp_ns)
     last_ns = own_ns[np.clip(np.searchsorted(own_ns, stamp_ns, 'right') - 1, 0, None)]
@@ -412,7 +412,8 @@ class Grid:
         return len(self.time_s)
 
 
-def _is_held(name: str, series: Series) -> bool:
+def is_held(name: str, series: Series) -> bool:
+    """Return whether a value of a topic counts until the next one."""
     return name in HELD_TOPICS if series.held is None else series.held
 
 

@@ -25,7 +25,7 @@ from itertools import accumulate
 
 import numpy as np
 from pam_sim.annotations import IntArray
-from pam_sim.run import HELD_TOPICS, Run, Series
+from pam_sim.run import is_held, Run, Series
 
 # A hole is longer than this, and than so many periods of a slow log: within less, a straight line
 # between readings does less harm than a new start.
@@ -131,7 +131,7 @@ def between(run: Run, begin_ns: int, end_ns: int) -> Run:
     topics = {}
     for name, series in run.topics.items():
         inside = (series.stamp_ns >= begin_ns) & (series.stamp_ns <= end_ns)
-        if name in HELD_TOPICS if series.held is None else series.held:
+        if is_held(name, series):
             before = np.flatnonzero(series.stamp_ns < begin_ns)
             inside[before[-1:]] = True
         # Of what holds, the last value from before counts from the begin on.
