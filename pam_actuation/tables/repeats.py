@@ -19,7 +19,7 @@ from dataclasses import replace
 import numpy as np
 from pam_actuation.messages import VALVE_NAMES
 from pam_actuation.tables.importer import Recording
-from pam_actuation.tables.resample import MEASURED
+from pam_actuation.tables.resample import is_measured
 from pam_sim.annotations import BoolArray, FloatArray, IntArray
 from pam_sim.gap.criteria import CRITERIA
 from pam_sim.gap.data.duties import period_of_changes_s, rows_of_periods
@@ -54,7 +54,7 @@ def without_repeats(recording: Recording) -> Recording:
     """
     signals, told = dict(recording.signals), []
     for name, (stamps, values) in recording.signals.items():
-        if name.rpartition('/')[2] not in (*MEASURED, 'angle'):
+        if not is_measured(name):
             continue
         known = np.isfinite(values)
         fresh = fresh_rows(stamps[known], values[known])

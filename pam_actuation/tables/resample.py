@@ -21,11 +21,12 @@ import numpy as np
 from pam_actuation.tables.clock import SLOW_HZ
 from pam_actuation.tables.importer import Recording
 from pam_actuation.tables.signals import BY_NAME
+from pam_actuation.tables.units import ANGLE, LENGTH, PRESSURE
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.errors import InputError
 from pam_sim.gap.data.noise import smallest_step
 
-MEASURED = 'pressure', 'supply_pressure', 'contraction', 'force', 'external_force'
+MEASURED = 'pressure', 'supply_pressure', 'contraction', 'force', 'external_force', 'angle'
 HOLE_STEPS = 5.0             # times the usual step: readings are missing, and nothing is between
 ROUNDING = 1e-9              # of a sample: the grid holds the first and the last reading
 SEED = 0                     # of the noise: the same file gives the same bag
@@ -38,6 +39,9 @@ def resampled(recording: Recording, rate_hz: float) -> Recording:
     A reading tells its value to half a step of its resolution only, and straight lines would
     tell it exactly. So normal noise of the same standard deviation is added to what is measured.
     Where readings are missing nothing is made up.
+
+    A command is straight as well, though a valve holds it: the pressure that answers it is
+    straight. A command in steps beside it would show a slow valve.
 
     Parameters
     ----------
@@ -73,7 +77,7 @@ def resampled(recording: Recording, rate_hz: float) -> Recording:
         grid_s = grid_s[np.diff(time_s)[before] <= HOLE_STEPS * step_s]
         made = np.interp(grid_s, time_s, values)
         fineness = smallest_step(np.unique(values))
-        if name in MEASURED:
+        if is_measured(name):
             made += fineness / math.sqrt(12.0) * random.standard_normal(made.size)
             told.append(f'{name}: read every {step_s:.4g} s, in steps of '
                         f'{_shown(name, fineness)}')
@@ -84,10 +88,15 @@ def resampled(recording: Recording, rate_hz: float) -> Recording:
                    resampled_hz=rate_hz)
 
 
+def is_measured(name: str) -> bool:
+    """Return whether a signal, of a muscle alone or of a joint, is read by a sensor."""
+    return name.rpartition('/')[2] in MEASURED
+
+
 def hint(recording: Recording) -> str:
     """Return a sentence on readings too slow for ``pam gap`` and what can be done, '' without."""
     slow = [name for name, (stamps, values) in recording.signals.items()
-            if name in MEASURED and _usual_step_s(stamps[np.isfinite(values)]) > 1.0 / SLOW_HZ]
+            if is_measured(name) and _usual_step_s(stamps[np.isfinite(values)]) > 1.0 / SLOW_HZ]
     return '' if not slow else (
         f'{", ".join(slow)}: read too slowly for pam gap. For a motion so slow that it is '
         'straight between its readings, such as a loop, add --resample 100')
@@ -98,6 +107,6 @@ def _usual_step_s(stamps: IntArray) -> float:
 
 
 def _shown(name: str, size: float) -> str:
-    unit, factor = {'pressure': ('Pa', 1.0), 'length': ('mm', 1e3)}.get(
-        BY_NAME[name].quantity, ('N', 1.0))
+    unit, factor = {PRESSURE: ('Pa', 1.0), LENGTH: ('mm', 1e3), ANGLE: ('deg', math.degrees(1.0))
+                    }.get(BY_NAME[name].quantity, ('N', 1.0))
     return f'{factor * size:.3g} {unit}'

@@ -51,6 +51,24 @@ def test_straight_between_readings_with_their_resolution():
     assert np.array_equal(made.signals['contraction'][1], again.signals['contraction'][1])
 
 
+def test_what_a_joint_measures_has_its_resolution_too():
+    stamps = readings().signals['contraction'][0]
+    wave = np.rint(10.0 * np.sin(0.1 * np.arange(40)))
+    steps = {'angle': np.radians(0.1), 'flexor/pressure': 5e3, 'extensor/supply_pressure': 2e3,
+             'flexor/ppr_voltage': 0.0, 'reference_angle': 0.0}
+    given = Recording({name: (stamps, (step or 1.0) * wave) for name, step in steps.items()},
+                      TableMapping())
+    made = resampled(given, 100.0)
+    for name, step in steps.items():
+        at, values = made.signals[name]
+        error = values - np.interp(at, *given.signals[name])
+        assert abs(np.std(error) - step / np.sqrt(12.0)) <= 0.1 * step / np.sqrt(12.0) + 1e-12
+    assert [one.split(' ', 1)[0] for one in made.told[:-1]] == [
+        f'{name}:' for name, step in steps.items() if step]
+    assert made.told[0] == 'angle: read every 0.6 s, in steps of 0.1 deg'
+    assert hint(given).startswith('angle, flexor/pressure, extensor/supply_pressure: read too')
+
+
 def test_nothing_is_made_up_where_readings_are_missing():
     stamps, values = readings().signals['contraction']
     values = values.copy()
