@@ -125,7 +125,7 @@ def run(args: argparse.Namespace) -> int:
         recording = resampled(recording, args.resample)
     elif said := hint(recording):
         recording.told.append(said)
-    recording.sources = {Path(file).name: digest_of(file) for file in args.files}
+    recording.sources = [(Path(file).name, digest_of(file)) for file in args.files]
     with progress(args, 1.0, '', 'writing') as bar:
         counts = write_bag(recording, out, rig=model, namespace=args.namespace or '',
                            overwrite=args.overwrite, progress=lambda s: bar.update(s - bar.n))
@@ -247,7 +247,7 @@ def _tell(args: argparse.Namespace, recording: 'Recording', found: 'Guess',
           following: str) -> None:
     import numpy as np
     remarks = [one.sentence for one in recording.found]
-    lines = [f'imported {recording.duration_s:.4g} s from {", ".join(recording.sources)}']
+    lines = [f'imported {recording.duration_s:.4g} s from {", ".join(args.files)}']
     lines += [f'  {text}' for text in recording.told]
     for name, one in recording.mapping.signals.items():
         _, values = recording.signals.get(name, ((), ()))

@@ -58,8 +58,8 @@ class Recording:
         Name of the signal to its stamps [ns] and its values, both of shape (rows,).
     mapping : TableMapping
         How they were read.
-    sources : dict of str to str
-        File to its SHA-256 digest.
+    sources : list of (str, str)
+        Name of each file and its SHA-256 digest; two folders may hold files of one name.
     told : list of str
         How the time was read, one sentence a table.
     found : list of Doubt
@@ -71,7 +71,7 @@ class Recording:
 
     signals: dict[str, tuple[IntArray, FloatArray]]
     mapping: TableMapping
-    sources: dict[str, str] = field(default_factory=dict)
+    sources: list[tuple[str, str]] = field(default_factory=list)
     told: list[str] = field(default_factory=list)
     found: list[Doubt] = field(default_factory=list)
     resampled_hz: float | None = None
@@ -295,11 +295,10 @@ def write_bag(recording: Recording, path: StrPath, *, rig: Any = None, namespace
     """
     metadata = experiment_metadata(
         rig=rig, valve=recording.valve, origin='imported',
-        experiment_name=Path(next(iter(recording.sources), 'table')).stem,
+        experiment_name=Path(recording.sources[0][0] if recording.sources else 'table').stem,
         mapping=recording.mapping.to_yaml(), length_m=_length_told(recording.mapping),
         resampled_hz='' if recording.resampled_hz is None else f'{recording.resampled_hz:g}',
-        sources='\n'.join(f'{name} sha256 {digest}'
-                          for name, digest in recording.sources.items()))
+        sources='\n'.join(f'{name} sha256 {digest}' for name, digest in recording.sources))
     space = namespace_of(namespace or (JOINT if recording.is_of_joint else MUSCLE))
     streams = _streams(recording.signals)
     order = _by_time(streams)

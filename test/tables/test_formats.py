@@ -14,6 +14,7 @@
 
 """Every kind of file, there and back: stamps and values to the bit."""
 
+import hashlib
 import json
 from pathlib import Path
 import struct
@@ -101,6 +102,22 @@ def test_the_same_table_gives_the_same_bag(bag, tmp_path):
         main(['import', str(tmp_path / 'table.csv'), '--out', str(tmp_path / name / 'bag')])
     one, two = (tmp_path / name / 'bag' / 'bag_0.mcap' for name in ('one', 'two'))
     assert one.read_bytes() == two.read_bytes()
+
+
+def test_a_bag_tells_each_of_two_files_of_one_name(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    digests = []
+    for folder, column in (('a', 'p [bar_abs]'), ('b', 'x [mm]')):
+        (tmp_path / folder).mkdir()
+        text = f't_s,{column}\n' + ''.join(f'{k / 100},{1 + k % 5}\n' for k in range(200))
+        (tmp_path / folder / 'log.csv').write_text(text)
+        digests.append(hashlib.sha256(text.encode()).hexdigest())
+    main(['import', 'a/log.csv', 'b/log.csv', '--out', 'bag'])
+    told = capsys.readouterr().out
+    assert 'imported 1.99 s from a/log.csv, b/log.csv' in told
+    # Without the folder: the same files give the same bag wherever they are.
+    assert load_run('bag').metadata['sources'].splitlines() == [
+        f'log.csv sha256 {digest}' for digest in digests]
 
 
 def test_rows_that_one_topic_leaves_out_are_told(bag, tmp_path, capsys):
