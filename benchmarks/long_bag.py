@@ -31,6 +31,7 @@ from pam_actuation.bags import layout
 from pam_actuation.bags.mcap_scan import MAGIC
 from pam_actuation.bags.record_walk import MESSAGE_BYTES, MESSAGE_HEAD, RECORD_BYTES
 from pam_actuation.topics import codec, definitions
+from pam_actuation.topics.quality import USUAL
 from pam_actuation.topics.table import RECORDED, short_name
 import zstandard
 
@@ -94,7 +95,7 @@ class _LongFile:
             schemas.append(_bytes_of(Schema(
                 i, definitions.schema_text(type_name).encode(), 'ros2msg', type_name)))
             channels.append(_bytes_of(Channel(i, name, 'cdr', {
-                'offered_qos_profiles': layout.to_yaml([layout.qos_profile()]),
+                'offered_qos_profiles': layout.to_yaml([layout.qos_profile(USUAL.publisher)]),
                 'topic_type_hash': definitions.type_hash(type_name)}, i)))
         return schemas + channels
 

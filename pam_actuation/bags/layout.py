@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import Any
 
 from pam_actuation.bags import disk
+from pam_actuation.topics.quality import Quality
 from pam_sim.files import StrPath
 import yaml
 
@@ -52,14 +53,13 @@ class TopicFacts:
     count: int
 
 
-def qos_profile(depth: int = 10, reliability: str = 'reliable', durability: str = 'volatile',
-                history: str = 'keep_last') -> dict[str, Any]:
+def qos_profile(quality: Quality) -> dict[str, Any]:
     """Return one offered QoS profile as rosbag2 Jazzy writes it (policies as words)."""
     return {
-        'history': history,
-        'depth': depth,
-        'reliability': reliability,
-        'durability': durability,
+        'history': 'keep_last',
+        'depth': quality.depth,
+        'reliability': quality.reliability,
+        'durability': quality.durability,
         'deadline': dict(_INFINITE),
         'lifespan': dict(_INFINITE),
         'liveliness': 'automatic',

@@ -21,7 +21,7 @@ the disk cannot follow, the newest messages are dropped and counted.
 """
 
 from collections import deque
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping
 import contextlib
 from dataclasses import asdict, dataclass, field, replace
 import os
@@ -189,8 +189,8 @@ class RecorderCore:
         self._syncing = threading.Thread(target=self._sync, name='bag_sync', daemon=True)
         self._syncing.start()
 
-    def add_topic(self, full_name: str, type_name: str, check_sequence: bool | None = None,
-                  qos: Sequence[dict[str, Any]] | None = None) -> None:
+    def add_topic(self, full_name: str, type_name: str,
+                  check_sequence: bool | None = None) -> None:
         """
         Announce a topic before its messages.
 
@@ -198,7 +198,7 @@ class RecorderCore:
         default everywhere but on ``/diagnostics``, where many nodes publish.
         """
         with self._disk:
-            self._writer.add_topic(full_name, type_name, qos)
+            self._writer.add_topic(full_name, type_name)
         with self._wake:
             self._counts.setdefault(full_name, TopicCounts())
             self._sent.setdefault(full_name, SentTimes())

@@ -21,7 +21,7 @@ records. With a limit of size or time ``run_1.mcap`` and so on follow, each a co
 file. ``run/metadata.yaml`` appears, complete, at close.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 import contextlib
 from pathlib import Path
 from typing import Any, Self
@@ -30,6 +30,8 @@ from pam_actuation.bags import disk, layout
 from pam_actuation.bags.data_file import DataFile
 from pam_actuation.bags.place import BagPlace
 from pam_actuation.topics.definitions import type_hash
+from pam_actuation.topics.quality import USUAL
+from pam_actuation.topics.table import BY_NAME, short_name
 from pam_sim.annotations import ByteArray, IntArray
 from pam_sim.errors import InputError
 from pam_sim.files import StrPath
@@ -144,14 +146,13 @@ class BagWriter:
         """Return the path of the newest file."""
         return self.files[-1]
 
-    def add_topic(self, full_name: str, type_name: str,
-                  qos: Sequence[dict[str, Any]] | None = None) -> None:
+    def add_topic(self, full_name: str, type_name: str) -> None:
         """
         Announce a topic; a second call with the same type changes nothing.
 
-        ``qos`` is a list of offered profiles (``layout.qos_profile``), by default
-        reliable, volatile, keep last 10. Raises InputError for a name that is not
-        absolute, a type that ROS 2 Jazzy does not have, or another type than before.
+        The bag states the quality of service of its publisher, as the table of topics has it.
+        Raises InputError for a name that is not absolute, a type that ROS 2 Jazzy does not have,
+        or another type than before.
         """
         if full_name in self._topics:
             if self._topics[full_name]['type'] != type_name:
@@ -161,10 +162,10 @@ class BagWriter:
             return
         if not full_name.startswith('/') or full_name.endswith('/'):
             raise InputError('give the full topic name, such as /muscle/pressure', full_name)
-        profiles = [layout.qos_profile()] if qos is None else list(qos)
+        row = BY_NAME.get(short_name(full_name))
+        profile = layout.qos_profile((row.service if row else USUAL).publisher)
         self._topics[full_name] = {
-            'type': type_name, 'qos': tuple(profiles), 'hash': type_hash(type_name),
-            'count': 0}
+            'type': type_name, 'qos': (profile,), 'hash': type_hash(type_name), 'count': 0}
         facts = self._topics[full_name]
         self._open.register(full_name, type_name, facts['qos'], facts['hash'])
 

@@ -14,6 +14,7 @@
 
 """The written bag: Jazzy layout, and readable by the two independent readers."""
 
+from dataclasses import replace
 from pathlib import Path
 import tracemalloc
 
@@ -25,7 +26,8 @@ from pam_actuation.bags.check import independent_readers
 from pam_actuation.bags.source import read_bag
 from pam_actuation.bags.writer import BagWriter
 from pam_actuation.topics import codec, definitions
-from pam_actuation.topics.table import RECORDED
+from pam_actuation.topics.quality import LATCHED, Quality, Service, USUAL
+from pam_actuation.topics.table import BY_NAME, RECORDED
 from pam_sim.errors import InputError
 import pytest
 from rosbags.highlevel import AnyReader
@@ -66,6 +68,27 @@ def test_rosbags_sees_the_metadata_file(bag):
             profile, = connection.ext.offered_qos_profiles
             assert (profile.history.name, profile.reliability.name) == ('KEEP_LAST', 'RELIABLE')
             assert connection.digest == definitions.type_hash(connection.msgtype)
+
+
+def test_each_topic_states_the_quality_of_its_publisher(tmp_path, monkeypatch):
+    latched = replace(BY_NAME['marker'], service=Service(LATCHED, LATCHED, LATCHED))
+    monkeypatch.setitem(BY_NAME, 'marker', latched)
+    with BagWriter(tmp_path / 'run', {}) as writer:
+        for name in ('pressure', 'marker'):
+            writer.add_topic(f'/muscle/{name}', BY_NAME[name].type_name)
+        writer.add_topic('/bench/imu', 'sensor_msgs/msg/Imu')
+    facts = yaml.safe_load((tmp_path / 'run' / 'metadata.yaml').read_text())[layout.METADATA_ROOT]
+    stated = {}
+    for row in facts['topics_with_message_count']:
+        profile, = row['topic_metadata']['offered_qos_profiles']
+        stated[row['topic_metadata']['name']] = Quality(
+            profile['depth'], profile['reliability'], profile['durability'])
+    assert stated == {'/muscle/pressure': USUAL.publisher, '/muscle/marker': LATCHED,
+                      '/bench/imu': USUAL.publisher}
+    with open(tmp_path / 'run' / 'run_0.mcap', 'rb') as stream:
+        for channel in make_reader(stream).get_summary().channels.values():
+            profile, = yaml.safe_load(channel.metadata['offered_qos_profiles'])
+            assert profile['depth'] == stated[channel.topic].depth
 
 
 def test_mcap_ros2_decodes_with_the_embedded_definitions(bag):
