@@ -78,14 +78,14 @@ class McapWriter:
     """
     One file being written.
 
+    A chunk of ``CHUNK_BYTES`` is closed; ``close_chunk`` closes it earlier.
+
     Parameters
     ----------
     write : callable
         Takes bytes and writes all of them, or raises OSError.
     profile, library : str
         Content of the header.
-    chunk_bytes : int
-        A chunk of this size is closed; ``close_chunk`` closes it earlier.
     index : binary file, optional
         Empty, seekable: keeps the index of the chunks (about 200 bytes each) until ``finish``,
         so that hours of recording need no memory. In memory by default.
@@ -100,9 +100,8 @@ class McapWriter:
     """
 
     def __init__(self, write: Callable[[bytes], object], profile: str = 'ros2', library: str = '',
-                 chunk_bytes: int = CHUNK_BYTES, index: BinaryIO | None = None) -> None:
+                 index: BinaryIO | None = None) -> None:
         self._write_all = write
-        self._chunk_bytes = chunk_bytes
         self._compressor = zstandard.ZstdCompressor()
         self.offset = 0
         self._schemas: dict[int, Schema] = {}
@@ -159,7 +158,7 @@ class McapWriter:
             index = self._index[channel] = []
         index += (log_time_ns, self.pending)
         self.pending += MESSAGE.size + size
-        if self.pending >= self._chunk_bytes:
+        if self.pending >= CHUNK_BYTES:
             self.close_chunk()
 
     def add_series(self, series: Sequence[MessageSeries]) -> None:
@@ -179,7 +178,7 @@ class McapWriter:
         ends = np.cumsum(np.array([one.shape[1] for one in records])[which])
         first, done = 0, 0
         while first < which.size:
-            full = done + self._chunk_bytes - self.pending
+            full = done + CHUNK_BYTES - self.pending
             last = min(int(np.searchsorted(ends, full)) + 1, which.size)
             size = int(ends[last - 1]) - done
             part, times = np.empty(size, np.uint8), time_ns[first:last]
@@ -191,7 +190,7 @@ class McapWriter:
                 self._index.setdefault(series[place].channel, []).extend(np.column_stack(
                     [times[own], begin + self.pending]).ravel().tolist())
             self._append(part.tobytes())
-            if self.pending >= self._chunk_bytes:
+            if self.pending >= CHUNK_BYTES:
                 self.close_chunk()
             first, done = last, done + size
 

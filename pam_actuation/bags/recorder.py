@@ -21,7 +21,7 @@ the disk cannot follow, the newest messages are dropped and counted.
 """
 
 from collections import deque
-from collections.abc import Hashable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 import contextlib
 from dataclasses import asdict, dataclass, field, replace
 import os
@@ -119,20 +119,20 @@ class SequenceCheck:
     """
     Finds gaps in sequence numbers that count from 1 per publisher.
 
-    Several publishers of one topic are separated by the ``publisher`` given with each number, or
-    else by continuity. A number continues the publisher that expects it. One lower than every
-    expected number begins a new publisher. Any other is the smallest possible gap.
+    Several publishers of one topic are separated by continuity. A number continues the publisher
+    that expects it. One lower than every expected number begins a new publisher. Any other is the
+    smallest possible gap.
     """
 
     def __init__(self) -> None:
         self.lost = 0
         self.missed_at_start = 0
         self.publishers = 0
-        self._expected: dict[Hashable, list[int]] = {}
+        self._expected: list[int] = []
 
-    def add(self, sequence: int, publisher: Hashable = None) -> None:
+    def add(self, sequence: int) -> None:
         """Take the sequence number of the next message of the topic."""
-        expected = self._expected.setdefault(publisher, [])
+        expected = self._expected
         # The publisher heard last is tried first.
         for i in range(len(expected) - 1, -1, -1):
             if expected[i] == sequence:
@@ -189,26 +189,22 @@ class RecorderCore:
         self._syncing = threading.Thread(target=self._sync, name='bag_sync', daemon=True)
         self._syncing.start()
 
-    def add_topic(self, full_name: str, type_name: str,
-                  check_sequence: bool | None = None) -> None:
+    def add_topic(self, full_name: str, type_name: str) -> None:
         """
         Announce a topic before its messages.
 
-        ``check_sequence`` says whether sequence numbers are watched for gaps; by
-        default everywhere but on ``/diagnostics``, where many nodes publish.
+        Sequence numbers are watched for gaps, but on ``/diagnostics``, where many nodes publish.
         """
         with self._disk:
             self._writer.add_topic(full_name, type_name)
         with self._wake:
             self._counts.setdefault(full_name, TopicCounts())
             self._sent.setdefault(full_name, SentTimes())
-            watch = full_name != DIAGNOSTICS if check_sequence is None else check_sequence
-            if watch:
+            if full_name != DIAGNOSTICS:
                 self._checks.setdefault(full_name, SequenceCheck())
 
     def receive(self, full_name: str, data: bytes, source_timestamp_ns: int,
-                receive_timestamp_ns: int, sequence: int | None = None,
-                publisher: Hashable = None) -> bool:
+                receive_timestamp_ns: int, sequence: int | None = None) -> bool:
         """
         Take one serialized message; returns False if it had to be dropped.
 
@@ -223,8 +219,6 @@ class RecorderCore:
         sequence : int, optional
             The publisher's sequence number of this message, counted from 1; 0 or
             None where the middleware has none.
-        publisher : hashable, optional
-            Who sent it, where the middleware tells.
 
         """
         with self._wake:
@@ -232,7 +226,7 @@ class RecorderCore:
             counts.received += 1
             check = self._checks.get(full_name)
             if check is not None and sequence:
-                check.add(sequence, publisher)
+                check.add(sequence)
                 counts.lost = check.lost
                 counts.missed_at_start = check.missed_at_start
                 counts.publishers = check.publishers

@@ -87,10 +87,9 @@ def _rises_without_name(table: Table, mapping: TableMapping) -> bool:
         return False
 
 
-def clock_of(table: Table, mapping: TableMapping, start_ns: int = START_NS,
-             sort: bool = False, part: int = 0) -> Clock:
+def clock_of(table: Table, mapping: TableMapping, sort: bool = False, part: int = 0) -> Clock:
     """
-    Return the times of the rows.
+    Return the times of the rows; time 0 is ``START_NS`` where they do not count from 1970.
 
     Parameters
     ----------
@@ -98,8 +97,6 @@ def clock_of(table: Table, mapping: TableMapping, start_ns: int = START_NS,
         The table.
     mapping : TableMapping
         What the user said of its time.
-    start_ns : int
-        Stamp of time 0, where the times do not count from 1970.
     sort : bool
         Put the rows in order of time.
     part : int
@@ -118,9 +115,8 @@ def clock_of(table: Table, mapping: TableMapping, start_ns: int = START_NS,
                              'give one of them', f'--part {part}')
         rows = np.arange(len(table), dtype=np.int64)
         numbers = rows if table.numbered is None else table.numbered
-        stamps = start_ns + np.round(numbers * (1e9 / mapping.rate_hz)).astype(np.int64)
-        return Clock(stamps, rows, f'{mapping.rate_hz:g} rows a second',
-                     _hidden(table, mapping, start_ns))
+        stamps = START_NS + np.round(numbers * (1e9 / mapping.rate_hz)).astype(np.int64)
+        return Clock(stamps, rows, f'{mapping.rate_hz:g} rows a second', _hidden(table, mapping))
     column = time_column(table, mapping)
     if column is None:
         if table.stamp_ns is None:
@@ -129,15 +125,15 @@ def clock_of(table: Table, mapping: TableMapping, start_ns: int = START_NS,
                 'equal distances', table.source)
         read = Times(table.stamp_ns, f'times of the messages on {table.topic}')
     else:
-        read = _from_column(table, column, start_ns)
+        read = _from_column(table, column)
     return _with_gaps(table, in_order(table, read, sort, part))
 
 
-def _hidden(table: Table, mapping: TableMapping, start_ns: int) -> tuple[str, ...]:
+def _hidden(table: Table, mapping: TableMapping) -> tuple[str, ...]:
     """Return a remark on a time that runs back where the rows are taken at equal distances."""
     column = time_column(table, replace(mapping, rate_hz=None))
     try:
-        stamps = None if column is None else _from_column(table, column, start_ns).stamp_ns
+        stamps = None if column is None else _from_column(table, column).stamp_ns
     except InputError:          # no time that could be read
         return ()
     row = int(np.argmin(np.diff(stamps))) + 1 if stamps is not None and len(stamps) > 1 else 0
@@ -153,25 +149,25 @@ def _line(place: str) -> str:
     return place.partition(':')[2] and f'line {place.rpartition(":")[2]}' or place
 
 
-def _from_column(table: Table, column: TimeMap, start_ns: int) -> Times:
+def _from_column(table: Table, column: TimeMap) -> Times:
     """Return the times in a column."""
     import pandas as pd
     name = table.require(column.column, column.where)
     values = table.columns[name]
     is_date = pd.api.types.is_datetime64_any_dtype(values)
     if column.unit in ('', DATE) and (pair := pair_of(table, name)) is not None:
-        return _paired(table, *pair, start_ns)
+        return _paired(table, *pair)
     if column.unit in ('', DATE) and holds_dates(values):
         raise InputError(
             f'column "{name}" holds dates without a time of day, and no column is known to hold '
             'that; add --map time="COLUMN:s", or --rate HZ for rows at equal distances',
             table.source)
     if is_date or column.unit in ('', DATE) and _is_text_date(values):
-        return _dates(table, name, start_ns)
+        return _dates(table, name)
     unit = column.unit or _unit_of_name(table, name)
     if pd.api.types.is_integer_dtype(values) and unit == 'ns':
         stamps = values.to_numpy(dtype=np.int64)
-        start = 0 if len(stamps) and abs(int(stamps[0])) > EPOCH_S * 1e9 else start_ns
+        start = 0 if len(stamps) and abs(int(stamps[0])) > EPOCH_S * 1e9 else START_NS
         return Times(start + stamps, f'column "{name}" in ns')
     numbers = table.numbers(name)
     missing = np.flatnonzero(~np.isfinite(numbers))
@@ -187,7 +183,7 @@ def _from_column(table: Table, column: TimeMap, start_ns: int) -> Times:
                          f'MATLAB; add --map time="{name}:s" (or ms, us, ns)', table.source)
     unit = unit or _unit_by_rate(table, name, numbers)
     factor = FACTORS[TIME][unit]
-    start = 0 if len(numbers) and numbers[0] * factor > EPOCH_S else start_ns
+    start = 0 if len(numbers) and numbers[0] * factor > EPOCH_S else START_NS
     # Whole numbers of the unit first: their product with a power of ten is exact.
     stamps = start + np.round(numbers * (factor * 1e9)).astype(np.int64)
     return Times(stamps, f'column "{name}" in {unit}', _resolution_ns(stamps - start),
@@ -203,7 +199,7 @@ def _is_text_date(values: 'pd.Series') -> bool:
     return bool(re.search(r'\d[-/:.]\d', first)) and not re.fullmatch(r'[+-]?[\d.]+', first)
 
 
-def _dates(table: Table, name: str, start_ns: int) -> Times:
+def _dates(table: Table, name: str) -> Times:
     """Return the times in a column of texts, or of dates as other files hold them."""
     import pandas as pd
     values = table.columns[name]
@@ -218,19 +214,19 @@ def _dates(table: Table, name: str, start_ns: int) -> Times:
         raise InputError(
             f'column "{name}" holds {str(values.iloc[found])!r}, which is no date and time as in '
             '2026-11-25T09:30:00.125', table.place(found))
-    stamps = found.stamp_ns + (start_ns if found.is_of_day else 0)
+    stamps = found.stamp_ns + (START_NS if found.is_of_day else 0)
     return Times(stamps, f'column "{name}", {found.told}', _resolution_ns(found.stamp_ns),
                  found.remark)
 
 
-def _paired(table: Table, date: str, time: str, start_ns: int) -> Times:
+def _paired(table: Table, date: str, time: str) -> Times:
     """Return the times whose date is in one column and whose time of day in another."""
     found = dates_of_pair(table, date, time)
     if isinstance(found, int):
         texts = ' '.join(str(table.columns[name].iloc[found]) for name in (date, time))
         raise InputError(f'columns "{date}" and "{time}" hold {texts!r}, which is no date and '
                          'time as in 2026-11-25 09:30:00.125', table.place(found))
-    return Times(found.stamp_ns + (start_ns if found.is_of_day else 0),
+    return Times(found.stamp_ns + (START_NS if found.is_of_day else 0),
                  f'columns "{date}" and "{time}", {found.told}',
                  _resolution_ns(found.stamp_ns), found.remark)
 

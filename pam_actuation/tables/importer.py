@@ -26,7 +26,7 @@ from pam_actuation.bags.message_writer import MessageWriter
 from pam_actuation.bags.metadata import experiment_metadata
 from pam_actuation.bags.plausibility import Size
 from pam_actuation.bags.writer import BagWriter
-from pam_actuation.messages import START_NS, VALVE_NAMES
+from pam_actuation.messages import VALVE_NAMES
 from pam_actuation.namespaces import JOINT, MUSCLE, namespace_of
 from pam_actuation.tables.clock import clock_of
 from pam_actuation.tables.guess import is_exported, unit_of_column
@@ -115,9 +115,9 @@ class Recording:
 
 
 def recording_of(tables: Sequence[Table], mapping: TableMapping, *, size: Size,
-                 start_ns: int = START_NS, sort: bool = False, part: int = 0,
-                 missing: Collection[str] = (), accept: bool = False, begin_s: float = 0.0,
-                 end_s: float = float('inf')) -> Recording:
+                 sort: bool = False, part: int = 0, missing: Collection[str] = (),
+                 accept: bool = False, begin_s: float = 0.0, end_s: float = float('inf')
+                 ) -> Recording:
     """
     Return the signals in tables.
 
@@ -131,7 +131,7 @@ def recording_of(tables: Sequence[Table], mapping: TableMapping, *, size: Size,
         Columns and units of the signals.
     size : Size
         Of the muscle.
-    start_ns, sort, part
+    sort, part
         As ``clock_of``.
     missing : collection of str
         Texts that stand for missing values.
@@ -154,7 +154,7 @@ def recording_of(tables: Sequence[Table], mapping: TableMapping, *, size: Size,
                 if (column := table.name_of(one.column)) is not None}
         if not held:
             continue
-        clock = clock_of(table, mapping, start_ns, sort, part)
+        clock = clock_of(table, mapping, sort, part)
         if clock.jump and not accept:
             raise InputError(f'{clock.jump}. (--accept takes them as they are)')
         result.told.append(f'{Path(table.source).name}: time from {clock.told}')

@@ -275,10 +275,10 @@ def test_diagnostics_have_no_sequence_check(tmp_path):
     assert summary.counts['/diagnostics'].lost is None and summary.complete
 
 
-def check(sequence, **options):
+def check(sequence):
     result = SequenceCheck()
     for number in sequence:
-        result.add(number, **options)
+        result.add(number)
     return result.lost, result.missed_at_start, result.publishers
 
 
@@ -300,13 +300,6 @@ def test_publishers_that_come_late_and_vanish_are_counted_honestly():
     # A late one with a high number cannot be told from a gap: the sum of both is right.
     lost, missed, _ = check([1, 2, 3, 50, 51, 4, 5, 52])
     assert lost + missed == 49
-
-
-def test_given_publishers_are_counted_apart():
-    result = SequenceCheck()
-    for publisher, number in (('a', 5), ('b', 900), ('a', 6), ('b', 902), ('a', 7)):
-        result.add(number, publisher)
-    assert (result.lost, result.missed_at_start, result.publishers) == (1, 4 + 899, 2)
 
 
 @pytest.mark.timed
