@@ -15,9 +15,8 @@
 """
 HTML pages about recorded runs: metrics, zoomable plots, rules, replay, gap.
 
-``pages.experiment_report`` and ``pages.bag_report`` write the page of one or
-several bags, ``demo_page.demo_report`` the page of the demo, and
-``gap.write_gap`` the result folder of a gap look. ``metrics`` holds the
-figures of merit as pure functions; ``sections`` one file per kind of section.
+``pages.bag_report`` writes the page of one or several bags, ``demo_page.demo_report`` that of the
+demo, and ``gap.write_gap`` the result folder of a gap look. ``metrics`` holds the figures of merit
+as pure functions; ``sections`` one file per kind of section.
 A page is one file that needs no network.
 """

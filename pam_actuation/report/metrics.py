@@ -20,7 +20,7 @@ they need. They return None if a topic is missing, so a page can leave a cell em
 failing.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from typing import Any, TYPE_CHECKING
 
@@ -317,8 +317,7 @@ def air_fed(run: 'Run', conductance_m3_per_s_pa: float, critical_ratio: float,
     return float(np.sum(0.5 * (flow[1:] + flow[:-1]) * np.diff(time_s)))
 
 
-def run_metrics(run: 'Run', parts: Sequence[Cycles] | None = None,
-                rig: 'Rig | None' = None) -> RunMetrics:
+def run_metrics(run: 'Run', rig: 'Rig | None' = None) -> RunMetrics:
     """
     Return the RunMetrics of a run.
 
@@ -326,14 +325,12 @@ def run_metrics(run: 'Run', parts: Sequence[Cycles] | None = None,
     ----------
     run : pam_sim.run.Run
         The recording.
-    parts : sequence of (start_s, period_s, count), optional
-        Of the repeating parts; by default as ``errors.find_parts``.
     rig : pam_sim.rig.Rig, optional
         Gives muscle and data sheet of the valves; without it air use, the air through the fill
         valve and the shares at the limits of a regulator are None.
 
     """
-    parts = find_parts(run) if parts is None else parts
+    parts = find_parts(run)
     tracked, pulled = tracking_error(run), force_error(run)
     cycles_m, cycles_n = part_rmse(tracked, parts), part_rmse(pulled, parts)
     error = None if tracked is None else tracked[1]

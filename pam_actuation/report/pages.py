@@ -23,14 +23,11 @@ from pam_actuation.report.full_valves import full_valves_section
 from pam_actuation.report.metrics import run_metrics, RunMetrics
 from pam_actuation.report.page import paragraph, render, Section, signed, table
 from pam_actuation.report.sections.cycles import cycles
-from pam_actuation.report.sections.gap import gap_section
 from pam_actuation.report.sections.markers import markers_sections
 from pam_actuation.report.sections.metrics_table import metrics
 from pam_actuation.report.sections.over_seeds import over_seeds, seeds_section
 from pam_actuation.report.sections.overlaid import overlaid
 from pam_actuation.report.sections.provenance import provenance
-from pam_actuation.report.sections.replay import controller_replays, overlays
-from pam_actuation.report.sections.rules import rules
 from pam_actuation.report.sections.signals_plot import time_plots
 from pam_actuation.report.sections.timing import timing
 from pam_sim import load_rig
@@ -38,12 +35,8 @@ from pam_sim.errors import InputError
 from pam_sim.files import StrPath, write_text
 
 if TYPE_CHECKING:
-    from pam_actuation.control.sofc.rule_table import RuleBase
-    from pam_actuation.replay.controller import ReplayResult
     from pam_actuation.report.errors import Cycles
-    from pam_actuation.report.sections.replay import Overlay
     from pam_sim.annotations import FloatArray
-    from pam_sim.gap import GapResult
     from pam_sim.rig import Rig
     from pam_sim.run import Run
 
@@ -69,16 +62,10 @@ def recorded_metrics(run: 'Run') -> RunMetrics:
     return run_metrics(run, rig=recorded_rig(run))
 
 
-def experiment_report(runs: 'Sequence[Run]', out_path: StrPath,
-                      titles: Sequence[str] | None = None,
-                      rules_before: 'RuleBase | None' = None,
-                      rules_after: 'RuleBase | None' = None,
-                      overlay: 'list[Overlay] | None' = None,
-                      replays: 'list[tuple[str, ReplayResult]] | None' = None,
-                      gap: 'GapResult | None' = None, page_title: str | None = None,
-                      of: str = '') -> dict[str, dict[str, Any]]:
+def bag_report(runs: 'Sequence[Run]', out_path: StrPath, titles: Sequence[str] | None = None,
+               of: str = '') -> dict[str, dict[str, Any]]:
     """
-    Write the HTML page of one or several runs.
+    Write the HTML page of one or several runs: what was recorded.
 
     Parameters
     ----------
@@ -88,16 +75,6 @@ def experiment_report(runs: 'Sequence[Run]', out_path: StrPath,
         File to write, atomically.
     titles : list of str, optional
         Short name of every run.
-    rules_before, rules_after : RuleBase, optional
-        Rules of the first run at its start and end.
-    overlay : list of Overlay, optional
-        Simulated against recorded signals of the first run.
-    replays : list of (title, result), optional
-        Controller replays.
-    gap : pam_sim.gap.GapResult, optional
-        Gap of the first run against a model.
-    page_title : str, optional
-        Heading; by default made of the experiment's name.
     of : str
         Words in the head of the page that tell which bags it shows.
 
@@ -124,20 +101,12 @@ def experiment_report(runs: 'Sequence[Run]', out_path: StrPath,
     for k, (title, run) in enumerate(zip(titles, runs)):
         heading = 'Signals over time' + (f': {title}' if len(runs) > 1 else '')
         sections.append(time_plots(run, f'signals-{k}', heading))
-    if rules_after is not None:
-        sections.append(rules(rules_before, rules_after))
-    if overlay:
-        sections.append(overlays(overlay))
-    if replays:
-        sections.append(controller_replays(replays))
     sections += markers_sections(list(zip(titles, runs)))
     sections.append(timing(list(zip(titles, runs, measured))))
-    if gap is not None:
-        sections.append(gap_section(gap))
     sections.append(provenance(list(zip(titles, runs))))
     name = (runs[0].metadata or {}).get('experiment_name') or 'Recording'
     write_text(out_path, render(
-        page_title or f'Experiment {name}', 'Tracking of a pneumatic muscle on the rig: '
+        f'Experiment {name}', 'Tracking of a pneumatic muscle on the rig: '
         'what was asked, what it did, and how well.', [s for s in sections if s],
         run_numbers(named), FOOTER, of))
     facts = {title: m.to_dict() for title, m in named}
@@ -202,13 +171,3 @@ def cycle_numbers(what: str, values: 'FloatArray', parts: 'Sequence[Cycles]', ti
             f'{what}, first → last cycle' + (f' of {hz}' if hz else ''),
             f'{title}: {signed(100 * (last / first - 1))} %', ''))
     return numbers
-
-
-def bag_report(runs: 'Sequence[Run]', out_path: StrPath, titles: Sequence[str] | None = None,
-               of: str = '') -> dict[str, dict[str, Any]]:
-    """
-    Write the page of some bags; as ``experiment_report``, and return the main numbers.
-
-    A gap result or rules are not computed here; the page shows what was recorded.
-    """
-    return experiment_report(runs, out_path, titles=titles, of=of)

@@ -23,6 +23,7 @@ from pam_actuation.control.sofc.rule_table import linear_feedback_table, RuleBas
 from pam_actuation.report import demo_page, figures, page, pages
 from pam_actuation.report.sections.over_seeds import same_remarks
 from pam_actuation.report.sections.replay import Overlay
+from pam_actuation.report.sections.rules import rules as rules_section
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.files import write_text
@@ -80,14 +81,9 @@ def overlay(run):
 
 def test_a_report_is_complete_and_needs_no_network(tmp_path):
     run = tracking_run(AMPLITUDES, metadata=METADATA)
-    before, after = rules()
-    replay = SimpleNamespace(identical=True, max_abs_difference_pa=0.0, recorded_pa=np.zeros(9))
-    found = pages.experiment_report(
-        [run], tmp_path / 'out' / 'page.html', ['learning'], before, after, overlay(run),
-        [('learning', replay)], gap())
+    found = pages.bag_report([run], tmp_path / 'out' / 'page.html', ['learning'])
     html, plots = markup(tmp_path / 'out' / 'page.html')
-    for key in ('metrics', 'cycles', 'signals-0', 'rules', 'overlays', 'replay', 'timing', 'gap',
-                'provenance'):
+    for key in ('metrics', 'cycles', 'signals-0', 'timing', 'provenance'):
         assert f'id="{key}"' in html
     for title in ('contraction [mm]', 'pressure [kPa gauge]', 'force [N]', 'valve voltage [V]'):
         assert any(title == axis.get('title', {}).get('text')
@@ -102,7 +98,7 @@ def test_a_report_is_complete_and_needs_no_network(tmp_path):
 
 def test_text_from_a_bag_cannot_become_markup(tmp_path):
     run = tracking_run(AMPLITUDES, metadata=METADATA)
-    pages.experiment_report([run], tmp_path / 'page.html', ['</script><b>'])
+    pages.bag_report([run], tmp_path / 'page.html', ['</script><b>'])
     content = (tmp_path / 'page.html').read_text()
     assert '<script>alert' not in content
     assert '</script><b>' not in content
@@ -251,9 +247,11 @@ def test_the_demo_page_is_small_and_has_the_key_numbers(tmp_path):
     learning = tracking_run(AMPLITUDES, noise_m=1e-5)
     frozen = tracking_run([2e-3] * 5, noise_m=1e-5)
     before, after = rules()
+    replay = SimpleNamespace(identical=True, max_abs_difference_pa=0.0, recorded_pa=np.zeros(9))
     parts = [demo_page.DemoPart('PPR', 'One paragraph.',
                                 [('PPR, learning', learning), ('PPR, frozen', frozen)],
-                                before, after, overlay(learning)),
+                                before, after, overlay(learning),
+                                [('PPR, learning', replay)]),
              demo_page.DemoPart('HSV', 'One paragraph.',
                                 [('HSV, learning', tracking_run(AMPLITUDES, valve='hsv'))])]
     tuning = {'cost_before_mm': 1.0, 'changed': {'lead_s': {'before': 0.1, 'after': 0.12}},
@@ -268,11 +266,12 @@ def test_the_demo_page_is_small_and_has_the_key_numbers(tmp_path):
     bars = next(p for p in plots if p['data'][0]['type'] == 'bar')
     assert [trace['name'] for trace in bars['data']] == ['PPR, learning', 'PPR, frozen']
     assert 'A note.' in html and 'duty' in str(plots) and 'lead_s' in html
+    for key in ('part1-rules', 'part1-overlays', 'part1-replay', 'tuning', 'gap', 'provenance'):
+        assert f'id="{key}"' in html
 
 
 def test_rule_maps_share_one_colour_scale(tmp_path):
-    before, after = rules()
-    pages.experiment_report([step_run()], tmp_path / 'page.html', None, before, after)
+    write_text(tmp_path / 'page.html', rules_section(*rules()).body)
     _, plots = markup(tmp_path / 'page.html')
     maps = [t for p in plots for t in p['data'] if t['type'] == 'heatmap']
     assert len(maps) == 4

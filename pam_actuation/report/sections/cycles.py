@@ -27,7 +27,7 @@ ROLES = ('after', 'frozen', 'second', 'green', 'command')
 
 
 def cycles(named: 'list[tuple[str, RunMetrics]]', key: str = 'cycles',
-           title: str = 'Tracking error per cycle', remark: str = '') -> Section | None:
+           remark: str = '') -> Section | None:
     """
     Return the bar chart of the RMSE of every cycle, or None if no run has cycles.
 
@@ -35,8 +35,8 @@ def cycles(named: 'list[tuple[str, RunMetrics]]', key: str = 'cycles',
     ----------
     named : list of (title, RunMetrics)
         Runs of the same experiment, for example with learning and frozen.
-    key, title, remark : str
-        Anchor, heading, and a sentence above the chart.
+    key, remark : str
+        Anchor, and a sentence above the chart.
 
     """
     tracked = [(name, m) for name, m in named if len(m.cycle_rmse_m)]
@@ -49,4 +49,5 @@ def cycles(named: 'list[tuple[str, RunMetrics]]', key: str = 'cycles',
     groups = [(name, m.cycle_rmse_m * 1e3, ROLES[k % len(ROLES)])
               for k, (name, m) in enumerate(tracked)]
     figure = figures.bars(labels, groups, 'cycle', 'tracking RMSE [mm]')
-    return Section(key, title, (paragraph(remark) if remark else '') + plot(figure))
+    body = (paragraph(remark) if remark else '') + plot(figure)
+    return Section(key, 'Tracking error per cycle', body)

@@ -38,8 +38,7 @@ SIZES = ('signal', 'noise floor', 'given model', 'numbers calibrated', 'final mo
 EXPLAINS_NOTHING = 0.0005        # a share that is shown as 0.0 %
 
 
-def gap_section(result: 'GapResult', key: str = 'gap', title: str = 'Recording against model',
-                remark: str = '', max_points: int = 2000,
+def gap_section(result: 'GapResult', max_points: int = 2000,
                 command: str = 'pam run next_experiment.yaml') -> Section:
     """
     Return the section of a gap result.
@@ -48,16 +47,13 @@ def gap_section(result: 'GapResult', key: str = 'gap', title: str = 'Recording a
     ----------
     result : pam_sim.gap.GapResult
         The result.
-    key, title, remark : str
-        Anchor, heading, and a sentence above.
     max_points : int
         Most points per trace.
     command : str
         How the next experiment is run.
 
     """
-    body = paragraph(remark) if remark else ''
-    body += ''.join(map(paragraph, result.model_lines))
+    body = ''.join(map(paragraph, result.model_lines))
     body += paragraph(result.place) if result.place else ''
     body += paragraph(f'{VERDICT_TEXT.get(result.verdict, result.verdict)}. {result.reason}')
     body += _subsystems(result)
@@ -74,7 +70,7 @@ def gap_section(result: 'GapResult', key: str = 'gap', title: str = 'Recording a
         body += paragraph(note, 'note')
     if result.traces:
         body += plot(_overlay(result, max_points)) + coloured_part(result)
-    return Section(key, title, body)
+    return Section('gap', 'Recording against model', body)
 
 
 def _input(result: 'GapResult') -> str:

@@ -28,8 +28,7 @@ if TYPE_CHECKING:
     from pam_actuation.report.metrics import RunMetrics
 
 
-def metrics(named: 'Sequence[tuple[str, RunMetrics]]', key: str = 'metrics',
-            title: str = 'Figures of merit') -> Section:
+def metrics(named: 'Sequence[tuple[str, RunMetrics]]', key: str = 'metrics') -> Section:
     """
     Return the table of metrics.
 
@@ -37,8 +36,8 @@ def metrics(named: 'Sequence[tuple[str, RunMetrics]]', key: str = 'metrics',
     ----------
     named : list of (title, RunMetrics)
         One column each.
-    key, title : str
-        Anchor and heading.
+    key : str
+        Anchor.
 
     """
     rows = [[name, *(cell(m) for _, m in named)] for name, cell in _ROWS]
@@ -53,7 +52,7 @@ def metrics(named: 'Sequence[tuple[str, RunMetrics]]', key: str = 'metrics',
             + (' Air through the fill valve is the flow that its data sheet gives for the '
                'recorded duty and pressures, leaks included.'
                if any(m.air_fed_kg is not None for _, m in named) else ''), 'note')
-    return Section(key, title, body)
+    return Section(key, 'Figures of merit', body)
 
 
 def _mm(value: float | None) -> str | None:

@@ -124,8 +124,7 @@ def _spread(values: list[Any]) -> dict[str, Any] | None:
             'std': numbers.std(axis=0, ddof=1).tolist()}
 
 
-def seeds_section(found: dict[str, dict[str, Any]], key: str = 'over-seeds',
-                  title: str = 'Over several seeds') -> Section | None:
+def seeds_section(found: dict[str, dict[str, Any]]) -> Section | None:
     """Return the table of what ``over_seeds`` found, None of nothing."""
     if not found:
         return None
@@ -135,7 +134,7 @@ def seeds_section(found: dict[str, dict[str, Any]], key: str = 'over-seeds',
              for name, figure, factor, unit in _FIGURES]
     body = table(['', *found], [row for row in rows if any(cell is not None for cell in row[1:])])
     remarks = ''.join(map(paragraph, same_remarks(found)))
-    return Section(key, title, paragraph(
+    return Section('over-seeds', 'Over several seeds', paragraph(
         'Mean and standard deviation over runs of the same experiment, rig and controller, '
         'whose seeds differ. Runs with frozen rules are counted apart.') + body + remarks)
 

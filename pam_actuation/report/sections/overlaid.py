@@ -27,11 +27,11 @@ if TYPE_CHECKING:
     from pam_sim.run import Run
 
 ROLES = ('measured', 'second', 'green', 'command', 'after')
+MOST_POINTS = 1600           # of a trace
 _DASHES = (None, 'dash', 'dot')      # once the colours are used up
 
 
-def overlaid(named: 'list[tuple[str, Run]]', key: str = 'overlaid',
-             title: str = 'Runs laid over each other', max_points: int = 1600) -> Section | None:
+def overlaid(named: 'list[tuple[str, Run]]') -> Section | None:
     """
     Return the section that draws all runs into the same plots, None for a single run.
 
@@ -39,39 +39,34 @@ def overlaid(named: 'list[tuple[str, Run]]', key: str = 'overlaid',
     ----------
     named : list of (title, pam_sim.run.Run)
         The runs; the reference is drawn from the first one.
-    key, title : str
-        Anchor and heading.
-    max_points : int
-        Most points per trace.
 
     """
     if len(named) < 2:
         return None
-    rows = [('contraction [mm]', _lines(named, _topic('contraction', 1e3), max_points)
-             + _reference(named[0][1], max_points)),
-            ('tracking error [mm]', _lines(named, _error, max_points)),
+    rows = [('contraction [mm]', _lines(named, _topic('contraction', 1e3))
+             + _reference(named[0][1])),
+            ('tracking error [mm]', _lines(named, _error)),
             ('pressure [kPa gauge]',
-             _lines(named, _topic('pressure', 1e-3, P_ATM_PA), max_points)),
-            ('force [N]', _lines(named, _topic('force', 1.0), max_points))]
+             _lines(named, _topic('pressure', 1e-3, P_ATM_PA))),
+            ('force [N]', _lines(named, _topic('force', 1.0)))]
     rows = [(label, traces) for label, traces in rows if traces]
     if not rows:
         return None
     body = paragraph('Time counts from the first reference of each run, so runs of the same '
                      'experiment lie over each other.')
-    return Section(key, title, body + plot(
+    return Section('overlaid', 'Runs laid over each other', body + plot(
         figures.stack(rows, 'time since the start of the experiment [s]'),
         'Drag to zoom, all rows follow; click a name to hide that run.'))
 
 
-def _lines(named: 'list[tuple[str, Run]]', read: Callable[..., Any],
-           points: int) -> list[dict[str, Any]]:
+def _lines(named: 'list[tuple[str, Run]]', read: Callable[..., Any]) -> list[dict[str, Any]]:
     traces = []
     for k, (title, run) in enumerate(named):
         pair = read(run)
         if pair is not None:
             time_s, value = pair
             traces.append(figures.line(
-                time_s, value, title, ROLES[k % len(ROLES)], width=1.3, max_points=points,
+                time_s, value, title, ROLES[k % len(ROLES)], width=1.3, max_points=MOST_POINTS,
                 dash=_DASHES[k // len(ROLES) % len(_DASHES)]))
     return traces
 
@@ -88,8 +83,8 @@ def _error(run: 'Run') -> tuple[FloatArray, FloatArray] | None:
     return None if tracked is None else (tracked[0], tracked[1] * 1e3)
 
 
-def _reference(run: 'Run', points: int) -> list[dict[str, Any]]:
+def _reference(run: 'Run') -> list[dict[str, Any]]:
     pair = signals.series(run, 'reference')
     return [] if pair is None else [figures.line(
         pair[0], pair[1] * 1e3, 'reference', 'reference', dash='dash', width=1.1,
-        max_points=points)]
+        max_points=MOST_POINTS)]

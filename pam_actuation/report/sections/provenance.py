@@ -26,8 +26,7 @@ if TYPE_CHECKING:
     from pam_sim.run import Run
 
 
-def provenance(runs: 'list[tuple[str, Run]]', key: str = 'provenance',
-               title: str = 'Where this comes from') -> Section:
+def provenance(runs: 'list[tuple[str, Run]]') -> Section:
     """
     Return the section that says which recordings a page shows and how they were made.
 
@@ -35,8 +34,6 @@ def provenance(runs: 'list[tuple[str, Run]]', key: str = 'provenance',
     ----------
     runs : list of (title, pam_sim.run.Run)
         The recordings of the page.
-    key, title : str
-        Anchor and heading.
 
     """
     fields: list[tuple[str, Callable[[Run], object]]] = [
@@ -63,7 +60,7 @@ def provenance(runs: 'list[tuple[str, Run]]', key: str = 'provenance',
             if content:
                 body += (f'<details><summary>{text(name)}: {part} as recorded</summary>'
                          f'<pre>{text(content)}</pre></details>')
-    return Section(key, title, body)
+    return Section('provenance', 'Where this comes from', body)
 
 
 def _valve(run: 'Run') -> str:

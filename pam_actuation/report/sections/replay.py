@@ -44,9 +44,7 @@ class Overlay:
     simulated: np.ndarray
 
 
-def overlays(signals: list[Overlay], key: str = 'overlays',
-             title: str = 'Simulated against recorded', remark: str = '',
-             max_points: int = 2000) -> Section:
+def overlays(signals: list[Overlay], key: str, remark: str, max_points: int) -> Section:
     """
     Return the section that lays simulated signals over recorded ones, with residuals.
 
@@ -54,8 +52,8 @@ def overlays(signals: list[Overlay], key: str = 'overlays',
     ----------
     signals : list of Overlay
         Signals named as topics.
-    key, title, remark : str
-        Anchor, heading, and a sentence above.
+    key, remark : str
+        Anchor, and a sentence above.
     max_points : int
         Most points per trace.
 
@@ -77,14 +75,13 @@ def overlays(signals: list[Overlay], key: str = 'overlays',
         spread = float(np.max(recorded) - np.min(recorded))
         facts.append([one.signal, f'{rmse(residual):.4g} {unit}',
                       f'{np.max(np.abs(residual)):.4g} {unit}', f'{spread:.4g} {unit}'])
-    body = paragraph(remark) if remark else ''
-    body += table(['signal', 'RMS difference', 'largest difference', 'range recorded'], facts)
-    return Section(key, title, body + plot(
+    body = paragraph(remark) + table(
+        ['signal', 'RMS difference', 'largest difference', 'range recorded'], facts)
+    return Section(key, 'Simulated against recorded', body + plot(
         figures.stack(rows, 'time since the start of the experiment [s]', row_px=170)))
 
 
-def controller_replays(named: 'list[tuple[str, ReplayResult]]', key: str = 'replay',
-                       title: str = 'Controller replayed offline') -> Section:
+def controller_replays(named: 'list[tuple[str, ReplayResult]]', key: str) -> Section:
     """
     Return the table of controller replays.
 
@@ -92,8 +89,8 @@ def controller_replays(named: 'list[tuple[str, ReplayResult]]', key: str = 'repl
     ----------
     named : list of (title, result)
         ``result`` has ``identical``, ``max_abs_difference_pa`` and ``recorded_pa``.
-    key, title : str
-        Anchor and heading.
+    key : str
+        Anchor.
 
     """
     rows = [[name, len(r.recorded_pa), 'yes' if r.identical else 'no',
@@ -102,4 +99,4 @@ def controller_replays(named: 'list[tuple[str, ReplayResult]]', key: str = 'repl
         'The same controller class was stepped on the recorded inputs, tick by tick. Equal '
         'to the bit means that the recording explains the commands completely.')
     body += table(['run', 'ticks', 'commands equal to the bit', 'largest difference'], rows)
-    return Section(key, title, body)
+    return Section(key, 'Controller replayed offline', body)

@@ -31,7 +31,7 @@ PLOTTED = (('pressure_command', 'controller', 'after'), ('valve_signal', 'driver
 
 
 def timing(named: 'Sequence[tuple[str, Run, RunMetrics | JointMetrics]]',
-           key: str = 'timing', title: str = 'Loop timing') -> Section:
+           key: str = 'timing') -> Section:
     """
     Return the table of periods of every topic and the histogram of the loops.
 
@@ -39,8 +39,8 @@ def timing(named: 'Sequence[tuple[str, Run, RunMetrics | JointMetrics]]',
     ----------
     named : list of (title, Run, RunMetrics)
         The runs; the histogram shows the first one.
-    key, title : str
-        Anchor and heading.
+    key : str
+        Anchor.
 
     """
     rows = []
@@ -64,4 +64,4 @@ def timing(named: 'Sequence[tuple[str, Run, RunMetrics | JointMetrics]]',
         body += plot(figures.histogram(groups, 'period [ms]', 'count'),
                      f'Periods of the loops, {named[0][0]}; the outer 0.1 % are drawn in the '
                      'outermost bins.')
-    return Section(key, title, body)
+    return Section(key, 'Loop timing', body)

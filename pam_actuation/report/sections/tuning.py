@@ -25,8 +25,7 @@ if TYPE_CHECKING:
 _UNITS = {'mm': 'mm', 'deg': '°'}      # as names end with them, and as they are shown
 
 
-def tuning_section(result: 'TuneResult | dict[str, Any]', key: str = 'tuning',
-                   title: str = 'Offline tuning') -> Section:
+def tuning_section(result: 'TuneResult | dict[str, Any]') -> Section:
     """
     Return the section of a tuning result.
 
@@ -36,8 +35,6 @@ def tuning_section(result: 'TuneResult | dict[str, Any]', key: str = 'tuning',
         With ``to_dict()`` or as a dict. Used where present: ``changed`` (name to
         {before, after}), ``history`` (pairs of rollouts done and best cost [mm]), and
         any other plain number, shown in a table.
-    key, title : str
-        Anchor and heading.
 
     """
     data = result if isinstance(result, dict) else result.to_dict()
@@ -64,7 +61,7 @@ def tuning_section(result: 'TuneResult | dict[str, Any]', key: str = 'tuning',
         line = figures.line(done, cost, 'best cost', 'after', held=True)
         body += plot(figures.stack(
             [(f'best cost [{_UNITS[unit]}]', [line])], 'simulated runs', row_px=220))
-    return Section(key, title, body)
+    return Section('tuning', 'Offline tuning', body)
 
 
 def _words(name: str) -> str:
