@@ -132,11 +132,10 @@ class McapWriter:
         self._append(_bytes(schema))
         return schema.id
 
-    def add_channel(self, topic: str, schema: int, metadata: dict[str, str],
-                    encoding: str = 'cdr') -> int:
+    def add_channel(self, topic: str, schema: int, metadata: dict[str, str]) -> int:
         """Announce a topic with the number of its definition; returns its number."""
         channel = Channel(
-            id=len(self._channels) + 1, topic=topic, message_encoding=encoding,
+            id=len(self._channels) + 1, topic=topic, message_encoding='cdr',
             schema_id=schema, metadata=metadata)
         self._channels[channel.id] = channel
         self._append(_bytes(channel))

@@ -35,6 +35,7 @@ from pam_sim.annotations import FloatArray
 ROW_PX = 210                 # height of one row of a stack of plots
 LEGEND_PX = 30               # room above a row for its legend
 BOTTOM_PX = 52
+BINS = 80                    # of a histogram
 # Contracting / extending rules and other signed maps: one scale, white at zero.
 DIVERGING = [[0.0, '#2166ac'], [0.25, '#92c5de'], [0.5, '#f7f7f7'], [0.75, '#fdb863'],
              [1.0, '#b35806']]
@@ -196,7 +197,7 @@ def with_markers(figure: dict[str, Any], markers: Sequence[tuple[float, str]]) -
 
 def bars(categories: Iterable[object],
          groups: Sequence[tuple[str, ArrayLike, str]], x_title: str,
-         y_title: str, height: int = 300) -> dict[str, Any]:
+         y_title: str) -> dict[str, Any]:
     """
     Return a grouped bar chart.
 
@@ -208,25 +209,25 @@ def bars(categories: Iterable[object],
         One bar per category and group.
     x_title, y_title : str
         Axis titles with units.
-    height : int
-        Height [px].
 
     """
     data = [{'type': 'bar', 'name': name, 'x': list(categories), 'y': rounded(values),
              'marker': {'color': f'@{role}'}, 'showlegend': len(groups) > 1}
             for name, values, role in groups]
     return {'data': data, 'layout': {
-        'height': height, 'barmode': 'group', 'bargap': 0.25, 'hovermode': 'x',
+        'height': 300, 'barmode': 'group', 'bargap': 0.25, 'hovermode': 'x',
         'margin': {'l': 78, 'r': 14, 't': 34, 'b': BOTTOM_PX},
         'legend': {'orientation': 'h', 'x': 0, 'y': 1.02, 'yanchor': 'bottom'},
         'xaxis': {'title': {'text': x_title}, 'type': 'category', 'automargin': True},
         'yaxis': {'title': {'text': y_title}, 'rangemode': 'tozero'}}}
 
 
-def histogram(groups: list[tuple[str, FloatArray, str]], x_title: str, y_title: str,
-              bins: int = 80, height: int = 280) -> dict[str, Any]:
+def histogram(groups: list[tuple[str, FloatArray, str]], x_title: str, y_title: str
+              ) -> dict[str, Any]:
     """
     Return histograms over one common set of bins, counted here to keep the page light.
+
+    The bins lie between the 0.1 % and 99.9 % quantiles; the rest goes into the outer ones.
 
     Parameters
     ----------
@@ -234,18 +235,13 @@ def histogram(groups: list[tuple[str, FloatArray, str]], x_title: str, y_title: 
         Samples in the unit of the x axis.
     x_title, y_title : str
         Axis titles with units.
-    bins : int
-        Number of bins between the 0.1 % and 99.9 % quantiles; the rest goes into the
-        outer bins.
-    height : int
-        Height [px].
 
     """
     everything = np.concatenate([np.asarray(v, dtype=float) for _, v, _ in groups])
     low, high = np.percentile(everything, [0.1, 99.9])
     if high <= low:
         low, high = low - 0.5 * abs(low) - 1e-9, high + 0.5 * abs(high) + 1e-9
-    edges = np.linspace(low, high, bins + 1)
+    edges = np.linspace(low, high, BINS + 1)
     centre = 0.5 * (edges[1:] + edges[:-1])
     data = []
     for name, values, role in groups:
@@ -255,14 +251,14 @@ def histogram(groups: list[tuple[str, FloatArray, str]], x_title: str, y_title: 
                      'line': {'color': f'@{role}', 'shape': 'hvh', 'width': 1.4},
                      'showlegend': len(groups) > 1})
     return {'data': data, 'layout': {
-        'height': height, 'margin': {'l': 78, 'r': 14, 't': 34, 'b': BOTTOM_PX},
+        'height': 280, 'margin': {'l': 78, 'r': 14, 't': 34, 'b': BOTTOM_PX},
         'legend': {'orientation': 'h', 'x': 0, 'y': 1.02, 'yanchor': 'bottom'},
         'xaxis': {'title': {'text': x_title}},
         'yaxis': {'title': {'text': y_title}, 'rangemode': 'tozero'}}}
 
 
 def heat_maps(maps: list[tuple[str, FloatArray, FloatArray, FloatArray]], x_title: str,
-              y_title: str, z_title: str, limit: float, height: int = 340) -> dict[str, Any]:
+              y_title: str, z_title: str, limit: float) -> dict[str, Any]:
     """
     Return heat maps in one row with one colour scale, symmetric about zero.
 
@@ -274,15 +270,13 @@ def heat_maps(maps: list[tuple[str, FloatArray, FloatArray, FloatArray]], x_titl
         Titles with units; ``z_title`` stands at the colour bar.
     limit : float
         The scale runs from -limit to limit in every map.
-    height : int
-        Height [px].
 
     """
     n = len(maps)
     gap = 0.05 if n > 2 else 0.09
     width = (1.0 - gap * (n - 1)) / n
     layout: dict[str, Any] = {
-        'height': height, 'margin': {'l': 62, 'r': 10, 't': 34, 'b': BOTTOM_PX},
+        'height': 340, 'margin': {'l': 62, 'r': 10, 't': 34, 'b': BOTTOM_PX},
         'annotations': []}
     data = []
     for k, (title, x, y, z) in enumerate(maps):
