@@ -197,7 +197,7 @@ def as_unknown(learned, proof, valve):
     """Return the result of a look for a term, the verdict held to be `unknown`."""
     rig, recording, held_out = load_rig(MODEL, valve=valve), *(
         Recording(run, valve) for run in (learned, proof))
-    estimator = Estimator(rig, subsystem_problems(rig, [recording], False, 0, CRITERIA))
+    estimator = Estimator(rig, subsystem_problems(rig, [recording], 0, 0, CRITERIA))
     base = estimator.base
     calibrated = Validation(held_out, True, estimator, base, base)
     result = GapResult('unknown', '', signals=calibrated.signals(), unexplained_fraction=1.0,

@@ -302,7 +302,7 @@ def separation(run: Run, rig: Rig, rivals: Sequence[Rival],
     topics = {k: v for k, v in run.topics.items() if with_force or k != 'force'}
     recording = Recording(type(run)(topics, run.metadata, run.namespace, run.path), rig.valve,
                           rig.is_driven)
-    estimator = Estimator(rig, subsystem_problems(rig, [recording], holds_certify=False))
+    estimator = Estimator(rig, subsystem_problems(rig, [recording], certify_runs=0))
     # Those with the same parameters begin alike: where a fit ends must not tell them apart.
     first, *others = (min((estimator.fit(hypothesis, theta) for _, _, like, theta in rivals
                            if _parameters(like) == _parameters(hypothesis)), key=estimator.cost)

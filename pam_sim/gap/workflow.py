@@ -129,7 +129,7 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
         rig = rig.with_(fidelity='switching')
         result.remarks.append(PULSES)
     estimator = Estimator(rig, subsystem_problems(
-        rig, recordings, not is_certify, seed, criteria), criteria=criteria)
+        rig, recordings, checked.certify_runs, seed, criteria), criteria=criteria)
     result.not_judged = _not_judged(estimator)
     progress(0.1)
     deadline = started + seconds

@@ -45,7 +45,7 @@ def numbers_first(runs: Sequence[Run], rig: Rig, holds_certify: bool, seed: int 
     rig : pam_sim.Rig
         The given model.
     holds_certify : bool
-        Whether the recordings hold the certify part too; it stays untouched.
+        Whether the first recording holds the certify part too; it stays untouched.
     seed : int
         Of the starts.
     progress : callable

@@ -15,7 +15,7 @@
 """What a recording can tell: of the valve, of muscle and load, or of the muscle alone."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 
 import numpy as np
@@ -66,6 +66,8 @@ class Offer:
         Known mass that hung on the load in addition.
     rest : Rest or None
         When the load rested on a stop; the force of then is left out.
+    holds_certify : bool
+        Whether every fifth block stays untouched, for a validation.
 
     """
 
@@ -76,18 +78,19 @@ class Offer:
     kind: str
     added_kg: float = 0.0
     rest: Rest | None = None
+    holds_certify: bool = False
 
 
 class LoadedMechanics(MechanicsProblem):
     """Muscle and load, with known masses hung on the load in some of the recordings."""
 
-    def __init__(self, rig: Rig, offers: Sequence[Offer], holds_certify: bool = False) -> None:
+    def __init__(self, rig: Rig, offers: Sequence[Offer]) -> None:
         self._added_kg = [one.added_kg for one in offers]
         self._raw = [one.recording for one in offers]
         self._raw_noise = [noise_of(raw.time_s['pressure'], raw.measured['pressure'])
                            for raw in self._raw]
         super().__init__(rig, [with_quiet_pressure(*one) for one in zip(
-            self._raw, self._raw_noise)], holds_certify=holds_certify)
+            self._raw, self._raw_noise)], sum(one.holds_certify for one in offers))
 
     def _disturb(self, random: np.random.Generator | None) -> None:
         super()._disturb(None)
@@ -106,8 +109,8 @@ class LoadedMechanics(MechanicsProblem):
         return super()._simulate(rig, index, numbers)
 
 
-def offers_of(runs: Sequence[Run], rig: Rig, added_kg: Sequence[float]
-              ) -> tuple[list[Offer], list[str]]:
+def offers_of(runs: Sequence[Run], rig: Rig, added_kg: Sequence[float],
+              spare_certify: bool = False) -> tuple[list[Offer], list[str]]:
     """
     Return (offers, remarks) of recordings; each stretch between holes is an offer of its own.
 
@@ -119,6 +122,8 @@ def offers_of(runs: Sequence[Run], rig: Rig, added_kg: Sequence[float]
         Its valve and load say which topics matter.
     added_kg : sequence of float
         Known mass on the load in addition, for each recording.
+    spare_certify : bool
+        Whether every fifth block of the first recording stays untouched.
 
     Raises
     ------
@@ -127,11 +132,12 @@ def offers_of(runs: Sequence[Run], rig: Rig, added_kg: Sequence[float]
 
     """
     offers, remarks = [], []
-    for run, mass in zip(runs, added_kg):
+    for index, (run, mass) in enumerate(zip(runs, added_kg)):
         parts, text = stretches(run, LEAST_DURATION_S, rig.is_driven)
         if not parts:
             raise InputError(text, run.path or 'recording')
-        offers += [offer_of(one, rig, mass) for one in parts]
+        offers += [replace(offer_of(one, rig, mass), holds_certify=spare_certify and index == 0)
+                   for one in parts]
         remarks += [text] if text else []
     lengths_unseen = [run for run in runs if 'contraction' not in run]
     if rig.load == 'isometric' and len(lengths_unseen) > 1:
@@ -227,14 +233,14 @@ def _never_lifted(run: Run, rig: Rig) -> bool:
     return bool(abs(covariance[0, 1]) < FOLLOWS_SHARE * bore_m2 * covariance[0, 0])
 
 
-def problems_of(rig: Rig, offers: Sequence[Offer], holds_certify: bool = False
-                ) -> list[SubsystemProblem]:
-    """Return the subsystems of several recordings, which may hold the certify part too."""
+def problems_of(rig: Rig, offers: Sequence[Offer]) -> list[SubsystemProblem]:
+    """Return the subsystems of several recordings."""
     found: list[SubsystemProblem] = []
-    valve = [one.recording for one in offers if one.valve]
+    valve = [one for one in offers if one.valve]
     if valve:
-        found.append(ValveProblem(rig, valve, holds_certify=holds_certify))
+        found.append(ValveProblem(rig, [one.recording for one in valve],
+                                  sum(one.holds_certify for one in valve)))
     mechanics = [one for one in offers if one.mechanics]
     if mechanics:
-        found.append(LoadedMechanics(rig, mechanics, holds_certify))
+        found.append(LoadedMechanics(rig, mechanics))
     return found

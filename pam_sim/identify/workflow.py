@@ -78,7 +78,7 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
     progress : callable
         Told the share that is done, 0 to 1.
     spare_certify : bool
-        Whether every fifth block of the recordings stays untouched, for a validation.
+        Whether every fifth block of the first recording stays untouched, for a validation.
 
     Returns
     -------
@@ -108,9 +108,9 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
         raise InputError('no number is unknown: state `unknown` in `tolerance`, or name numbers',
                          rig.name)
     runs, remarks = commanded(runs, rig)
-    offers, holes = offers_of(runs, rig, added_kg or [0.0] * len(runs))
+    offers, holes = offers_of(runs, rig, added_kg or [0.0] * len(runs), spare_certify)
     remarks += holes
-    problems = problems_of(rig, offers, spare_certify)
+    problems = problems_of(rig, offers)
     acting = [n for n in wanted if any(n.acts_in(p) for p in problems)]
     numbers = [*acting, *known_numbers_of(problems, acting)]
     weighted = Weighted(rig, problems, numbers)

@@ -18,8 +18,11 @@ from gap_runs import nominal, NS, recorded, voltages
 import numpy as np
 from pam_sim.errors import InputError
 from pam_sim.gap import find_gap
+from pam_sim.gap.data.checked import checked_runs
 from pam_sim.gap.data.holes import between, holes_in, stretches
+from pam_sim.gap.data.split import CERTIFY
 from pam_sim.identify import identify
+from pam_sim.identify.records import offers_of, problems_of
 from pam_sim.run import Run, Series
 import pytest
 
@@ -49,6 +52,19 @@ def test_a_run_without_a_hole_is_left_as_it_is(whole):
     run = without(whole, *HOLE_S, topics=('force', 'contraction'))
     assert stretches(run, 1.0) == ([run], '')
     assert len(stretches(run, 1.0, driven=True)[0]) == 2
+
+
+def test_the_proof_takes_blocks_of_the_first_bag_with_all_its_stretches(whole):
+    other = recorded(nominal(), voltages(24.0), seed=1)
+    runs = [without(whole, *HOLE_S), without(other, *HOLE_S)]
+    checked = checked_runs(runs, None, nominal())
+    assert (len(checked.runs), checked.certify_runs) == (4, 2)
+    assert checked_runs(runs[0], other, nominal()).certify_runs == 0
+    offers, _ = offers_of(runs, nominal(), [0.0] * 2, spare_certify=True)
+    assert [one.holds_certify for one in offers] == [True, True, False, False]
+    for problem in problems_of(nominal(), offers):
+        assert set(problem.run[problem.part == CERTIFY]) == {0, 1}
+    assert not any(one.holds_certify for one in offers_of(runs, nominal(), [0.0] * 2)[0])
 
 
 def test_stretches_come_longest_first_and_are_told(whole):

@@ -56,7 +56,7 @@ def test_at_its_least_size_an_effect_moves_a_signal_by_one_floor(with_cell):
     o = next(o for o in outlooks(with_cell) if o.name == 'coulomb_friction')
     rig = nominal().with_(effects=[{'name': o.name, 'parameters': o.visible}])
     problem = next(c for c in subsystem_problems(nominal(), [Recording(
-        recorded(nominal(), voltages(10.0)), 'ppr')], holds_certify=False)
+        recorded(nominal(), voltages(10.0)), 'ppr')], certify_runs=0)
         if c.subsystem == 'muscle')
     rows, zero = problem.part < 3, np.zeros(len(problem.known))
     base = problem.errors(nominal(), zero)

@@ -25,7 +25,7 @@ from pam_sim.effects.unnamed.reading import with_terms
 from pam_sim.gap.data.noise import noise_of
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.signals import FIELD
-from pam_sim.gap.data.split import FIT, SELECT
+from pam_sim.gap.data.split import CERTIFY, FIT, SELECT
 from pam_sim.gap.subsystems import effects as of_sensors
 from pam_sim.gap.subsystems.effects import acts_on, sensor_changes, true_value
 from pam_sim.gap.subsystems.problems import subsystem_problems
@@ -152,6 +152,15 @@ def test_a_force_recorded_in_one_of_two_runs_is_used():
     z[problem.known.index(late)] = 1.0
     moved = problem.values(nominal(), z) != still
     assert moved[problem.run == 1].any() and not moved[problem.run == 0].any()
+
+
+def test_the_proof_takes_blocks_of_the_first_run_alone():
+    runs = [Recording(recorded(nominal(), voltages(12.0), seed=seed), 'ppr') for seed in (0, 1)]
+    for problem in subsystem_problems(nominal(), runs):
+        assert set(problem.run[problem.part == CERTIFY]) == {0}
+        assert set(problem.run[problem.part == SELECT]) == {0, 1}
+    for problem in subsystem_problems(nominal(), runs, certify_runs=0):
+        assert not (problem.part == CERTIFY).any()
 
 
 def test_noise_with_a_memory_is_measured_where_the_signal_rests():

@@ -111,7 +111,7 @@ def test_a_clear_gap_of_the_muscle_asks_about_a_stated_law():
 def test_a_static_map_is_no_possible_effect_beside_an_unknown_law():
     run = record(RIG, gauge_pa=(50e3, 400e3), hold_s=0.8, keep=('pressure', 'contraction'))
     for name, there in (('law.a3', False), ('mass_kg', True)):
-        problems = problems_of(RIG, [offer_of(run, RIG, 0.0)], False)
+        problems = problems_of(RIG, [offer_of(run, RIG, 0.0)])
         possible = possible_effects(RIG, problems, unknown_numbers(RIG, [name]))
         names = {number.effect for number in possible}
         assert ('end_taper' in names) is there and 'creep' in names

@@ -41,6 +41,8 @@ class CheckedRuns:
         To search, the parts between holes.
     certify : Run or None
         For the validation, None where it is a part of the first run.
+    certify_runs : int
+        How many of ``runs``, from the first on, hold the certify part.
     refusals : list of str
         Why they cannot be compared with the model; empty where they can.
     remarks : list of str
@@ -50,6 +52,7 @@ class CheckedRuns:
 
     runs: list[Run]
     certify: Run | None
+    certify_runs: int
     refusals: list[str]
     remarks: list[str]
 
@@ -70,13 +73,13 @@ def checked_runs(runs: Run | Sequence[Run], certify: Run | None, rig: Rig,
         raise InputError('at least one recording is needed', 'runs')
     check_apart(runs, certify, criteria)
     runs, certify, told = all_commanded(runs, certify, rig)
-    runs, certify, holes, refusals = split_at_holes(
+    runs, first, certify, holes, refusals = split_at_holes(
         runs, certify, criteria.min_duration_s, rig.is_driven)
     health = [check_for(run, rig, criteria)
               for run in [*runs, *([certify] if certify else [])]]
     refusals += list(dict.fromkeys(p for h in health for p in h.problems))
     remarks = told + holes + list(dict.fromkeys(r for h in health for r in h.remarks))
-    return CheckedRuns(runs, certify, refusals, remarks)
+    return CheckedRuns(runs, certify, 0 if certify else first, refusals, remarks)
 
 
 def recording_of(run: Run, rig: Rig, criteria: Criteria = CRITERIA) -> Recording:

@@ -73,11 +73,12 @@ def stretches(run: Run, least_s: float, driven: bool = False) -> tuple[list[Run]
 
 def split_at_holes(runs: Sequence[Run], certify: Run | None, least_s: float,
                    driven: bool = False
-                   ) -> tuple[list[Run], Run | None, list[str], list[str]]:
+                   ) -> tuple[list[Run], int, Run | None, list[str], list[str]]:
     """
-    Return (runs, certify, remarks, refusals) of a question: stretches stand for runs with holes.
+    Return (runs, first, certify, remarks, refusals): stretches stand for runs with holes.
 
-    Of the recording for the validation the longest stretch is kept.
+    ``first`` of these are of the first run. Of the recording for the validation the longest
+    stretch is kept.
 
     Parameters
     ----------
@@ -99,7 +100,7 @@ def split_at_holes(runs: Sequence[Run], certify: Run | None, least_s: float,
             (remarks if parts else refusals).append(text)
     last = found.pop() if certify is not None else []
     kept = [one for parts in found for one in parts]
-    return kept, last[0] if last else None, remarks, refusals
+    return kept, len(found[0]), last[0] if last else None, remarks, refusals
 
 
 def holes_of(run: Run, driven: bool = False) -> str:

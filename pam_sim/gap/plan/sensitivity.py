@@ -140,7 +140,7 @@ class Sensitivities:
     def __init__(self, rig: Rig, recording: Recording, only: Collection[str] | None = None,
                  criteria: Criteria = CRITERIA) -> None:
         self.rig, self.criteria = rig, criteria
-        self.problems = subsystem_problems(rig, [recording], holds_certify=False)
+        self.problems = subsystem_problems(rig, [recording], certify_runs=0)
         self.signals = sum((problem.signals for problem in self.problems), ())
         pool = candidates(rig, self.signals, only)
         self.left_out = left_out(only, pool, rig, self.signals)

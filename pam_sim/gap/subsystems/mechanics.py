@@ -38,7 +38,7 @@ class MechanicsProblem(SubsystemProblem):
 
     subsystem = 'muscle'
 
-    def __init__(self, rig: Rig, recordings: Sequence[Recording], holds_certify: bool = True,
+    def __init__(self, rig: Rig, recordings: Sequence[Recording], certify_runs: int = 1,
                  seed: int = 0, criteria: Criteria = CRITERIA) -> None:
         self._noise_pa: list[float | FloatArray] = [0.0] * len(recordings)
         self._command = lru_cache(maxsize=KEPT)(self._command_of)
@@ -46,7 +46,7 @@ class MechanicsProblem(SubsystemProblem):
                        for r in recordings]
         self._pressure = [tuple(np.interp(r.time_s['pressure'], r.grid_s, y)
                                 for y in smoothed(r, 'pressure')) for r in recordings]
-        super().__init__(rig, recordings, holds_certify, seed, criteria)
+        super().__init__(rig, recordings, certify_runs, seed, criteria)
 
     @staticmethod
     def outputs(recording: Recording) -> tuple[str, ...]:

@@ -52,8 +52,8 @@ class SubsystemProblem:
         The given model.
     recordings : list of Recording
         Inputs and measured signals.
-    holds_certify : bool
-        Whether the recordings hold the certify part too.
+    certify_runs : int
+        How many of the recordings hold the certify part too; these come first.
     seed : int
         Of the draws that carry input noise into the floor.
     criteria : Criteria
@@ -88,7 +88,7 @@ class SubsystemProblem:
     criteria: Criteria = CRITERIA
     is_dealt_short, block_s = False, math.inf
 
-    def __init__(self, rig: Rig, recordings: Sequence[Recording], holds_certify: bool = True,
+    def __init__(self, rig: Rig, recordings: Sequence[Recording], certify_runs: int = 1,
                  seed: int = 0, criteria: Criteria = CRITERIA) -> None:
         self.recordings, self.criteria = recordings, criteria
         self._place = lru_cache(maxsize=KEPT)(self._place_of)
@@ -104,7 +104,7 @@ class SubsystemProblem:
         self._index, parts, blocks, signals, measured, times, runs = ([] for _ in range(7))
         first = 0
         for index, recording in enumerate(recordings):
-            split = split_of(recording, holds_certify, criteria)
+            split = split_of(recording, index < certify_runs, criteria)
             self.is_dealt_short |= split.is_short
             self.block_s = min(self.block_s, split.block_s)
             chosen = {}

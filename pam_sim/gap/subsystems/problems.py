@@ -31,12 +31,12 @@ from pam_sim.gap.subsystems.valve import ValveProblem
 from pam_sim.rig import Rig
 
 
-def subsystem_problems(rig: Rig, recordings: Sequence[Recording], holds_certify: bool = True,
+def subsystem_problems(rig: Rig, recordings: Sequence[Recording], certify_runs: int = 1,
                        seed: int = 0, criteria: Criteria = CRITERIA) -> list[SubsystemProblem]:
     """Return the subsystems that these recordings allow, the valve first."""
     found: list[SubsystemProblem] = []
     if not any(r.pressure_given for r in recordings):
-        found.append(ValveProblem(rig, recordings, holds_certify, seed, criteria))
+        found.append(ValveProblem(rig, recordings, certify_runs, seed, criteria))
     if any(MechanicsProblem.outputs(r) for r in recordings):
-        found.append(MechanicsProblem(rig, recordings, holds_certify, seed, criteria))
+        found.append(MechanicsProblem(rig, recordings, certify_runs, seed, criteria))
     return found

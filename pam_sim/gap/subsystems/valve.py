@@ -44,7 +44,7 @@ class ValveProblem(SubsystemProblem):
 
     subsystem = 'valve'
 
-    def __init__(self, rig: Rig, recordings: Sequence[Recording], holds_certify: bool = True,
+    def __init__(self, rig: Rig, recordings: Sequence[Recording], certify_runs: int = 1,
                  seed: int = 0, criteria: Criteria = CRITERIA) -> None:
         self._shift_s: list[FloatArray] | None = None
         self._late_s = 0.0
@@ -53,7 +53,7 @@ class ValveProblem(SubsystemProblem):
         self._motion = [smoothed(r, 'contraction') for r in recordings]
         self._jumps: dict[int, UnseenJumps] = {}
         self._stamps_only, self._given_s = False, delay_and_lag_s(rig)
-        super().__init__(rig, recordings, holds_certify, seed, criteria)
+        super().__init__(rig, recordings, certify_runs, seed, criteria)
         self._jumps = {index: self._jumps_of(rig, index)
                        for index, r in enumerate(recordings) if r.unseen_s > 0.0}
 

@@ -61,7 +61,7 @@ class OwnRuns:
         self._settle_s = {s: settling_s(validation.recording, s)
                           for s in validation.recording.signals}
         self._problems = subsystem_problems(
-            self._estimator.rig, [validation.recording], False, validation.seed,
+            self._estimator.rig, [validation.recording], 0, validation.seed,
             self._estimator.criteria) if self._whole else self._estimator.problems
         before, refit, after = (
             self._given(), self._errors(validation.base), self._errors(validation.final))
