@@ -44,6 +44,21 @@ def test_the_page_of_muscle_laws_has_a_row_for_each():
     assert laws and not [name for name in laws if f'\n| `{name}` |' not in rows]
 
 
+@pytest.mark.skipif(any(os.environ.get(name) for name in PLUG_INS), reason='plug-ins are set')
+def test_the_page_of_names_has_each_number_whose_name_does_not_tell_its_unit():
+    text = (ROOT / 'docs' / 'reference' / 'naming.md').read_text(encoding='utf-8')
+    rows = text.split('## Symbols in model files')[1].split('\n## ')[0]
+    silent = {(p['name'], p['unit']) for entry in ENTRIES for p in entry['parameters']
+              if p['unit'] not in ('-', '1') and not p['name'].endswith(f"_{suffix(p['unit'])}")}
+    told = re.findall(r'^\| `(\w+)` .* \| (.+) \|$', rows, re.MULTILINE)
+    assert silent == {(name, unit) for name, unit in told if unit != '–'}
+
+
+def suffix(unit):
+    """Return how the name of a number ends that has this unit."""
+    return re.sub('[()^]', '', unit).replace('/', '_per_').replace(' ', '_').lower()
+
+
 def test_overview_names_everything_within_the_terminal(monkeypatch):
     monkeypatch.setenv('COLUMNS', '80')
     lines = overview(ENTRIES).splitlines()
