@@ -81,12 +81,13 @@ def actuate(tick: int, command_pa: float, plant: Plant, hsv: bool, driver: Drive
     """Run the driver law where it is due and the physics of a period; others as of ``sense``."""
     plant_state, plant_par, plant_inp, plant_out = plant
     steps, driver_every, latency_steps = timing
-    acting = part(plant_inp, 0, layout.INPUT)
+    acting, inp = part(plant_inp, 0, layout.INPUT), part(raw, 0, FORCE_INPUT)
     command_pa = risen(part(rise, 0, RISE), command_pa)
     signal_0, signal_1 = acting.signal_0, acting.signal_1
     if tick % driver_every == 0:
         signal_0, signal_1 = drive(
-            driver, hsv, command_pa, part(raw, 0, FORCE_INPUT).pressure_pa)
+            driver, hsv, command_pa, inp.pressure_pa,
+            part(plant_out, 0, layout.OUTPUT).supply_pa, inp.contraction_m)
     for j in range(steps):
         if j == latency_steps:
             acting.signal_0 = signal_0

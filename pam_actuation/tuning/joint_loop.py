@@ -109,7 +109,7 @@ class JointLoop:
         noises['angle_rad'], steps_of.angle_rad = angle * angle_noise_rad, angle_step_rad
         for k, (side, rig) in enumerate(sides.items()):
             noise, step = sensor_noise(rig, self.ticks, (seed, k))
-            for name in ('pressure_pa', 'force_n'):
+            for name in READINGS.names or ():
                 noises[f'{side}_{name}'] = noise.view(READINGS)[name]
                 steps_of[f'{side}_{name}'] = fields(step, READINGS)[name]
         self._torque = np.zeros(self.ticks)

@@ -29,7 +29,7 @@ from pam_actuation.control.sofc.step import sofc_step
 from pam_actuation.tuning.loop_parts import (
     drive, Driver, JOINT_READINGS, Plant, read, RISE, risen, WANTED)
 from pam_sim.annotations import FloatArray
-from pam_sim.compiled import compiled, entry_point, source_key
+from pam_sim.compiled import compiled, entry_point, inlined, source_key
 from pam_sim.joint import layout as joint_layout
 from pam_sim.joint.kernel import joint_step
 from pam_sim.records import part, record
@@ -104,6 +104,26 @@ def sense(tick: int, plants: Plants, hsv: tuple[bool, bool], drivers: tuple[Driv
     row.extensor_force_n = extensor.true_force_n
 
 
+@inlined
+def drive_muscle(driver: Driver, hsv: bool, command_pa: float, measured_pa: float,
+                 seen: np.record, noise_m: float, step_m: float) -> tuple[float, float]:
+    """
+    Run the driver law of a muscle; return its two valve signals.
+
+    Parameters
+    ----------
+    driver, hsv, command_pa, measured_pa
+        As of ``drive``.
+    seen : record
+        ``layout.OUTPUT`` of the muscle, of which the driver is told supply and contraction.
+    noise_m, step_m : float
+        Noise and step of that contraction.
+
+    """
+    return drive(driver, hsv, command_pa, measured_pa, seen.supply_pa,
+                 read(seen.contraction_m + noise_m, step_m))
+
+
 @compiled
 def actuate(tick: int, plants: Plants, hsv: tuple[bool, bool], drivers: tuple[Driver, Driver],
             timing: tuple[int, int, int], reference: FloatArray, noise: FloatArray,
@@ -113,6 +133,9 @@ def actuate(tick: int, plants: Plants, hsv: tuple[bool, bool], drivers: tuple[Dr
     """Run the driver laws where they are due and the physics of a period; as of ``sense``."""
     joint, flexor, extensor = plants
     joint_inp, _, _, _ = joint
+    _, _, _, flexor_out = flexor
+    _, _, _, extensor_out = extensor
+    off, steps_of = noise.view(JOINT_READINGS)[tick], part(quantum, 0, JOINT_READINGS)
     flexor_hsv, extensor_hsv = hsv
     flexor_driver, extensor_driver = drivers
     flexor_rise, extensor_rise = rises
@@ -124,10 +147,14 @@ def actuate(tick: int, plants: Plants, hsv: tuple[bool, bool], drivers: tuple[Dr
     flexor_0, flexor_1 = acting.flexor_signal_0, acting.flexor_signal_1
     extensor_0, extensor_1 = acting.extensor_signal_0, acting.extensor_signal_1
     if tick % driver_every == 0:
-        flexor_0, flexor_1 = drive(
-            flexor_driver, flexor_hsv, row.flexor_command_pa, inp.flexor_pressure_pa)
-        extensor_0, extensor_1 = drive(
-            extensor_driver, extensor_hsv, row.extensor_command_pa, inp.extensor_pressure_pa)
+        flexor_0, flexor_1 = drive_muscle(
+            flexor_driver, flexor_hsv, row.flexor_command_pa, inp.flexor_pressure_pa,
+            part(flexor_out, 0, layout.OUTPUT), off.flexor_contraction_m,
+            steps_of.flexor_contraction_m)
+        extensor_0, extensor_1 = drive_muscle(
+            extensor_driver, extensor_hsv, row.extensor_command_pa, inp.extensor_pressure_pa,
+            part(extensor_out, 0, layout.OUTPUT), off.extensor_contraction_m,
+            steps_of.extensor_contraction_m)
     acting.torque_n_m = torque_n_m[tick]
     for j in range(steps):
         if j == latency_steps:

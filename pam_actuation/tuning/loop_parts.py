@@ -35,7 +35,7 @@ Driver: TypeAlias = tuple[FloatArray, FloatArray, FloatArray]
 READINGS = record('pressure_pa', 'contraction_m', 'force_n')
 JOINT_READINGS = record(
     'angle_rad', 'flexor_pressure_pa', 'extensor_pressure_pa', 'flexor_force_n',
-    'extensor_force_n')
+    'extensor_force_n', 'flexor_contraction_m', 'extensor_contraction_m')
 # What is wanted at a tick, and one preview ahead: in the unit of what is tracked, per second.
 WANTED = record('reference', 'rate', 'lead', 'lead_rate')
 # What acts on a muscle from outside.
@@ -87,8 +87,7 @@ def risen(rise: np.record, command_pa: float) -> float:
 
 @compiled
 def drive(driver: Driver, hsv: bool, command_pa: float,
-          measured_pa: float, supply_pa: float = np.nan,
-          measured_m: float = np.nan) -> tuple[float, float]:
+          measured_pa: float, supply_pa: float, measured_m: float) -> tuple[float, float]:
     """
     Run a driver law once and return its two valve signals.
 
@@ -101,9 +100,9 @@ def drive(driver: Driver, hsv: bool, command_pa: float,
     command_pa, measured_pa : float
         Wanted and measured muscle pressure, absolute Pa.
     supply_pa : float
-        Measured supply, absolute Pa; NaN where none is: the nominal one. Only for a pair.
+        Measured supply, absolute Pa. Only for a pair.
     measured_m : float
-        Measured contraction; NaN where none is. Only for a pair.
+        Measured contraction. Only for a pair.
 
     """
     state, par, out = driver

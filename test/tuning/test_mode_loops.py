@@ -14,11 +14,13 @@
 
 """Closed loops of force and joint mode on realistic rigs: tracking, learning, limits."""
 
+from dataclasses import replace
 import math
 
 import numpy as np
 from pam_actuation.bags.load_joint import load_recording
 from pam_actuation.control.config import load_controller
+from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.experiments import load_experiment
 from pam_actuation.experiments.offline import simulate_experiment
 from pam_actuation.tuning.force_loop import ForceLoop
@@ -127,6 +129,41 @@ def test_the_compiled_loop_of_joint_mode_steps_the_live_class():
         assert commands_pa == pytest.approx(
             [result.signals[f'{side}_command_pa'][k] for side in ('flexor', 'extensor')],
             abs=1e-6)
+
+
+def loop_of(mode, supply_factor=1.0):
+    """Return a loop behind on/off valves, its rig, and drivers that believe in a supply."""
+    if mode == 'joint':
+        rig, make, values = load_joint('joint_dmsp_5_300_realistic', valve='hsv'), JointLoop, (
+            'joint_angle', 'to_rad: 0.2')
+    else:
+        rig, make, values = isometric('hsv'), ForceLoop, ('force', 'to_n: 60.0')
+    experiment = load_experiment(SHORT.format(domain=values[0], values=values[1]))
+    configs = [driver_config(muscle) for muscle in rig.muscles.values()]
+    configs = [replace(one, hsv=replace(one.hsv, supply_pa=supply_factor * one.hsv.supply_pa))
+               for one in configs]
+    known = {'drivers': configs} if mode == 'joint' else {'driver': configs[0]}
+    return make(rig, experiment, seed=1, **known), load_controller(f'sofc_{mode}_hsv', rig)
+
+
+@pytest.mark.parametrize('mode', ['joint', 'force'])
+def test_the_driver_of_a_rollout_is_told_the_measured_supply(mode):
+    """What it believes without one changes nothing, as live."""
+    (loop, controller), (other, again) = loop_of(mode), loop_of(mode, 0.8)
+    assert np.array_equal(other.run(again).value, loop.run(controller).value)
+
+
+@pytest.mark.parametrize('mode', ['joint', 'force'])
+def test_the_driver_of_a_rollout_is_told_the_measured_contraction(mode):
+    """A controller may ask for a driver whose volume grows with it; that of the rig does not."""
+    loop, controller = loop_of(mode)
+    controller.driver = {'hsv.volume_slope_m3_per_m': 4e-4}
+    usual = loop.run(controller, learn=False)
+    controller.driver['hsv.correct_by_contraction'] = 0.5
+    corrected = loop.run(controller, learn=False)
+    for name, pressures_pa in usual.signals.items():
+        if name.endswith('pressure_pa'):
+            assert np.abs(corrected.signals[name] - pressures_pa).max() > 100.0
 
 
 def test_frozen_rules_stay_as_they_are():
