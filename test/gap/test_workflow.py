@@ -14,14 +14,16 @@
 
 """The gap workflow: verdict, size and place on recordings whose truth is known."""
 
+from dataclasses import replace
 import json
 
-from gap_runs import assert_form, NOMINAL, nominal, recorded, voltages
+from gap_runs import assert_form, duties, NOMINAL, nominal, recorded, voltages
 import numpy as np
 from pam_actuation.report.gap import free_run_overlay, write_gap
 from pam_sim import load_rig
 from pam_sim.effects.registry import effects
 from pam_sim.gap import find_gap
+from pam_sim.gap.criteria import CRITERIA
 from pam_sim.gap.data.health import check_for
 from pam_sim.gap.data.recording import held_mean, Recording
 from pam_sim.gap.data.split import CERTIFY, FIT, long_split, SELECT, UNUSED
@@ -172,6 +174,19 @@ def test_what_cannot_be_compared_is_refused_with_a_reason(spoil, word):
     assert result.verdict == 'refused' and word in result.reason
     assert_form(result)
     json.dumps(result.to_dict(), allow_nan=False)
+
+
+@pytest.mark.parametrize('valve, asked, told', [
+    ('ppr', {}, 'comes at 8 Hz; at least 9 Hz are needed'),
+    ('ppr', {'min_rate_hz': 12.0}, 'comes at 8 Hz; at least 12 Hz are needed'),
+    ('hsv', {}, 'valve_signal comes at 50 Hz; of on/off valves every pulse counts, so at least '
+     '90 Hz are needed'),
+    ('hsv', {'min_pulse_rate_hz': 60.0}, 'at least 60 Hz are needed')])
+def test_a_log_that_is_too_slow_is_told_the_rate_that_decides(valve, asked, told):
+    rig = load_rig(NOMINAL, valve=valve)
+    run = recorded(rig, duties() if valve == 'hsv' else voltages(12.0),
+                   rate_hz=50 if valve == 'hsv' else 8, jitter_s=0.0)
+    assert any(told in one for one in check_for(run, rig, replace(CRITERIA, **asked)).problems)
 
 
 def test_the_limit_of_the_signal_is_that_of_the_regulator():

@@ -179,8 +179,8 @@ def missed_pulses(stamp_ns: IntArray, criteria: Criteria = CRITERIA) -> str:
     if rate_hz >= criteria.min_pulse_rate_hz:
         return ''
     return (f'valve_signal comes at {rate_hz:.0f} Hz; of on/off valves every pulse counts, so at '
-            'least 100 Hz are needed: record each of its messages as it is sent (the other topics '
-            'may be slow)')
+            f'least {criteria.min_pulse_rate_hz:g} Hz are needed: record each of its messages as '
+            'it is sent (the other topics may be slow)')
 
 
 def _periods_s(stamp_ns: IntArray) -> FloatArray:
@@ -198,7 +198,8 @@ def _check_stamps(run: Run, topic: str, health: Health, criteria: Criteria) -> N
     health.rate_hz[topic] = 1.0 / float(np.median(periods))
     rate_hz = health.rate_hz[topic]
     if rate_hz < criteria.min_rate_hz:
-        health.problems.append(f'{topic} comes at {rate_hz:.3g} Hz; at least 10 Hz are needed')
+        health.problems.append(f'{topic} comes at {rate_hz:.3g} Hz; at least '
+                               f'{criteria.min_rate_hz:g} Hz are needed')
     elif topic == 'valve_signal' and health.valve == 'hsv' and (
             missed := missed_pulses(stamps, criteria)):
         health.problems.append(missed)
