@@ -89,8 +89,8 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
     ------
     InputError
         Nothing is unknown, there is no such number or no recording, or a recording offers
-        nothing. Only the force law is unknown, while no force was recorded and an effect is
-        missing.
+        nothing. A mass was added to a load without one. Only the force law is unknown, while no
+        force was recorded and an effect is missing.
 
     """
     progress = _onward(progress)
@@ -100,6 +100,9 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
     if added_kg and len(added_kg) != len(runs):
         raise InputError(f'{len(added_kg)} masses for {len(runs)} recordings; give one for each, '
                          '0 for none', 'added mass')
+    if any(added_kg) and 'mass_kg' not in rig.parameters:
+        raise InputError(f'{max(added_kg):g} kg hung on load `{rig.load}`, which has no mass; a '
+                         'held muscle takes 0', 'added mass')
     unknown = [n for name in unknown for n in stated_names(rig.muscle.law, name, 'unknown number')]
     of_rig = {p.name for p in rig.number_list}
     rig = rig.with_(tolerance={name: UNKNOWN for name in unknown if name in of_rig})

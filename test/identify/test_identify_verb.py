@@ -79,6 +79,8 @@ def test_what_is_found_is_written_and_loads(bag, tmp_path, capsys):
     (['--rig', 'dmsp_5_300_hanging_mass'], 'no number is unknown'),
     (['--rig', 'dmsp_5_300_hanging_mass', '--unknown', 'mas_kg'], 'did you mean `mass_kg`'),
     (['--rig', 'dmsp_5_300_hanging_mass', '--unknown', 'mass_kg', '--added-kg', '-1'], '0 to 500'),
+    (['--rig', 'dmsp_5_300_isometric', '--unknown', 'K_m', '--added-kg', '1'],
+     'added mass: 1 kg hung on load `isometric`, which has no mass'),
     (['--rig', 'dmsp_99', '--unknown', 'mass_kg'], 'dmsp_99')])
 def test_a_mistake_is_one_line_and_exit_code_2(bag, options, said, capsys, tmp_path):
     assert main(['identify', str(bag), *options, '--out', str(tmp_path / 'found')]) == 2
