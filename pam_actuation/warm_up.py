@@ -122,7 +122,7 @@ def tracked(law: str) -> None:
 
 
 def tracked_force() -> None:
-    """Track a force as ``pam tune`` does."""
+    """Track a force in a compiled loop."""
     rig = load_rig(FORCE_RIG)
     ForceLoop(rig, short('force', 'to_n: 5.0')).run(_law('sofc_force_ppr', rig))
 

@@ -48,8 +48,7 @@ if TYPE_CHECKING:
     from pam_sim.joint.rig import JointRig
     from pam_sim.rig import Rig
 
-WARM = tuple(
-    f'pam_actuation.tuning.{name}' for name in ('rollouts', 'force_rollouts', 'joint_rollouts'))
+WARM = 'pam_actuation.tuning.rollouts', 'pam_actuation.tuning.joint_rollouts'
 HELD_OUT_SEED = 7919      # added to the seed for the noise the search never sees
 SHOWN_UNIT = {'mm': ' mm', 'deg': '°'}      # of costs, as people read it
 

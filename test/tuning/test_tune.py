@@ -25,7 +25,7 @@ from pam_actuation.tuning.cost import tracking_cost
 from pam_actuation.tuning.random_rigs import random_rigs
 from pam_actuation.tuning.space import (
     Axis, default_axes, from_unit, PID_INVERSE_AXES, SOFC_AXES, to_unit)
-from pam_actuation.tuning.tune import tune
+from pam_actuation.tuning.tune import tune, WARM
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 import pytest
@@ -53,6 +53,13 @@ def rig():
 def untuned(rig):
     return load_controller(
         'controller: sofc\nsettings: {lead_s: 0.0, learning_rate: 0.5}\n', rig)
+
+
+def test_a_force_is_not_tuned_and_no_worker_imports_its_loop():
+    held = load_rig('dmsp_5_300_isometric_realistic')
+    with pytest.raises(InputError):
+        tune(held, load_controller('sofc_force_ppr', held), load_experiment('force_sine'))
+    assert WARM and not [name for name in WARM if 'force' in name]
 
 
 def test_tuning_improves_held_out_runs_and_reports(rig, tmp_path):
