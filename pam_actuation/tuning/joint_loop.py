@@ -122,7 +122,6 @@ class JointLoop:
                          for rig, config in zip(sides.values(), configs)]
         self._plant = joint.plant(dt_s=PHYSICS_S)
         self._steps = steps, min(int(round(latency_s / PHYSICS_S)), steps - 1)
-        self._fresh_drivers(None)       # refuses two kinds of valves
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle what it is made of: a cluster gets kilobytes, not the arrays."""

@@ -106,6 +106,16 @@ def learning_mask(controller: 'CompiledController | WrappedLaw', learn: Learns, 
     return np.full(ticks, float(may and learn))
 
 
+def _rates_for(period_s: float) -> str:
+    """Return the rates of controllers whose ticks fit a period of the driver."""
+    second, period = round(1.0 / PHYSICS_S), round(period_s / PHYSICS_S)
+    if abs(period * PHYSICS_S - period_s) > 1e-9:
+        return 'none; a period of whole milliseconds has some'
+    rates = [second // steps for steps in range(period, 0, -1)
+             if second % steps == period % steps == 0]
+    return f'{", ".join(map(str, rates))} Hz'
+
+
 class DriverLaw:
     """
     A driver law at a controller's rate.
@@ -129,7 +139,7 @@ class DriverLaw:
         Raises
         ------
         InputError
-            It asks for a period that is no whole number of ticks.
+            The period of a pair of valves is no whole number of ticks.
 
         """
         config = DriverConfig.from_parameters(asked, self._config) if asked else self._config
@@ -137,8 +147,10 @@ class DriverLaw:
             law = replace(config.ppr, period_s=self._tick_s)
             return (zeros(ppr.STATE), law.par(), zeros(ppr.OUTPUT)), 1
         period_s = config.hsv.period_s
-        every = max(1, round(period_s / self._tick_s))
-        if asked and _PERIOD in asked and abs(every * self._tick_s - period_s) > 1e-9:
-            raise InputError(f'the controller asks for {period_s:g} s; a rollout needs a whole '
-                             f'number of its ticks of {self._tick_s:g} s', _PERIOD)
+        every = round(period_s / self._tick_s)
+        if every < 1 or abs(every * self._tick_s - period_s) > 1e-9:
+            raise InputError(
+                f'the driver acts every {period_s:g} s; a rollout needs a whole number of the '
+                f"controller's ticks in that, not of {self._tick_s:g} s; allowed rates are "
+                f'{_rates_for(period_s)}', _PERIOD)
         return (initial_state(), config.hsv.par(), zeros(hsv_kernel.OUTPUT)), every

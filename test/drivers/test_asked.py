@@ -129,6 +129,32 @@ def test_a_rollout_drives_valves_as_often_as_asked(rig, asked, every):
         assert every == 2 or (changes % 2 == 1).any()
 
 
+@pytest.mark.parametrize('rate_hz', [50, 100, 125, 200, 250])
+def test_a_rollout_keeps_the_period_of_the_driver_or_is_refused(rig, rate_hz):
+    """Live the valves go on every 10 ms, whatever the rate of the controller."""
+    controller = load_controller(
+        f'controller: pid\nsettings: {{rate_hz: {rate_hz}}}\n', rig)
+    for make, plant in ((ClosedLoop, ()), (ForeignLoop, (rig.plant,))):
+        loop = make(*plant, rig, load_experiment(JUMP), rate_hz=float(rate_hz))
+        if rate_hz in (100, 200):
+            moves = np.flatnonzero(np.diff(loop.run(controller).signal, axis=0).any(axis=1)) + 1
+            assert len(moves) > 10 and (moves % (rate_hz // 100) == 0).all()
+            continue
+        with pytest.raises(InputError, match=(
+                'hsv.period_s: .*every 0.01 s.*0.0.* s.* 100, 200, 500, 1000 Hz')):
+            loop.run(controller)
+
+
+def test_a_period_that_is_asked_for_makes_another_rate_fit(rig):
+    controller = load_controller(
+        'controller: pid\nsettings: {rate_hz: 125}\ndriver: {hsv.period_s: 0.008}\n', rig)
+    loop = ClosedLoop(rig, load_experiment(JUMP), rate_hz=125.0)
+    assert np.ptp(loop.run(controller).signal) > 0.0
+    controller.driver['hsv.period_s'] = 0.0035
+    with pytest.raises(InputError, match='none; a period of whole milliseconds'):
+        loop.run(controller)
+
+
 def test_a_rollout_of_a_joint_drives_valves_as_often_as_asked():
     """Another period gives another motion; of one that does not fit the ticks there is none."""
     joint = load_joint('joint_dmsp_5_300_realistic', valve='hsv')
