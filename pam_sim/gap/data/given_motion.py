@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-The contraction that a load prescribes, without what the noise of its sensor would make of it.
+The measured motion, without what the noise of its sensor would make of it.
 
 The model takes the motion as it is given: its speed becomes damping, and its direction that of dry
 friction. Noise at rest would turn that direction hundreds of times a second.
@@ -26,6 +26,7 @@ from pam_sim.gap.data.noise import noise_of
 WINDOW_S = 0.061             # of the parabolas that smooth; passes what is slower than 15 Hz
 PARABOLA_GAIN = 2.25         # variance of the middle of a parabola through N values, times N
 MOSTLY = 0.5                 # share of the time
+DERIVATIVES_S = 0.101        # of the cubics whose derivatives are taken
 STILL_SD = 3.0               # a move within so many deviations of the noise left is none
 
 
@@ -62,3 +63,24 @@ def followed(values: FloatArray, play: float) -> FloatArray:
         place = min(max(place, value - play), value + play)
         found.append(place)
     return np.array(found)
+
+
+def smooth_motion(time_s: FloatArray, contraction_m: FloatArray, grid_s: FloatArray
+                  ) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """
+    Return contraction [m], rate [m/s] and acceleration [m/s^2] on an even grid, smoothed.
+
+    Parameters
+    ----------
+    time_s, contraction_m : numpy.ndarray, shape (M,)
+        What was measured.
+    grid_s : numpy.ndarray, shape (N,)
+        Evenly spaced instants.
+
+    """
+    from scipy.signal import savgol_filter       # slow to import
+    dt_s = float(grid_s[1] - grid_s[0])
+    x = np.interp(grid_s, time_s, contraction_m)
+    steps = 2 * int(0.5 * DERIVATIVES_S / dt_s) + 1
+    x_m, v, a = (savgol_filter(x, steps, 3, deriv=k, delta=dt_s) for k in range(3))
+    return x_m, v, a

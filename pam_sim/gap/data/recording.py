@@ -20,7 +20,7 @@ from typing import Protocol
 
 import numpy as np
 from pam_sim.annotations import BoolArray, FloatArray
-from pam_sim.gap.data.given_motion import given_motion
+from pam_sim.gap.data.given_motion import given_motion, smooth_motion
 from pam_sim.gap.data.jumps import jump_shares
 from pam_sim.gap.data.noise import SLOW_S
 from pam_sim.gap.data.pulses import openings, Pulses
@@ -34,7 +34,6 @@ GRID_S = 0.001
 STAMP_S = 1e-9               # stamps count nanoseconds
 START_S = 0.05               # the state at the start is read from this stretch
 SMOOTH_STEPS = 21            # of a measured signal whose rate is needed
-MOTION_STEPS = 101           # window of the derivatives of measured contraction
 START_SAMPLES = 3            # or from so many samples of a slow log
 EMPTY_PA = 5e3               # above the atmosphere, below which a muscle is empty
 
@@ -194,9 +193,8 @@ class Recording:
     @cached_property
     def motion(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return contraction [m], rate [m/s] and acceleration [m/s^2] on the grid, smoothed."""
-        from scipy.signal import savgol_filter       # slow to import
-        x = np.interp(self.grid_s, self.time_s['contraction'], self.measured['contraction'])
-        return tuple(savgol_filter(x, MOTION_STEPS, 3, deriv=k, delta=GRID_S) for k in range(3))
+        return smooth_motion(
+            self.time_s['contraction'], self.measured['contraction'], self.grid_s)
 
     def tells(self, signal: str, time_s: FloatArray) -> BoolArray:
         """Return at which instants a signal tells of the model: a driven force, in motion."""

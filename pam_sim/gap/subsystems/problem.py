@@ -14,7 +14,7 @@
 
 """One subsystem with the recordings it is compared with."""
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from functools import cached_property, lru_cache
 import math
 import threading
@@ -98,7 +98,8 @@ class SubsystemProblem:
         self.simulations, self.asked, self._lock = 0, 0, threading.Lock()
         self._kept_errors: Recent[FloatArray] = Recent(KEPT_ERRORS)
         self._kept_runs: Recent[Response] = Recent(KEPT_RUNS)
-        self.in_parts = lru_cache(maxsize=None)(self._in_parts)
+        self.in_parts: Callable[[tuple[int, ...]], BoolArray] = lru_cache(maxsize=None)(
+            lambda parts: np.isin(self.part, parts))
         self.known = self._rig_numbers(rig, recordings, criteria) + self._nuisances(recordings)
         self._start = [{s: r.start(s) for s in r.measured} for r in recordings]
         self._index, parts, blocks, signals, measured, times, runs = ([] for _ in range(7))
@@ -274,12 +275,6 @@ class SubsystemProblem:
         place = np.clip((self._index[index][name] - late_s) / GRID_S, 0.0, count - 1.001)
         row = place.astype(int)
         return row, place - row
-
-    def _in_parts(self, parts: tuple[int, ...]) -> BoolArray:
-        """Return which samples are in one of some parts; not to be written to."""
-        found: BoolArray = np.isin(self.part, parts)
-        found.flags.writeable = False
-        return found
 
     def chi2(self, errors: FloatArray, part: int) -> float:
         """Return the mean squared error in a part, each signal with the same weight."""
