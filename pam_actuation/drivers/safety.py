@@ -135,8 +135,9 @@ class SafetySupervisor:
 
     def flow(self, change_pa: float, long_share: float = 0.0) -> None:
         """Tell the change [Pa] the valve should have made, and what share long pulses did."""
-        self.frozen.flow(change_pa)
-        self.unmoved.flow(change_pa, long_share)
+        if math.isfinite(change_pa):        # a model that runs away says nothing
+            self.frozen.flow(change_pa)
+            self.unmoved.flow(change_pa, long_share)
 
     def emergency_stop(self, why: str = 'requested') -> None:
         """Latch the emergency stop: vent at the next tick and until ``reset``."""

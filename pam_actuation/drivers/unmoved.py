@@ -77,11 +77,10 @@ class UnmovedMonitor:
 
     def flow(self, change_pa: float, long_share: float) -> None:
         """Add the change [Pa] expected in one period, and what share of it is of long pulses."""
-        if math.isfinite(change_pa):
-            change_pa = min(max(change_pa, -_MOST_PA), _MOST_PA)
-            self._filled_pa += change_pa
-            self._let_in_pa += max(change_pa, 0.0)
-            self._proven_pa += change_pa * long_share
+        change_pa = min(max(change_pa, -_MOST_PA), _MOST_PA)
+        self._filled_pa += change_pa
+        self._let_in_pa += max(change_pa, 0.0)
+        self._proven_pa += change_pa * long_share
 
     def problem(self, now_ns: int, pressure_pa: float, follows: bool) -> str:
         """

@@ -282,6 +282,18 @@ def test_frozen_reading():
             assert decision.state == OK and decision.level == 1
 
 
+def test_a_frozen_reading_is_noticed_although_the_model_ran_away():
+    bench = Bench(needs_pressure=True)
+    bench.run(100)
+    for k in range(100):
+        bench.now += 5 * MS
+        bench.safety.on_pressure(bench.now, P_ATM_PA + 200e3)
+        bench.safety.on_command(bench.now, P_ATM_PA + 300e3)
+        bench.safety.flow(math.nan if k == 5 else 5e3)
+        decision = bench.safety.tick(bench.now)
+    assert decision.fault == 'pressure_frozen'
+
+
 def test_still_reading_without_flow_is_not_frozen():
     """A quiet noise-free sensor at rest is healthy."""
     bench = Bench()
