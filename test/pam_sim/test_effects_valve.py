@@ -17,9 +17,11 @@
 import numpy as np
 from pam_sim import load_rig
 from pam_sim.effects.registry import effects
+from pam_sim.effects.valve_dead_zone import mean_opening
 from pam_sim.effects.valve_dead_zone_gradual import mean_opening_with_lift
 from pam_sim.errors import InputError
 from pam_sim.units import GAS_CONSTANT_AIR, P_ATM_PA, TEMPERATURE_K
+from pam_sim.valve.hsv import open_time_in, pulse_edges
 from profiles import duties, profile
 import pytest
 from scipy.integrate import solve_ivp
@@ -123,6 +125,27 @@ def test_gradual_dead_zone_of_a_switching_valve_is_the_area_under_its_lift(duty,
     found = mean_opening_with_lift(duty, period_s, open_s, close_s, rise_s, fall_s)
     # A valve that is not shut when the next pulse comes stays open.
     assert found == pytest.approx(1.0 if duty == 0.95 else expected, abs=1e-4)
+
+
+@pytest.mark.parametrize('open_s', [0.0, 1.7e-3, 6e-3, 9e-3, 15e-3])
+@pytest.mark.parametrize('close_s', [0.0, 2e-3, 6e-3, 9e-3, 15e-3])
+def test_the_averaged_valve_opens_like_a_switching_one_that_was_shut(open_s, close_s):
+    period_s = 0.010
+    for duty in np.linspace(0.0, 1.0, 34):
+        off_s, opened_s = 0.0, 0.0
+        for period in range(20):
+            on_s, off_s = pulse_edges(duty * period_s, off_s, period_s, open_s, close_s)
+            if period >= 10:
+                opened_s += open_time_in(0.0, period_s, on_s, off_s)
+        assert mean_opening(duty, period_s, open_s, close_s) == pytest.approx(
+            opened_s / (10 * period_s), abs=1e-9)
+
+
+@pytest.mark.parametrize('fidelity', ['averaged', 'switching'])
+def test_pulses_shorter_than_the_opening_time_let_in_no_air_however_slow_the_valve_shuts(fidelity):
+    slow = held('hsv', ('valve_dead_zone', {'open_time_s': 6e-3, 'close_time_s': 6e-3}),
+                fidelity=fidelity)
+    assert slow.simulate(pulse(fill=0.5)).pressure_pa == pytest.approx(P_ATM_PA)
 
 
 @pytest.mark.parametrize('fidelity', ['averaged', 'switching'])
