@@ -67,6 +67,6 @@ EFFECT = Effect(
 @compiled
 def muscle_force(force_n: float, pressure_pa: float, velocity_m_per_s: float,
                  par: np.record) -> float:
-    """Return the force less that of the contact."""
-    return force_n - loop_level_n(pressure_pa, par) * saturation(
+    """Return the force less that of the contact, of which none is left far below one bar."""
+    return force_n - max(loop_level_n(pressure_pa, par), 0.0) * saturation(
         velocity_m_per_s * par.inverse_speed_s_per_m)

@@ -111,6 +111,18 @@ def test_a_step_may_be_long_against_the_width(name, given, stride_m):
     assert np.max(np.abs(fine[::coarse] - long)) < 0.005 * HALF_WIDTH_N
 
 
+@pytest.mark.parametrize('name', [*ON_TRAVEL, 'smooth_friction'])
+def test_friction_that_grows_with_pressure_is_none_below_the_atmosphere(name):
+    path = np.linspace(0.0, 0.020, 301)              # a shut muscle is made shorter
+    shut = load_rig('dmsp_5_300_driven').with_(valve='hsv')
+    without, with_it = (rig.simulate(np.zeros((300, 2)), contraction_m=path,
+                                     initial_pressure_pa=P_ATM_PA)
+                        for rig in (shut, shut.with_(effects=[{'name': name, 'parameters': {
+                            'force_n': 0.0, 'force_per_pa': 2e-5}}])))
+    assert with_it.pressure_pa[-1] < P_ATM_PA - 10e3
+    assert np.array_equal(with_it.force_n, without.force_n)
+
+
 def test_bouc_wen_follows_its_equation():
     path, _ = legs(5, 7)
     travel = (path - path[0]) / 0.8e-3
