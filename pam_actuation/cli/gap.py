@@ -236,7 +236,6 @@ def _explain(args: argparse.Namespace) -> int:
     from pam_actuation.report.model_held import recorded_model
     from pam_sim import load_rig
     from pam_sim.catalogue import catalogue, find
-    from pam_sim.gap.plan.detectable import NOT_PROPORTIONAL
     from pam_sim.gap.plan.look_alikes import look_alikes
     from pam_sim.rig_text import rig_title
     from pam_sim.units import behind_number
@@ -254,7 +253,7 @@ def _explain(args: argparse.Namespace) -> int:
     least = found['least']
     lines = [in_full(entry), f'model: {rig_title(rig)}, valve {rig.valve}']
     if not least:
-        lines.append(f'no smallest size: {NOT_PROPORTIONAL}')
+        lines.append(f'no smallest size: {found["why"]}')
     else:
         unit = behind_number(least['unit'])
         lines.append(f'shows from {least["quantity"]} = {least["value"]:.3g}{unit} on '

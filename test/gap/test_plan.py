@@ -14,6 +14,7 @@
 
 """Planning before any data exist: least sizes, pairs that look alike, the best protocol."""
 
+from dataclasses import replace
 import json
 
 from gap_runs import nominal, recorded, voltages
@@ -21,8 +22,11 @@ import numpy as np
 from pam_actuation.cli.main import main
 from pam_actuation.experiments import load_experiment, protocols
 from pam_sim.gap.data.recording import Recording
+from pam_sim.gap.plan import look_alikes
+from pam_sim.gap.plan.detectable import BEYOND_RANGE
 from pam_sim.gap.plan.outlook import in_proportion, least_factors, outlooks, score
 from pam_sim.gap.plan.sensitivity import Sensitivities
+from pam_sim.gap.select.screening import screen
 from pam_sim.gap.subsystems.problems import subsystem_problems
 from pam_sim.located_yaml import dump_yaml
 import pytest
@@ -126,6 +130,16 @@ def test_a_name_that_cannot_be_tried_is_told_and_alone_refused(tmp_path, capsys)
 def test_an_option_of_another_question_is_refused(words, told, capsys):
     assert main(['gap', 'bag', *words]) == 2
     assert capsys.readouterr().err == f'pam gap: {told}\n'
+
+
+def test_an_explanation_gives_no_size_beyond_the_range(monkeypatch, capsys):
+    monkeypatch.setattr(look_alikes, 'screen', lambda *of: [
+        replace(one, seen=1e-3 * one.seen) for one in screen(*of)])
+    assert main(['gap', '--explain', 'coulomb_friction', '--json']) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said['least'] is None and said['why'] == BEYOND_RANGE
+    assert main(['gap', '--explain', 'coulomb_friction']) == 0
+    assert f'no smallest size: {BEYOND_RANGE}\n' in capsys.readouterr().out
 
 
 def test_the_verb_writes_an_experiment_that_runs(monkeypatch, tmp_path, capsys):

@@ -14,13 +14,16 @@
 
 """Which effects are worth a fit: what a promise must not depend on."""
 
+from dataclasses import replace
+
 from gap_runs import nominal, recorded, voltages
 import numpy as np
 from pam_sim.gap.criteria import CRITERIA
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.fit.estimator import Estimator
+from pam_sim.gap.plan.detectable import BEYOND_RANGE, NOT_SEEN, sizes_or_reasons
 from pam_sim.gap.select.candidates import candidates
-from pam_sim.gap.select.screening import screen
+from pam_sim.gap.select.screening import screen, Screened
 from pam_sim.gap.subsystems.problems import subsystem_problems
 import pytest
 
@@ -54,6 +57,26 @@ def test_what_a_number_at_the_end_of_its_range_cannot_do_is_promised():
     assert max(deviations) == pytest.approx(CRITERIA.max_prior_sd, abs=1e-3)
     assert next(s for s in found if s.candidate.effect == 'viscous_damping'
                 ).promise['muscle'] > 0.3
+
+
+@pytest.mark.parametrize('name, quantity', [
+    ('coulomb_friction', 'force_n'), ('viscous_damping', 'force_at_50mm_per_s_n'),
+    ('contraction_bias', 'bias_m')])
+def test_a_size_that_shows_only_beyond_its_range_is_none(name, quantity):
+    outputs = ('pressure', 'contraction', 'force')
+    candidate = next(c for c in candidates(nominal(), outputs) if c.name == name)
+    free, = candidate.free
+    size = candidate.starts()[0]
+    at_end = Screened(candidate, (), {}, seen=size[free.name] / free.upper, size=size)
+
+    def told(seen):
+        return sizes_or_reasons([replace(at_end, seen=seen)], nominal(), outputs)[name]
+    assert told(1.01 * at_end.seen)['value'] == pytest.approx(
+        told(2.0 * at_end.seen)['value'] * 2.0 / 1.01)
+    beyond = told(0.99 * at_end.seen)
+    assert beyond['value'] is None and beyond['why'] == BEYOND_RANGE
+    assert beyond['quantity'] == quantity
+    assert told(0.0)['why'] == NOT_SEEN
 
 
 def test_switching_times_are_tried_one_by_one():

@@ -24,6 +24,7 @@ from pam_sim.rig import Rig
 
 NOT_PROPORTIONAL = 'what it does is not about proportional to any of its parameters'
 NOT_SEEN = 'it was not tried, or changes no signal here'
+BEYOND_RANGE = 'it would show only beyond the range in which it is fitted'
 
 
 def least_sizes(screened: Iterable[Screened], rig: Rig, floors: float = 1.0
@@ -33,7 +34,7 @@ def least_sizes(screened: Iterable[Screened], rig: Rig, floors: float = 1.0
 
     A size shows when its signature, freed of what the known numbers can do, has an rms of
     ``floors`` noise floors. Effects whose response is not about proportional to their
-    size are left out.
+    size are left out, and those that show only beyond the range of a parameter.
     """
     found = {}
     for s in screened:
@@ -43,14 +44,23 @@ def least_sizes(screened: Iterable[Screened], rig: Rig, floors: float = 1.0
         factor = floors / s.seen
         values = {f.name: s.size[f.name] * (1.0 if f.shape else factor)
                   for f in s.candidate.free}
-        values = {f.name: min(max(values[f.name], f.lower), f.upper) for f in s.candidate.free}
+        if any(not f.lower <= values[f.name] <= f.upper for f in s.candidate.free):
+            continue
         report = effect.report(effect.values(s.candidate.setting(values)['parameters']), rig)
         quantity, (value, unit) = next(iter(report.items()))
         found[effect.name] = {'value': float(value), 'unit': unit, 'quantity': quantity}
     return found
 
 
-def sizes_or_reasons(screened: Iterable[Screened], rig: Rig, outputs: Sequence[str],
+def why_none(name: str, screened: Iterable[Screened], rig: Rig) -> str:
+    """Return why ``least_sizes`` has none of an effect that can be tried."""
+    if all(f.shape for f in get_effect(name).free_parameters(rig.valve)):
+        return NOT_PROPORTIONAL
+    seen = any(s.seen > 0.0 for s in screened if s.candidate.effect == name)
+    return BEYOND_RANGE if seen else NOT_SEEN
+
+
+def sizes_or_reasons(screened: Sequence[Screened], rig: Rig, outputs: Sequence[str],
                      floors: float = 1.0) -> dict[str, dict[str, Any]]:
     """
     Return ``least_sizes``, and for every other effect of the valve why it has none (``why``).
@@ -64,8 +74,7 @@ def sizes_or_reasons(screened: Iterable[Screened], rig: Rig, outputs: Sequence[s
                 or rig.valve not in effect.valves):
             continue
         quantity, (_, unit) = next(iter(effect.report(effect.values({}), rig).items()))
-        shapes_only = all(f.shape for f in effect.free_parameters(rig.valve))
-        found[name] = {'value': None, 'unit': unit, 'quantity': quantity,
-                       'why': why_not(name, rig, outputs) or (
-                           NOT_PROPORTIONAL if shapes_only else NOT_SEEN)}
+        found[name] = {
+            'value': None, 'unit': unit, 'quantity': quantity,
+            'why': why_not(name, rig, outputs) or why_none(name, screened, rig)}
     return found

@@ -24,7 +24,7 @@ from pam_sim.errors import InputError
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.fit.candidate import Candidate
 from pam_sim.gap.fit.estimator import Estimator
-from pam_sim.gap.plan.detectable import least_sizes
+from pam_sim.gap.plan.detectable import least_sizes, why_none
 from pam_sim.gap.select.candidates import candidates
 from pam_sim.gap.select.screening import ErrorSpace, free_signature, screen, spaces_of
 from pam_sim.gap.subsystems.effects import acts_on
@@ -51,8 +51,8 @@ def look_alikes(run: Run, rig: Rig, name: str) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``least``: smallest size that moves a signal by one noise floor (None where its
-        response is not proportional); ``alike``: list of (name, |cosine| of signatures).
+        ``least``: smallest size that moves a signal by one noise floor, or None; ``why``: why
+        there is none, or None; ``alike``: list of (name, |cosine| of signatures).
 
     Raises
     ------
@@ -80,8 +80,10 @@ def look_alikes(run: Run, rig: Rig, name: str) -> dict[str, Any]:
         if cosine > estimator.criteria.alike_cosine:
             alike.append((c.name, cosine))
     alike.sort(key=lambda pair: -pair[1])
-    least = least_sizes(screen(estimator, estimator.base, [mine]), rig)
-    return {'least': least.get(name), 'alike': alike[:MOST]}
+    screened = screen(estimator, estimator.base, [mine])
+    least = least_sizes(screened, rig).get(name)
+    return {'least': least, 'why': None if least else why_none(name, screened, rig),
+            'alike': alike[:MOST]}
 
 
 def _signatures(estimator: Estimator, candidate: Candidate, spaces: Mapping[str, ErrorSpace]
