@@ -110,9 +110,8 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
     if not wanted:
         raise InputError('no number is unknown: state `unknown` in `tolerance`, or name numbers',
                          rig.name)
-    runs, remarks = commanded(runs, rig)
-    offers, holes = offers_of(runs, rig, added_kg or [0.0] * len(runs), spare_certify)
-    remarks += holes
+    runs, of_commands = commanded(runs, rig)
+    offers, of_offers = offers_of(runs, rig, added_kg or [0.0] * len(runs), spare_certify)
     problems = problems_of(rig, offers)
     acting = [n for n in wanted if any(n.acts_in(p) for p in problems)]
     numbers = [*acting, *known_numbers_of(problems, acting)]
@@ -131,7 +130,7 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
             law, f'{LAW_AND_EFFECT}; pam gap fits both', runs, rig,
             unknown=[name for name in unknown if name not in law], added_kg=added_kg, seed=seed,
             advise=advise, progress=progress, spare_certify=spare_certify)
-        found.remarks = [*remarks, *found.remarks]
+        found.remarks = [*of_commands, *found.remarks]      # it has those of the offers
         return found
     forms: FloatArray = np.zeros(len(acting))       # doubt by the formulation, in coordinates
     if incomplete:
@@ -161,7 +160,8 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
         [{'path': one.path, 'kind': one.kind, 'added_kg': one.added_kg} for one in offers],
         _signals(before, _rms(squares)), incomplete, bent=bent)
     result.remarks += [f'{one.path}: {one.rest.text()}' for one in offers if one.rest]
-    result.remarks += remarks + ([] if force_compared else of_one_scale(acting))
+    result.remarks += [*of_commands, *of_offers]
+    result.remarks += [] if force_compared else of_one_scale(acting)
     result.remarks += remarks_on(rig, problems, wanted, numbers_found, left, at_rest)
     # What ends at the edge of its range needs another model rather than another recording.
     if advise and (any(not one.is_narrow for one in numbers_found) or len(acting) < len(wanted)):

@@ -27,6 +27,8 @@ from pam_sim.identify.before_gap import numbers_first
 from pam_sim.identify.numbers import unknown_numbers
 from pam_sim.identify.possible import possible_effects
 from pam_sim.identify.records import offer_of, problems_of
+from pam_sim.run import Series
+from pam_sim.units import P_ATM_PA
 import pytest
 
 ISOMETRIC = load_rig('dmsp_5_300_isometric').with_(parameters={'contraction_m': 0.02})
@@ -128,6 +130,24 @@ def test_beside_a_missing_effect_the_law_is_left_to_the_look_for_it():
     assert any('law.a3: as in the model' in remark for remark in found.remarks)
     with pytest.raises(InputError, match='record a force, or let pam gap fit both'):
         identify(run, RIG, ['law.a3'], advise=False)
+
+
+def test_a_hole_is_told_once_where_the_law_is_left_to_the_look():
+    run = record(RIG.with_(effects=['creep', 'coulomb_friction']), gauge_pa=(50e3, 400e3, 150e3),
+                 hold_s=1.5, keep=('pressure', 'contraction'))
+    pressure = run.topics['pressure']
+    at_s = pressure.time_s(run.start_ns)
+    kept = (at_s < 2.0) | (at_s > 2.4)
+    run.topics['pressure'] = Series(
+        pressure.stamp_ns[kept], {k: v[kept] for k, v in pressure.values.items()}, pressure.unit)
+    signal = run.topics.pop('valve_signal')
+    wanted_pa = P_ATM_PA + RIG.parameters['K_m'] * signal.values['ppr_voltage']
+    run.topics['pressure_command'] = Series(
+        signal.stamp_ns, {'pressure_pa': wanted_pa}, {'pressure_pa': 'Pa'})
+    said = identify(run, RIG, ['law.a3', 'spring_n_per_m'], advise=False).remarks
+    for one in ('law.a3: as in the model', 'without a hole count as 2 recordings',
+                'the pressure command is taken'):
+        assert sum(one in remark for remark in said) == 1
 
 
 def test_the_look_begins_with_all_unknown_numbers_but_the_law():
