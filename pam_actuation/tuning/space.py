@@ -15,7 +15,7 @@
 """What may be tuned and between which bounds: a named box, logarithmic where apt."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 from typing import TYPE_CHECKING
 
@@ -100,11 +100,15 @@ MPC_AXES = (
 
 
 def _of_sofc(controller: 'Law') -> tuple[Axis, ...]:
-    from pam_actuation.control.sofc.settings import SCALING
+    from pam_actuation.control.sofc.settings import (
+        INERTIA, LEAST_INERTIA_PA_S2_PER_M, predicted_gains, SCALING)
     rules = controller.rules
     learned = rules is not None and (
         rules.feedforward.any() or (rules.feedback != rules.feedback_initial).any())
     axes = JOINT_AXES if tracked_by(controller) == JOINT else SOFC_AXES
+    if predicted_gains(controller.settings):
+        axes = tuple(replace(axis, lower=LEAST_INERTIA_PA_S2_PER_M) if axis.name == INERTIA
+                     else axis for axis in axes)
     return tuple(axis for axis in axes if axis.name in controller.settings
                  and not (learned and axis.name in SCALING))
 

@@ -98,6 +98,28 @@ def test_a_switch_takes_its_words_and_numbers_and_nothing_between(kind, one, tmp
             assert f'{number} or {word}' in str(caught.value)
 
 
+PREDICTED = 'predicted_proportional_pa_per_m', 'predicted_derivative_pa_s_per_m'
+
+
+@pytest.mark.parametrize('gain', PREDICTED)
+def test_a_prediction_without_inertia_is_refused(gain, tmp_path):
+    path, inertia = tmp_path / 'mine.yaml', 'acceleration_feedforward_pa_s2_per_m'
+
+    def load(*lines):
+        path.write_text('\n  '.join(('controller: sofc\nsettings:', *lines)) + '\n')
+        return load_controller(str(path), StraightRig())
+
+    for line, lines in ((4, ('lead_s: 0.1', f'{gain}: 1.0e+3')),
+                        (5, ('lead_s: 0.1', f'{gain}: 1.0e+3', f'{inertia}: 0.5'))):
+        with pytest.raises(InputError, match='allowed 1 to 1e.07 Pa s2/m with') as caught:
+            load(*lines)
+        assert caught.value.where == f'{path}:{line}'
+    assert load(f'{gain}: 1.0e+3', f'{inertia}: 1').settings[gain] == 1e3
+    assert load(f'{gain}: 0.0', f'{inertia}: 0').settings[gain] == 0.0
+    with pytest.raises(InputError, match=inertia):
+        rebuild(load(f'{gain}: 1.0e+3', f'{inertia}: 1'), {inertia: 0.0})
+
+
 def test_the_settings_that_choose_are_switches():
     assert {one.name for _, one in SWITCHES} == {
         'index_form', 'membership_form', 'jump_form', 'jump_announced', 'use_static_inverse'}

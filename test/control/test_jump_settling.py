@@ -203,6 +203,7 @@ def test_a_reference_that_nobody_announced_goes_on_for_the_dead_time_only(invers
         controller = SelfOrganizingFuzzyController(
             inverse, {'lead_s': lead_s, 'dead_time_s': dead_s, 'jump_time_s': MOVE_S,
                       'half_strength_m': 4e-5, 'predicted_proportional_pa_per_m': 1.0,
+                      'acceleration_feedforward_pa_s2_per_m': 2e4,
                       'announced_strength_time_s': 0.5}, rig_name='a/ppr')
         st, leads = fields(controller._state, STATE), []
         for tick in range(300):

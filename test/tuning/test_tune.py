@@ -22,12 +22,14 @@ from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.experiments.experiment import load_experiment
 from pam_actuation.tuning.closed_loop import ClosedLoop
 from pam_actuation.tuning.cost import tracking_cost
+from pam_actuation.tuning.problem import rebuild
 from pam_actuation.tuning.random_rigs import random_rigs
 from pam_actuation.tuning.space import (
     Axis, default_axes, from_unit, PID_INVERSE_AXES, SOFC_AXES, to_unit)
 from pam_actuation.tuning.tune import tune, WARM
 from pam_sim import load_rig
 from pam_sim.errors import InputError
+from pam_sim.joint import load_joint
 import pytest
 
 SHORT_SINE = """
@@ -153,6 +155,18 @@ def test_axes_are_clipped_scaled_and_checked(rig):
         tune(rig, untuned(rig), load_experiment(SHORT_SINE), axes=(Axis('speed', 1.0, 2.0),))
     with pytest.raises(InputError, match='too small'):
         tune(rig, untuned(rig), load_experiment(SHORT_SINE), budget=3)
+
+
+@pytest.mark.parametrize('name, load', [
+    ('sofc_model_ppr', lambda: load_rig('dmsp_5_300_realistic')),
+    ('sofc_model_joint_ppr', lambda: load_joint('joint_dmsp_5_300_realistic'))])
+def test_both_ends_of_each_axis_make_a_controller_that_predicts(name, load):
+    controller = load_controller(name, load())
+    for axis in default_axes(controller):
+        for part in (0.0, 1.0):
+            settings = from_unit((axis,), np.array([part]))
+            assert settings.get('acceleration_feedforward_pa_s2_per_m', 1.0) >= 1.0
+            rebuild(controller, settings)
 
 
 def test_scaling_stays_once_rules_are_learned(rig):

@@ -30,7 +30,7 @@ from pam_actuation.control.sofc.rule_table import linear_feedback_table, RuleBas
 from pam_actuation.control.sofc.rule_text import NUMBERS
 from pam_actuation.control.sofc.rules_output import keep_command, sofc_output
 from pam_actuation.control.sofc.settings import (
-    OF_MODEL, parameter_array, PARAMETERS, scaling_of, SETTINGS)
+    check_inertia, OF_MODEL, parameter_array, PARAMETERS, scaling_of, SETTINGS)
 from pam_actuation.control.sofc.step import sofc_step
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
@@ -70,7 +70,8 @@ class SelfOrganizingFuzzyController(CompiledController):
     def __init__(self, static_inverse: FloatArray, settings: Mapping[str, object] | None = None,
                  rules: RuleBase | None = None, rig_name: str = '',
                  where: Callable[[str], str] | None = None) -> None:
-        settings = checked_settings(SETTINGS, settings, where)
+        given, settings = settings or {}, checked_settings(SETTINGS, settings, where)
+        check_inertia(settings, given, where or str)
         super().__init__(settings, STATE, rig_name)
         if not any(self.settings[name] for name in OF_MODEL):
             self.state_names = self.state_names[:-len(MODEL_OUTPUTS)]

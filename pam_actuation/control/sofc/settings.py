@@ -19,7 +19,7 @@ A setting is one entry of ``SETTINGS``; its field in ``PARAMETERS``, its key, de
 range in files follow from it.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -28,7 +28,9 @@ from pam_actuation.control.settings import parameter_record, setting, switch
 from pam_actuation.control.sofc.path_memory import path_widths_m
 from pam_actuation.control.sofc.rule_text import MOST_SETS
 from pam_sim.annotations import FloatArray
+from pam_sim.errors import InputError
 from pam_sim.records import values_of
+from pam_sim.units import allowed_range
 
 SETTINGS = (
     setting('rate_hz', 'Hz', 200.0, 20.0, 1000.0, 'control rate'),
@@ -99,7 +101,8 @@ SETTINGS = (
     setting('rate_feedforward_pa_s_per_m', 'Pa s/m', 0.0, 0.0, 1e7,
             'pressure per rate of the reference: damping over force per pressure'),
     setting('acceleration_feedforward_pa_s2_per_m', 'Pa s2/m', 0.0, 0.0, 1e7,
-            'pressure per acceleration of the reference: mass over force per pressure'),
+            'pressure per acceleration of the reference: mass over force per pressure; at least 1 '
+            'with feedback on a predicted error'),
     setting('reference_bend_s', 's', 0.0, 0.0, 0.5,
             'low pass on the acceleration with which a reference that nobody announced goes on; '
             '0 = it goes on straight'),
@@ -226,6 +229,9 @@ OF_MODEL = (
     'path_sets', 'model_noise_pa', 'disturbance_time_s', 'predicted_proportional_pa_per_m',
     'predicted_derivative_pa_s_per_m')
 
+# The prediction divides by the inertia.
+INERTIA, LEAST_INERTIA_PA_S2_PER_M = 'acceleration_feedforward_pa_s2_per_m', 1.0
+
 # What rules mean depends on these; a file of rules must agree in all of them.
 SCALING = (
     'rate_hz', 'error_universe_m', 'change_universe_m_per_s', 'feedback_gain_pa',
@@ -236,6 +242,40 @@ SCALING = (
 PATH_SCALING = ('path_sets', 'path_shortest_m', 'path_longest_m')
 # The same, where some of them fade.
 FADING_SCALING = ('path_fading_sets', 'path_fading_shortest_m', 'path_fading_longest_m')
+
+
+def predicted_gains(settings: Mapping[str, float]) -> list[str]:
+    """Return the names of the gains on a predicted error that are not 0."""
+    return [name for name in OF_MODEL if name.startswith('predicted_') and settings[name] > 0.0]
+
+
+def check_inertia(settings: Mapping[str, float], given: Mapping[str, object],
+                  where: Callable[[str], str]) -> None:
+    """
+    Refuse a law that predicts the error with next to no inertia.
+
+    Parameters
+    ----------
+    settings : mapping
+        All settings of the law.
+    given : mapping
+        Those that were stated: the place is that of the inertia, else of a predicted gain.
+    where : callable
+        Place of a setting for errors.
+
+    Raises
+    ------
+    InputError
+        The inertia is too small for a prediction.
+
+    """
+    gains = predicted_gains(settings)
+    if gains and settings[INERTIA] < LEAST_INERTIA_PA_S2_PER_M:
+        usual = next(one for one in SETTINGS if one.name == INERTIA)
+        allowed = allowed_range(LEAST_INERTIA_PA_S2_PER_M, usual.upper, usual.unit, INERTIA)
+        raise InputError(
+            f'`{INERTIA}` is {settings[INERTIA]:g}; allowed {allowed} with feedback on a '
+            'predicted error', where(INERTIA if INERTIA in given else gains[0]))
 
 
 def scaling_of(settings: Mapping[str, Any]) -> dict[str, Any]:
