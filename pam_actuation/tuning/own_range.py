@@ -63,15 +63,11 @@ def with_own_range(controller: 'Law', rig: 'Rig | JointRig', experiments: 'Seque
     asked_m = max((one.chain.extremes()[1] for one in experiments
                    if one.domain == 'contraction'), default=0.0)
     if isinstance(controller, SelfOrganizingFuzzyController) \
-            and asked_m > controller.settings['reference_upper_m'] and not _learned(controller):
+            and asked_m > controller.settings['reference_upper_m'] \
+            and not controller.rules.has_learned():
         upper_m = round(_GRID_M * math.ceil(asked_m / _GRID_M - 1e-9), 6)
         settings['reference_upper_m'] = upper_m
         said.append(f'reference_upper_m is {1e3 * upper_m:g} mm instead of '
                     f'{1e3 * controller.settings["reference_upper_m"]:g}: the experiments ask '
                     'for that')
     return (rebuild(controller, settings) if settings else controller), said
-
-
-def _learned(controller: SelfOrganizingFuzzyController) -> bool:
-    return any((table.values != 0.0).any() for table in controller.rules.tables()
-               if table.name != 'feedback')

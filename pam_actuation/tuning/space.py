@@ -102,9 +102,7 @@ MPC_AXES = (
 def _of_sofc(controller: 'Law') -> tuple[Axis, ...]:
     from pam_actuation.control.sofc.settings import (
         INERTIA, LEAST_INERTIA_PA_S2_PER_M, predicted_gains, SCALING)
-    rules = controller.rules
-    learned = rules is not None and (
-        rules.feedforward.any() or (rules.feedback != rules.feedback_initial).any())
+    learned = controller.rules is not None and controller.rules.has_learned()
     axes = JOINT_AXES if tracked_by(controller) == JOINT else SOFC_AXES
     if predicted_gains(controller.settings):
         axes = tuple(replace(axis, lower=LEAST_INERTIA_PA_S2_PER_M) if axis.name == INERTIA

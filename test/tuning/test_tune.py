@@ -22,6 +22,7 @@ from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.experiments.experiment import load_experiment
 from pam_actuation.tuning.closed_loop import ClosedLoop
 from pam_actuation.tuning.cost import tracking_cost
+from pam_actuation.tuning.own_range import with_own_range
 from pam_actuation.tuning.problem import rebuild
 from pam_actuation.tuning.random_rigs import random_rigs
 from pam_actuation.tuning.space import (
@@ -169,12 +170,21 @@ def test_both_ends_of_each_axis_make_a_controller_that_predicts(name, load):
             rebuild(controller, settings)
 
 
-def test_scaling_stays_once_rules_are_learned(rig):
-    controller = untuned(rig)
-    names = {axis.name for axis in default_axes(controller)}
-    assert 'feedback_gain_pa' in names
-    controller.rules.feedforward[0, 3] = 100.0
-    assert 'feedback_gain_pa' not in {axis.name for axis in default_axes(controller)}
+@pytest.mark.parametrize('name', [
+    'feedback', 'feedforward', 'motion', 'path', 'covariance', 'feedback_of_a_file'])
+def test_scaling_stays_once_rules_are_learned(rig, name):
+    def axes():
+        return {axis.name for axis in default_axes(controller)}
+
+    controller = load_controller('sofc_model_ppr', rig)
+    assert {'feedback_gain_pa', 'reference_knots'} <= axes()
+    getattr(controller.rules, name.split('_')[0])[..., 0, 3] += 0.1
+    if name == 'feedback_of_a_file':        # its rules are the initial ones as well
+        controller.rules.feedback_initial[...] = controller.rules.feedback
+    assert not {'feedback_gain_pa', 'reference_knots'} & axes()
+    far = load_experiment(HOLD.replace('0.014', '0.034'))
+    after, _ = with_own_range(controller, rig, [far])
+    assert after.settings['reference_upper_m'] == controller.settings['reference_upper_m'] < 0.034
 
 
 def test_cost_weighs_late_errors_and_refuses_runaways():

@@ -307,6 +307,13 @@ class RuleBase:
             values[...] = initial
             fired[...] = 0.0
 
+    def has_learned(self) -> bool:
+        """Return whether any rule, or what is known of the muscle, is not that of no teaching."""
+        untaught = {'feedback': linear_feedback_table()}
+        return bool(np.any(self.covariance)) or any(
+            np.any(values != untaught.get(name, 0.0))
+            for name, values in zip(self.NAMES, self.arrays()))
+
     def digest(self) -> str:
         """Return the sha256 of the rules as hexadecimal text."""
         total = hashlib.sha256()
