@@ -31,7 +31,8 @@ force map         gain times 0.85 to 1.15                     both
 
 Both muscles of a joint are drawn each by itself.
 
-The ranges are design values. Each is drawn evenly, independently of the others.
+The ranges are design values. Each is drawn evenly, independently of the others. A number that
+would leave the range of its parameter becomes the end of that range.
 """
 
 from collections.abc import Callable
@@ -41,6 +42,7 @@ import numpy as np
 from pam_sim.annotations import FloatArray
 from pam_sim.effects.registry import get_effect
 from pam_sim.effects.setting import EffectSetting, equivalent, forms_of
+from pam_sim.joint.parameters import PARAMETERS
 from pam_sim.joint.rig import JointRig
 from pam_sim.parameters import Parameter
 from pam_sim.rig import Rig
@@ -89,8 +91,8 @@ def _drawn_joint(joint: JointRig, part: FloatArray) -> JointRig:
     """Return the joint at a point of the unit cube."""
     limb = _between(LIMB_FACTOR, part[-1])
     return joint.with_(
-        parameters={name: joint.parameters[name] * limb
-                    for name in ('limb_mass_kg', 'inertia_kg_m2')},
+        parameters=_inside(PARAMETERS, {name: joint.parameters[name] * limb
+                                        for name in ('limb_mass_kg', 'inertia_kg_m2')}),
         flexor=_drawn(joint.flexor, part[:_DRAWS]),
         extensor=_drawn(joint.extensor, part[_DRAWS:2 * _DRAWS]))
 
@@ -108,14 +110,12 @@ def _drawn(rig: Rig, part: FloatArray) -> Rig:
         gauge_pa = values['supply_pa'] - P_ATM_PA
         changed['supply_pa'] = P_ATM_PA + gauge_pa * _between(SUPPLY_FACTOR, part[3])
     if 'mass_kg' in values:
-        mass = next(p for p in rig.parameter_list if p.name == 'mass_kg')
-        changed['mass_kg'] = _within(
-            mass, _between(MASS_KG, part[4]) * (values['mass_kg'] / NOMINAL_KG))
+        changed['mass_kg'] = _between(MASS_KG, part[4]) * (values['mass_kg'] / NOMINAL_KG)
     delay_s = _between(DEAD_TIME_S, part[2])
     stated = forms_of(rig.effects, 'valve_dead_time')
     has_one = equivalent(rig, 'valve_dead_time', 'delay_s') > 0.0
     delays = stated if has_one else [EffectSetting.of('valve_dead_time')]
-    return rig.with_(parameters=changed, effects=[
+    return rig.with_(parameters=_inside(rig.parameter_list, changed), effects=[
         *(_resized(one, lambda value: value * friction)
           if get_effect(one.name).family == 'friction' else one
           for one in rig.effects if one not in stated),
@@ -129,6 +129,11 @@ def _between(ends: tuple[float, float], part: float) -> float:
 
 def _within(parameter: Parameter, value: float) -> float:
     return min(max(value, parameter.lower), parameter.upper)
+
+
+def _inside(parameters: tuple[Parameter, ...], drawn: dict[str, float]) -> dict[str, float]:
+    """Return drawn numbers, each within its range."""
+    return {p.name: _within(p, drawn[p.name]) for p in parameters if p.name in drawn}
 
 
 def _resized(setting: EffectSetting, change: Callable[[float], float]) -> dict[str, Any]:

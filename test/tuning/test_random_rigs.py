@@ -20,6 +20,7 @@ from pam_actuation.tuning.random_rigs import (
     VALVE_FACTOR)
 from pam_sim import load_rig
 from pam_sim.effects.setting import forms_of
+from pam_sim.joint import load_joint
 from pam_sim.units import P_ATM_PA
 import pytest
 
@@ -84,10 +85,22 @@ def test_a_dead_time_in_another_formulation_is_drawn_in_this_one():
         drawn_s['delay_s'] / nominal_s['delay_s']) != 1.0
 
 
-def test_a_number_at_the_end_of_its_range_stays_in_it():
-    rig = load_rig('dmsp_40_300_hanging_mass').with_(
-        parameters={'mass_kg': 500.0},
+@pytest.mark.parametrize('valve, at_end', [
+    ('ppr', {'mass_kg': 500.0}), ('ppr', {'T_m': 2.0}), ('ppr', {'T_m': 0.001}),
+    ('hsv', {'C': 1e-8}), ('hsv', {'C': 1e-12}), ('hsv', {'supply_pa': 1.5e5}),
+    ('ppr', {'force_map_gain': 5.0}), ('ppr', {'force_map_gain': 0.2})])
+def test_a_number_at_the_end_of_its_range_stays_in_it(valve, at_end):
+    rig = load_rig('dmsp_40_300_hanging_mass', valve=valve).with_(
+        parameters=at_end,
         effects=[{'name': 'valve_dead_time', 'parameters': {'delay_s': 0.5}}])
-    for one in random_rigs(rig, 20, seed=1):
-        assert one.parameters['mass_kg'] <= 500.0
-        assert one.effect('valve_dead_time').parameters['delay_s'] <= 0.5
+    (name, value), = at_end.items()
+    drawn = random_rigs(rig, 20, seed=1)
+    assert value in [one.parameters[name] for one in drawn]
+    assert all(one.effect('valve_dead_time').parameters['delay_s'] <= 0.5 for one in drawn)
+
+
+def test_a_limb_at_the_end_of_its_range_stays_in_it():
+    joint = load_joint('joint_dmsp_5_300_realistic').with_(
+        parameters={'limb_mass_kg': 100.0, 'inertia_kg_m2': 100.0})
+    for one in random_rigs(joint, 20, seed=1):
+        assert one.parameters['limb_mass_kg'] <= 100.0 and one.parameters['inertia_kg_m2'] <= 100.0
