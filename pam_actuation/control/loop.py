@@ -58,8 +58,8 @@ silent (of a joint: while both are vented)     ago; a new message resumes
 of two muscles one stays empty; its driver     vents both until that one follows again
 vents against the commands or falls silent;    (``slack_muscle``): none is left alone
 its pressure is lost                           under air
-loop or driver late over 20 ms, or a reading   learning stands still for 0.25 s
-older than ``on_time`` allows its sensor
+loop or driver late over 20 ms, or a reading   learning stands still for 0.25 s and as long
+older than ``on_time`` allows its sensor       again as it was late, at most 0.5 s
 the loop itself stood still                    waits up to 20 ms for a measurement
 the loop itself stood still over 0.25 s        starts bumplessly
 =============================================  ==========================================

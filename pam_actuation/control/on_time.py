@@ -26,7 +26,7 @@ from statistics import median_low
 LATE_NS = 20_000_000        # a loop this late leaves an error
 # For a slow sensor. With readings 30 ms apart a law that learns may swing, on on/off valves first.
 LATEST_NS = 35_000_000
-AFTER_LATE_NS = 250_000_000     # for so long, credit delay included
+AFTER_LATE_NS = 250_000_000     # for so long, credit delay included, and at most so long again
 _INTERVALS = 41             # of which the middle one is that of the sensor
 _AT_LEAST = 11              # of these before they count
 _AGES = 2                   # intervals that a reading may be old: uneven ones, and a way
@@ -87,7 +87,7 @@ class OnTime:
         # Asked for where it counts alone: at most sensors no reading is ever that old.
         old = age_ns > self.late_ns and age_ns > self._oldest_ns()
         if old or max(gap_ns, silent_ns) > self.late_ns:
-            self._from_ns = now_ns + late_ns + AFTER_LATE_NS
+            self._from_ns = now_ns + min(late_ns, AFTER_LATE_NS) + AFTER_LATE_NS
         on_time = now_ns >= self._from_ns
         self._tell(on_time, age_ns if old else 0)
         return on_time

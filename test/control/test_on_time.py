@@ -86,6 +86,16 @@ def test_readings_too_old_to_learn_from_are_told(readings, age_ms):
     assert float(words.split()[-1]) == pytest.approx(age_ms, abs=10.0)
 
 
+@pytest.mark.parametrize('silent_s', [0.06, 0.5, 60.0])
+def test_after_a_long_silence_of_the_driver_learning_soon_goes_on(silent_s):
+    on_time, silent_ns = OnTime(200.0, 'contraction'), round(silent_s * 1e9)
+    assert not on_time.judge(silent_ns, 5 * MS, silent_ns, silent_ns)
+    after_ms = 1e-6 * AFTER_LATE_NS + min(1e3 * silent_s, 1e-6 * AFTER_LATE_NS)
+    for k in range(1, 200):
+        now_ns = silent_ns + k * 5 * MS
+        assert on_time.judge(now_ns, 5 * MS, now_ns, 0) == (k * 5 >= after_ms)
+
+
 def test_what_is_forgotten_is_told_no_longer():
     _, _, on_time = judged(every(80.0))
     on_time.forget()
