@@ -103,6 +103,8 @@ class FrozenMeasurement:
             NaN where none is fresh: then nothing is noticed.
 
         """
+        # The clock may have been set back.
+        self._noticed_ns = min(self._noticed_ns, now_ns)
         if self._band:
             value = self._averaged(stamp_ns, value)
         if not abs(value - self._value) <= self._band or stamp_ns < self._since_ns:

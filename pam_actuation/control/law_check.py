@@ -49,4 +49,6 @@ class LawCheck:
         for at, (lowest, highest) in self._looks_at:
             if not lowest <= values[at] <= highest:      # so NaN
                 self._until_ns = now_ns + RESUME_NS
+        # The clock may have been set back.
+        self._until_ns = min(self._until_ns, now_ns + RESUME_NS)
         return now_ns < self._until_ns

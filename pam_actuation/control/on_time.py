@@ -88,6 +88,8 @@ class OnTime:
         old = age_ns > self.late_ns and age_ns > self._oldest_ns()
         if old or max(gap_ns, silent_ns) > self.late_ns:
             self._from_ns = now_ns + min(late_ns, AFTER_LATE_NS) + AFTER_LATE_NS
+        # The clock may have been set back.
+        self._from_ns = min(self._from_ns, now_ns + 2 * AFTER_LATE_NS)
         on_time = now_ns >= self._from_ns
         self._tell(on_time, age_ns if old else 0)
         return on_time

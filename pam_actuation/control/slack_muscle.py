@@ -94,6 +94,10 @@ class SlackMuscle:
         """
         if math.isfinite(pressure_pa):
             self._measured_ns = now_ns
+        # The clock may have been set back.
+        self._noticed_ns = min(self._noticed_ns, now_ns)
+        if self._measured_ns is not None:
+            self._measured_ns = min(self._measured_ns, now_ns)
         self._count(now_ns, command_pa, pressure_pa)
         vented_ns = self._following.vented_ns(now_ns)
         lost = self._measured_ns is not None and now_ns - self._measured_ns >= LOST_NS

@@ -131,6 +131,8 @@ class NewReadings:
         last = self._last.get(topic)
         known = isinstance(reading, tuple) and last is not None and stamp_ns == last[1]
         if value is None or known:
+            # The clock may have been set back.
+            self._newest_ns[topic] = min(self._newest_ns[topic], now_ns)
             if now_ns - self._newest_ns[topic] > LONGEST_WAIT_NS:
                 raise DeviceError(f'no new value for {LONGEST_WAIT_NS // 10 ** 9} s', topic)
             return None
