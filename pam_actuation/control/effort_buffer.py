@@ -16,7 +16,8 @@
 The wanted torque of one joint, from what was published on ``joint_effort``.
 
 The newest usable message counts while it is fresh, as every measurement does. One that is
-not usable is ignored, counted, and the reason kept. No ROS inside.
+not usable, or older than the one that counts, is ignored, counted, and the reason kept. After the
+clock was set back, what counts is ahead, and new ones count at once. No ROS inside.
 """
 
 import math
@@ -60,8 +61,11 @@ class EffortBuffer:
         """Judge what arrived; none counts where ``angle_wanted``, a fresh angle set point."""
         for message in self._arrived:
             try:
-                self.torque_n_m = _usable_torque_n_m(message, self._joint, now_ns, angle_wanted)
-                self._taken = message
+                torque_n_m = _usable_torque_n_m(message, self._joint, now_ns, angle_wanted)
+                if message.stamp_ns < self.stamp_ns <= now_ns + MAX_AHEAD_NS:
+                    raise InputError(
+                        'is stamped before the newest one; is there a second sender?', WHERE)
+                self.torque_n_m, self._taken = torque_n_m, message
                 self.refusal = ''
             except InputError as error:
                 self.rejected += 1

@@ -40,8 +40,8 @@ reference silent for more than 0.5 s           holds the last position, learning
 reference silent for more than 2 s             vents
 torque that is followed silent for 0.1 s       vents
 a reference or trajectory that is not finite,  that message is ignored and counted; what was
-out of reach, from the future, long ago, or    held goes on
-older than the reference that is held
+out of reach, from the future or long ago; a   held goes on
+reference or torque older than the one held
 co-contraction out of reach or not finite      ignored and counted; what was held goes on
 pressure missing, stale or not finite          valve and model of the muscle stay as they are
                                                known; start and learning go on without it

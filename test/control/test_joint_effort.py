@@ -124,3 +124,17 @@ def test_a_torque_that_cannot_be_used_is_ignored_counted_and_says_why(
     buffer.take(NamedEfforts(START_NS, (), (1.0,)))
     buffer.judge(START_NS, angle_wanted=False)
     assert (buffer.torque_n_m, buffer.rejected, buffer.refusal) == (1.0, 1, '')
+
+
+def test_an_older_torque_does_not_replace_a_newer_one_but_counts_after_the_clock_was_set_back():
+    buffer = EffortBuffer('knee')
+    now_ns = START_NS
+    for after_ms, torque_n_m, counts in (
+            (0, 5.0, 5.0), (-50, -5.0, 5.0), (0, 4.0, 4.0), (-3_600_000, -3.0, -3.0)):
+        stamp_ns = START_NS + after_ms * MS_NS
+        now_ns = min(now_ns, stamp_ns + 50 * MS_NS)
+        buffer.take(NamedEfforts(stamp_ns, (), (torque_n_m,)))
+        buffer.judge(now_ns, angle_wanted=False)
+        assert buffer.torque_n_m == counts
+        assert ('stamped before the newest one' in buffer.refusal) == (counts != torque_n_m)
+    assert buffer.rejected == 1 and buffer.stamp_ns == START_NS - 3_600_000 * MS_NS
