@@ -51,11 +51,19 @@ class Loop:
         self.period_ns = period_ns
         self.callback = callback
         self.next_ns = now_ns + period_ns
+        self._seen_ns = now_ns
         self.clock: LoopTime = clock or SteadyTime()
 
     def every(self, period_s: float) -> None:
         """Change the period, from the next tick on."""
         self.period_ns = round(period_s * 1e9)
+
+    def due(self, now_ns: int) -> bool:
+        """Return whether a tick is due; where the time begins anew, so does the period."""
+        if now_ns < self._seen_ns:
+            self.next_ns = now_ns + self.period_ns
+        self._seen_ns = now_ns
+        return self.next_ns <= now_ns
 
     def advance(self, now_ns: int) -> None:
         """Set the time of the next tick, in step with the former ones."""
@@ -123,6 +131,6 @@ class LoopSet:
         with self.lock:
             for loop in self._loops:
                 now_ns = loop.clock.now_ns()
-                if loop.next_ns <= now_ns and self._loops:      # one before may have ended all
+                if loop.due(now_ns) and self._loops:      # one before may have ended all
                     loop.advance(now_ns)
                     loop.callback()

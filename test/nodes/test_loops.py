@@ -14,6 +14,7 @@
 
 """Test the loops of a node and their statistics, without ROS."""
 
+from operator import sub
 import time
 
 from pam_actuation.nodes.loops import Loop, LoopSet, SteadyTime
@@ -101,6 +102,20 @@ def test_loops_run_on_the_time_they_are_given():
         loops.time.time_ns += 10 * MS
         loops.run_once()
     assert calls.count('simulated') == 3
+
+
+def test_a_time_that_begins_anew_stops_no_loop():
+    loops = LoopSet()
+    loops.time = StandingTime()
+    ticks_ns = []
+    loops.add(0.01, lambda: ticks_ns.append(loops.time.time_ns))
+    for begin_ns in (0, 3_600_000 * MS, 5 * MS):
+        ticks_ns.clear()
+        for k in range(26):
+            loops.time.time_ns = begin_ns + k * 4 * MS
+            loops.run_once()
+        assert 9 <= len(ticks_ns) <= 11
+        assert all(7 * MS < gap < 13 * MS for gap in map(sub, ticks_ns[1:], ticks_ns))
 
 
 def test_timing_counts_period_jitter_and_overruns():

@@ -212,7 +212,7 @@ def test_a_driver_on_simulated_time_vents_on_its_way_out(rig):
 
 
 @pytest.mark.ros
-def test_the_plant_makes_the_time_anew_after_a_cleanup(rig):
+def test_the_plant_makes_the_time_anew_after_a_cleanup_and_others_follow(rig):
     for transition in (
             Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP,
             Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
@@ -221,3 +221,8 @@ def test_the_plant_makes_the_time_anew_after_a_cleanup(rig):
     begin = len(rig.heard['force'])
     wait_for(lambda: len(rig.heard['force']) > begin + 20, 10.0, 'the time')
     assert rig.heard['force'][-1].plain.stamp_ns < rig.heard['force'][begin - 1].plain.stamp_ns
+    states = rig.heard['controller_state']
+    before_ns = max(heard.plain.stamp_ns for heard in states)
+    count = len(states)
+    wait_for(lambda: len(states) > count + 20, 10.0, 'control on the new time')
+    assert states[-1].plain.stamp_ns < before_ns
