@@ -90,8 +90,7 @@ def _check_values(given: Located, reached: Mapping[str, NodeSpec],
                   more: Mapping[str, object]) -> None:
     """Raise InputError on the first value that is not allowed, or not the one that is given."""
     from pam_actuation.nodes.interfaces import node_class
-    from pam_actuation.nodes.managed import COMMON_PARAMETERS
-    from pam_actuation.nodes.parameters import problem
+    from pam_actuation.nodes.parameters import COMMON_PARAMETERS, problem
     for name, holder, key in _flat(given):
         value = holder[key]
         if name in BRINGING_UP:
@@ -137,7 +136,7 @@ def _check_names(given: Located, kinds: list[str]) -> None:
     """Raise InputError on the first parameter that none of some nodes has."""
     try:
         from pam_actuation.nodes.interfaces import node_class
-        from pam_actuation.nodes.managed import COMMON_PARAMETERS
+        from pam_actuation.nodes.parameters import COMMON_PARAMETERS
     except ImportError as error:
         raise InputError(ros_missing(error.name or 'rclpy')) from None
     known = {one.name for kind in kinds

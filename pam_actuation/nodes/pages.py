@@ -18,8 +18,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 
 from pam_actuation.models.markdown import escaped, row
 from pam_actuation.nodes.interfaces import Inspector, NEEDED, NodeInterface, VARIANTS
-from pam_actuation.nodes.managed import COMMON_PARAMETERS
-from pam_actuation.nodes.parameters import allowed
+from pam_actuation.nodes.parameters import allowed, COMMON_PARAMETERS
 from pam_actuation.rigging import layouts
 from pam_actuation.rigging.node_spec import NodeSpec
 from pam_actuation.rigging.processes import parameter_arguments

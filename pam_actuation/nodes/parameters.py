@@ -38,6 +38,33 @@ from rclpy.node import Node
 QOS = 'qos_overrides.'
 # Of these ROS declares the parameters itself, late or never.
 TOPICS_OF_ROS = ('/clock', '/parameter_events', '/rosout')
+COMMON_PARAMETERS = (         # of every node
+    node_parameter('autostart', True, 'Configure and activate without being told to.'),
+    node_parameter(
+        'await_subscriber', '',
+        'Name of a node that must receive every message, such as the recorder; activation waits '
+        'for it. Without a slash: in the namespace of this node. Empty: none.'),
+    node_parameter(
+        'await_timeout_s', 30.0, 'How long activation waits for await_subscriber [s].',
+        0.1, 600.0),
+    node_parameter(
+        'diagnostics_period_s', 0.5, 'Time between two diagnostic messages [s].', 0.05, 10.0),
+    node_parameter(
+        'realtime_priority', 0, 'Real-time priority (Linux, SCHED_RR), the same for all nodes of '
+        'a rig; 0: none. What must be on time comes first: watchdog and driver add 3 to it, plant '
+        'and sensors 2, controllers 1. Without the right to it the node runs as before.', 0, 96),
+    node_parameter(
+        'end_with_parent', False, 'End in order, as by SIGTERM, when the process that started the '
+        'node is gone (Linux). The launch files ask for it: ros2 launch leaves its nodes behind '
+        'where SIGTERM or SIGKILL ends it.'),
+    node_parameter('muscle', 'muscle', 'Name of the muscle or joint in the messages sent.'),
+    node_parameter(
+        'frame_id', '', 'Name of a frame of tf2, header.frame_id of all messages of the rig that '
+        'this node sends: where the sensor sits. Empty: none.'),
+    node_parameter(
+        'lockstep', [''], 'Names of all nodes that go through the simulated time tick by tick '
+        'together, this one included; needs use_sim_time. Empty: none.'),
+)
 
 
 def valve_of_rig(description: str) -> Parameter:

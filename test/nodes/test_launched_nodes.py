@@ -28,7 +28,7 @@ from launch_ros.actions import Node                                         # no
 from launch_ros.utilities import evaluate_parameters                        # noqa: E402
 from pam_actuation.namespaces import node_name_of                          # noqa: E402
 from pam_actuation.nodes.interfaces import node_class                       # noqa: E402
-from pam_actuation.nodes.managed import COMMON_PARAMETERS                   # noqa: E402
+from pam_actuation.nodes.parameters import COMMON_PARAMETERS                # noqa: E402
 from pam_actuation.rigging import layouts                                   # noqa: E402
 from pam_actuation.rigging import model_view                                # noqa: E402
 from pam_sim import load_rig                                                # noqa: E402
