@@ -25,6 +25,7 @@ from pam_actuation.bags.ending import ENDED_FILE
 from pam_actuation.bags.ending import Ending
 from pam_actuation.bags.ending import ending_of
 from pam_actuation.bags.ending import EndWatch
+from pam_actuation.bags.ending import ERROR as RUN_FAILED
 from pam_actuation.bags.ending import RECORDED_FILE
 from pam_actuation.bags.metadata import (
     experiment_metadata, names_text, own_name, TOPIC_NAMES)
@@ -289,6 +290,8 @@ class ExperimentRecorder(ManagedNode):
             path = os.path.join(self.value('notes_folder'), ENDED_FILE)
             with contextlib.suppress(OSError, ValueError, TypeError), open(path) as stream:
                 told = Ending(**json.load(stream))
+        if self.failure and told is None:
+            told = Ending(ended=RUN_FAILED, because=self.failure)
         return self.watch.ending(ending_of(self.metadata).planned_s, told)
 
     def _close(self) -> RecordingSummary:
@@ -307,8 +310,10 @@ class ExperimentRecorder(ManagedNode):
         """Take the last messages, finish the bag, say whether it is complete."""
         if self.core is None:
             return
-        self._take_last()
-        summary = self._close()
+        try:
+            self._take_last()
+        finally:
+            summary = self._close()
         if summary.complete:
             self.get_logger().info(
                 f'{summary.written} messages recorded, none lost{_before(summary)}: '

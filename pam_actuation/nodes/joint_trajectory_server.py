@@ -120,9 +120,9 @@ class JointTrajectoryServer(ManagedNode):
         now_ns = self.now_ns()
         with self._lock:
             if self._current is followed:
+                self.send('joint_trajectory', standing.ahead(now_ns))
                 self._current = None
                 self._held = standing, now_ns + round(hold_s * 1e9)
-                self.send('joint_trajectory', standing.ahead(now_ns))
         self._counts['goals.reached'] += outcome.code == SUCCESSFUL and outcome.text != CANCELLED
         self.diagnostics.update(OK, outcome.text)
         followed.finish(outcome)

@@ -82,6 +82,8 @@ class ManagedNode(LifecycleNode):
         self.exit_code: int | None = None
         self.result_code = 0        # with which it ends otherwise
         self.stopping = False
+        self.failure = ''           # why the node failed while active
+        self._active = False        # from start to the end of its work
         # The user's mistake that stopped the last transition.
         self.input_error: InputError | None = None
         self.timing: LoopTiming | None = None
@@ -270,6 +272,7 @@ class ManagedNode(LifecycleNode):
     def fail(self, why: str, details: str = '') -> None:
         """Make the output safe, say why and end the process with exit code 1."""
         self.get_logger().error(f'{why}\n{details}' if details else why)
+        self.failure = self.failure or why
         self._make_safe(why)
         self._end_loops()
         self.exit_code = 1
@@ -292,21 +295,37 @@ class ManagedNode(LifecycleNode):
     def finish(self, why: str) -> None:
         """Leave safely from whatever state: the end of every process comes through here."""
         with self.loops.lock:
-            was_active = bool(self.loops)
-            self._end_loops()
-            self._make_safe(why)
-            if was_active:
-                self._end_work(why)
-                self.get_logger().info(why)
+            if self._leave(why):
+                if self.failure:
+                    self.get_logger().error(self.failure)
+                else:
+                    self.get_logger().info(why)
             self._farewell()
+
+    def _leave(self, why: str) -> bool:
+        """End the node's work, tell what fails meanwhile; return whether it was active."""
+        was_active = self._active
+        try:
+            self._end_work(why)
+        except Exception:
+            self.result_code = 1
+            self.get_logger().error(f'the end of the work failed:\n{traceback.format_exc()}')
+        return was_active
 
     def last_status(self, why: str) -> tuple[int, str, Values]:
         """Return level, message and values of the last status of all."""
         return ERROR if self.exit_code else OK, why, self.diagnostics.values_of()
 
     def _end_work(self, why: str) -> None:
-        self.diagnostics.end(*self.last_status(why))
-        self.stop()
+        """Make the output safe; a node that was active sends its last status and stops."""
+        was_active, self._active = self._active, False
+        self._end_loops()
+        self._make_safe(why)
+        if was_active:
+            try:
+                self.diagnostics.end(*self.last_status(self.failure or why))
+            finally:
+                self.stop()
 
     def _farewell(self) -> None:
         """Wait a little until everybody has what was sent last."""
@@ -350,8 +369,7 @@ class ManagedNode(LifecycleNode):
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Make the output safe after a failed transition; the node is unconfigured then."""
-        self._end_loops()
-        self._make_safe('a transition failed')
+        self._leave('a transition failed')
         self._farewell()
         return self._transition('recover', self._cleanup)
 
@@ -400,6 +418,7 @@ class ManagedNode(LifecycleNode):
         for subscription in self.subscriptions_polled:
             subscription.resume()
         self.start()
+        self._active = True
         self.diagnostics.silent = False
         # Also while a simulated time stands still.
         steady = None if self.simulated_time is None else SteadyTime()
@@ -439,11 +458,7 @@ class ManagedNode(LifecycleNode):
                 f'{subscriber} does not receive {", ".join(missed)}', f'parameter {parameter}')
 
     def _deactivate(self) -> None:
-        was_active = bool(self.loops)
-        self._end_loops()
-        self._make_safe(DEACTIVATED)
-        if was_active:
-            self._end_work(DEACTIVATED)
+        self._end_work(DEACTIVATED)
 
     def _cleanup(self) -> None:
         if self.simulated_time is not None:

@@ -23,6 +23,7 @@ pytest.importorskip('rclpy')
 
 from live_rig import LiveRig, wait_for                                      # noqa: E402, I100
 from pam_actuation.bags.check import independent_readers                    # noqa: E402
+from pam_actuation.bags.ending import ending_of                            # noqa: E402
 from pam_actuation.bags.info import bag_info                                # noqa: E402
 from pam_actuation.bags.recover import recover_bag                          # noqa: E402
 from pam_actuation.bags.source import read_bag                              # noqa: E402
@@ -157,6 +158,28 @@ def test_a_bag_is_finished_where_the_activation_fails_after_it_was_opened(made, 
     recorder.trigger_activate()
     assert recorder.core is None
     assert (tmp_path / 'bag' / 'metadata.yaml').is_file()
+
+
+@pytest.mark.parametrize('lasts', [False, True])
+def test_a_loop_that_fails_leaves_a_whole_bag(lasts, made, tmp_path):
+    recorder = made()
+    recorder.trigger_configure()
+    recorder.trigger_activate()
+    taken, take_all = [], recorder._take_all
+
+    def broken():
+        taken.append(1)
+        if lasts or len(taken) == 1:
+            raise RuntimeError('broken on purpose')
+        return take_all()
+    recorder._take_all = broken
+    wait_for(lambda: recorder.loops.run_once() or recorder.exit_code, 5.0, 'the failure')
+    recorder.finish('ended')
+    assert len(taken) > 1 and recorder.core is None
+    assert (recorder.exit_code, recorder.result_code) == (1, int(lasts))
+    ending = ending_of(bag_info(tmp_path / 'bag').metadata)
+    assert ending.ended == 'error'
+    assert ending.because == 'the loop of this node failed: broken on purpose'
 
 
 def test_the_bag_of_a_remapped_rig_says_which_topic_is_which(tmp_path):

@@ -15,13 +15,16 @@
 
 """What fails while a node takes down what it built is told. Nothing is started."""
 
+import math
 from types import SimpleNamespace
 
 import pytest
 
 pytest.importorskip('rclpy')
 
-from pam_actuation.nodes.managed import ManagedNode             # noqa: E402, I100
+from pam_actuation.control.trajectory_goal import Outcome, SUCCESSFUL       # noqa: E402, I100
+from pam_actuation.nodes import joint_trajectory_server         # noqa: E402
+from pam_actuation.nodes.managed import ManagedNode             # noqa: E402
 from pam_actuation.nodes.valve_driver import ValveDriver        # noqa: E402
 
 
@@ -51,3 +54,51 @@ def test_a_setup_that_cannot_be_undone_is_told(error, level):
     node, said = node_with(teardown=teardown)
     ManagedNode._undo_setup(node)
     assert [one for one, _ in said] == [level] and str(error) in said[0][1]
+
+
+@pytest.mark.parametrize('fails', ['outcome', 'send'])
+def test_a_goal_is_answered_where_the_server_fails(fails, context, monkeypatch):
+    def broken(*_):
+        raise KeyError(fails)
+    monkeypatch.setattr(                        # control_msgs need not be installed
+        joint_trajectory_server, '_Actions', lambda node: SimpleNamespace(close=lambda: None))
+    goal = SimpleNamespace(outcome=lambda *_: Outcome(SUCCESSFUL, 'there'), ahead=math.ceil)
+    followed = joint_trajectory_server._Followed(SimpleNamespace(is_cancel_requested=False), goal)
+    server = joint_trajectory_server.JointTrajectoryServer(
+        context=context, namespace='/knee', enable_rosout=False)
+    try:
+        server.trigger_configure()
+        server.trigger_activate()
+        setattr(goal if fails == 'outcome' else server, fails, broken)
+        server._current = followed
+        while server.exit_code is None:
+            server.loops.run_once()
+        server.finish('ended')
+        assert followed.result.text == 'the server was stopped'
+    finally:
+        server.destroy_node()
+
+
+def test_what_fails_at_the_end_of_an_active_node_is_told_and_the_rest_is_done(context):
+    ended = []
+
+    class Node(ManagedNode):
+        NAME = 'ending'
+
+        def last_status(self, why):
+            raise KeyError('status')
+
+        def stop(self):
+            ended.append('stop')
+            raise KeyError('stop')
+    node = Node(context=context, namespace='/muscle', enable_rosout=False)
+    try:
+        node.trigger_configure()
+        node.trigger_activate()
+        node.get_logger = lambda: SimpleNamespace(
+            error=ended.append, info=ended.append)
+        node.finish('over')
+    finally:
+        node.destroy_node()
+    assert node.result_code == 1 and ended[0] == 'stop' and ended[2] == 'over'
+    assert "KeyError: 'status'" in ended[1] and "KeyError: 'stop'" in ended[1]
