@@ -87,7 +87,7 @@ def _arguments():
             description='Whether to take a controller file that was made for another rig.'),
         DeclareLaunchArgument(
             'learning', default_value='true', choices=['true', 'false'],
-            description='Whether the rules of the controller may change.'),
+            description='Whether the controller learns.'),
         DeclareLaunchArgument(
             'experiment', default_value='sine_quarter_hz',
             description='Experiment by name, or path of its file; none: wait for references.'),
@@ -174,7 +174,7 @@ def generate_launch_description():
          'exit_when_finished': True},
         condition=IfCondition(NotEqualsSubstitution(LaunchConfiguration(EXPERIMENT), '')))
     sofc = _node('sofc_controller', valve, control, learning, condition=chosen('sofc_controller'))
-    pid = _node('pid_controller', valve, control, condition=chosen('pid_controller'))
+    pid = _node('pid_controller', valve, control, learning, condition=chosen('pid_controller'))
     nodes = [recorder, plant, sensors, driver, watchdog, sofc, pid, reference]
     ends = end.handlers((
         (reference, 'the experiment is over'), (driver, 'the valve driver ended'),

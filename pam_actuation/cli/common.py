@@ -158,7 +158,7 @@ def add_controller_options(
     parser.add_argument(
         '--rules', type=source, default=None, metavar='FILE', help='rule file to start from')
     parser.add_argument(
-        '--freeze', action='store_true', help='keep the rules frozen: no learning')
+        '--freeze', action='store_true', help='keep what is learned frozen: no learning')
     add_other_rig_option(parser)
 
 

@@ -40,7 +40,7 @@ from pam_actuation.control.settings import checked_settings, parameter_record, s
 from pam_actuation.control.static_inverse import inverse_pressure_pa
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import Compiled, compiled, entry_point, inlined, source_key
-from pam_sim.records import part, record
+from pam_sim.records import fields, part, record
 from pam_sim.units import P_ATM_PA
 
 if TYPE_CHECKING:
@@ -269,7 +269,7 @@ class IlcController(FixedLawController):
 
     def learning_reason(self) -> str:
         """Return in words whether the last tick learned, or why not."""
-        if self.freeze_learning:
+        if self.freeze_learning or not fields(self._inputs, INPUT).learning:
             return _OFF
         return _LEARNS if self._outputs[self.state_names.index('cycle_s')] > 0.0 else _NO_CYCLE
 

@@ -44,7 +44,7 @@ VARIANTS: dict[str, tuple[dict[str, Any], ...]] = {
         {'accept_valve_command': True},
         {'valve_type': 'hsv', 'hsv.correct_by_contraction': 0.8}),
     'valve_watchdog': (),
-    'sofc_controller': (), 'pid_controller': (),
+    'sofc_controller': (), 'pid_controller': ({'controller': 'ilc_ppr'},),
     'reference_generator': (
         {'experiment': 'disturbance'}, {'experiment': 'pressure_identification'},
         {'experiment': 'voltage_steps'}, {'experiment': 'joint_sine'},

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What freezes the rules of a controller: a parameter and a service, for nodes with rules."""
+"""What freezes the learning of a controller: a parameter and a service."""
 
 from collections.abc import Iterable
 from typing import Any, TYPE_CHECKING

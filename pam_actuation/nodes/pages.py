@@ -44,7 +44,7 @@ def page(interface: NodeInterface, notes: Mapping[str, str]) -> str:
     first, _, rest = interface.description.partition('\n')
     parts = [
         f'# {interface.name}', first + (rest and f'\n{rest}').replace('``', '`'),
-        f'{_MADE} More: {_EXPLAINED}.', '## Example', _example(interface),
+        f'{_MADE} More: {_EXPLAINED}.', '## Example', _example(interface, notes),
         '## Topics and services', _endpoints(interface, notes),
         '`/diagnostics` is published by every node; with `use_sim_time` it takes `/clock`.',
         '## Parameters', _parameters(interface.parameters, interface.live),
@@ -56,7 +56,7 @@ def page(interface: NodeInterface, notes: Mapping[str, str]) -> str:
     return '\n\n'.join(part.rstrip() for part in parts) + '\n'
 
 
-def _example(interface: NodeInterface) -> str:
+def _example(interface: NodeInterface, notes: Mapping[str, str]) -> str:
     node = next((one for one in _EXAMPLES if one.name == interface.name), None)
     namespace = node.namespace if node else '/muscle'
     given = {key: value for key, value in (node.parameters if node else {}).items()
@@ -70,6 +70,8 @@ def _example(interface: NodeInterface) -> str:
               f'    ros2 param describe {full} {interface.parameters[0].name}'
               if interface.parameters else f'    ros2 param list {full}']
     for name, type_name in interface.serves.items():
+        if name in notes:
+            continue
         data = ' "{data: true}"' if type_name.endswith('SetBool') else ''
         lines.append(f'    ros2 service call {full}/{name.removeprefix("~/")} {type_name}{data}')
     return '\n'.join(lines)

@@ -196,7 +196,7 @@ def _parameters(plan: RigPlan, bag: StrPath | None, learning: bool, seed: int, n
             **model, 'valve_type': rig.valve,
             'accept_other_rig': bool(controller.other_rig),
             'controller': _write(plan.controller_file, law_text)}
-        if controller.kind == 'sofc':
+        if controller.learns:
             nodes[plan.controller_node]['learning'] = learning
     nodes[REFERENCE] = {
         'valve_type': rig.valve,

@@ -121,6 +121,7 @@ def test_an_ilc_that_may_not_learn_keeps_what_it_knows_and_one_without_a_cycle_l
     frozen = ilc()
     errors = tracked(frozen, Muscle(model_of_lag_and_mass()), sine(1.0), 1600, learn=False)
     assert rms(errors[-200:]) > 0.9 * rms(errors[200:400])
+    assert frozen.learning_reason() == 'learning is off'
 
     def drifting(t):
         """Return a sweep: no two cycles are alike."""

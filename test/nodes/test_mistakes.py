@@ -59,6 +59,9 @@ MISTAKES = {
     'sofc_controller law': (
         'sofc_controller', ['controller:=mpc_ppr'], 'controller: mpc_ppr is a mpc controller',
         'pid_controller all others'),
+    'pid_controller law': (
+        'pid_controller', ['controller:=sofc_ppr'], 'controller: sofc_ppr is a sofc controller',
+        'sofc_controller runs this one'),
     'pid_controller type': (
         'pid_controller', ['valve_type:=3'], 'valve_type: 3', 'must be of type str'),
     'reference_generator experiment': (

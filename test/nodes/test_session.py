@@ -38,6 +38,14 @@ segments:
   - hold: {duration_s: 0.5}
 """
 LONG = SHORT.replace('hold: {duration_s: 0.5}', 'hold: {duration_s: 60.0}')
+QUICK = """\
+name: quick
+domain: contraction
+segments:
+  - rest: {duration_s: 0.2}
+  - ramp: {to_m: 0.006, duration_s: 0.5}
+  - sine: {center_m: 0.008, amplitude_m: 0.002, frequency_hz: 2.0, cycles: 5}
+"""
 PULL = """\
 name: pull
 domain: force
@@ -74,6 +82,19 @@ def test_an_experiment_is_recorded_to_the_last_message(tmp_path):
     assert replayed.identical, replayed.max_abs_difference_pa
     volts = run.topics['valve_signal'].values['ppr_voltage']
     assert volts.max() > 1.0 and volts[-1] == 0.0
+
+
+@pytest.mark.parametrize('learning', [True, False])
+def test_an_ilc_learns_live_unless_frozen(learning, tmp_path):
+    result = session.run_experiment(
+        QUICK, controller='ilc_ppr', out_dir=tmp_path / 'bag', learning=learning)
+    assert result.complete, result
+    run = load_run(result.bag)
+    state = run.topics['controller_state'].values
+    assert state['cycle_s'].max() == pytest.approx(0.5, abs=0.01)
+    assert (abs(state['learned_pa']).max() > 1e3) == learning
+    assert (state['learning'].max() == 1.0) == learning
+    assert replay_controller(run).identical
 
 
 def test_a_force_is_tracked_live_and_replayed_to_the_bit(tmp_path):
