@@ -17,15 +17,13 @@
 import argparse
 from collections.abc import Iterator
 from contextlib import contextmanager, ExitStack
-import os
 from typing import TYPE_CHECKING
 
 from pam_actuation.cli.options import count, number, Parser
+from pam_actuation.rigging.domain import HIGHEST_OF_ROS
 
 if TYPE_CHECKING:
     from pam_actuation.nodes.operator import Operator
-
-HIGHEST_DOMAIN = 232
 
 
 def add_live_options(parser: Parser) -> None:
@@ -34,7 +32,7 @@ def add_live_options(parser: Parser) -> None:
         '--namespace', default='',
         help='only nodes in or below it, such as /left_knee (default: all)')
     parser.add_argument(
-        '--domain-id', type=count(0, HIGHEST_DOMAIN), default=None, metavar='N',
+        '--domain-id', type=count(0, HIGHEST_OF_ROS), default=None, metavar='N',
         help='only this ROS domain (default: ROS_DOMAIN_ID, else 0, and every domain in which '
              'pam runs nodes on this machine)')
     parser.add_argument(
@@ -56,10 +54,10 @@ def operators(args: argparse.Namespace) -> 'Iterator[list[Operator]]':
 
     """
     from pam_actuation.namespaces import namespace_of
-    from pam_actuation.rigging.domain import domains_in_use
+    from pam_actuation.rigging.domain import domains_in_use, own_domain
     from pam_sim.errors import InputError
     namespace = namespace_of(args.namespace, '--namespace')
-    own = _own_domain()
+    own = own_domain()
     wanted = [args.domain_id] if args.domain_id is not None else [
         own, *(one for one in domains_in_use() if one != own)]
     try:
@@ -73,16 +71,6 @@ def operators(args: argparse.Namespace) -> 'Iterator[list[Operator]]':
             opened.append(Operator(domain_id, namespace, local=domain_id != own))
             stack.callback(opened[-1].close)
         yield opened
-
-
-def _own_domain() -> int:
-    """Return the ROS domain of this environment."""
-    from pam_sim.errors import InputError
-    text = os.environ.get('ROS_DOMAIN_ID') or '0'
-    if not text.isdigit() or int(text) > HIGHEST_DOMAIN:
-        raise InputError(f'{text!r} is not allowed, it must be 0 to {HIGHEST_DOMAIN}',
-                         'ROS_DOMAIN_ID')
-    return int(text)
 
 
 def nobody(opened: 'list[Operator]', what: str) -> str:

@@ -18,7 +18,6 @@ import argparse
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
-import os
 import sys
 import tempfile
 
@@ -66,11 +65,11 @@ def viewed(args: argparse.Namespace, environment: bool = False) -> Iterator[int 
         yield args.domain_id
         return
     need_tornado()
-    from pam_actuation.rigging.domain import DomainLock
+    from pam_actuation.rigging.domain import DomainLock, own_domain
     from pam_actuation.rigging.view_process import page_beside
     wanted = args.domain_id
     if wanted is None and environment:
-        wanted = int(os.environ.get('ROS_DOMAIN_ID', '0'))
+        wanted = own_domain()
     lock = DomainLock(wanted)
     try:
         with tempfile.TemporaryDirectory(prefix='pam_view_') as folder, \

@@ -29,6 +29,7 @@ from pam_actuation.nodes.endpoints import PolledSubscription
 from pam_actuation.nodes.operator import is_below
 from pam_actuation.nodes.ros_messages import message_class
 from pam_actuation.rigging.client import context_by_environment
+from pam_actuation.rigging.domain import own_domain
 from pam_actuation.topics.quality import ONLOOKER
 from pam_actuation.topics.table import BY_NAME, DIAGNOSTICS, short_name
 import rclpy
@@ -54,7 +55,7 @@ class Onlooker:
     def __init__(self, domain_id: int | None = None, namespace: str = '') -> None:
         self._namespace = namespace
         if domain_id is None:
-            domain_id = int(os.environ.get('ROS_DOMAIN_ID') or 0)
+            domain_id = own_domain()
         context = context_by_environment(
             domain_id, ['--ros-args', '--enclave', f'/{NAME}'])
         # Several may look at one rig.

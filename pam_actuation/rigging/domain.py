@@ -25,6 +25,7 @@ from pam_sim.errors import InputError
 
 LOWEST, HIGHEST = 1, 100       # higher ones collide with the ports Linux hands out itself
 PORT_BASE, PORTS_PER_DOMAIN, FIRST_PARTICIPANT = 7400, 250, 10
+HIGHEST_OF_ROS = 232
 PORTS_EACH, PARTICIPANTS = 2, 20        # the first ones may have left
 
 
@@ -49,8 +50,9 @@ class DomainLock:
     def __init__(self, domain_id: int | None = None) -> None:
         self._file: TextIO | None = None
         if domain_id is not None:
-            if not 0 <= domain_id <= 232:
-                raise InputError(f'{domain_id} is not allowed, give 0 to 232', 'domain id')
+            if not 0 <= domain_id <= HIGHEST_OF_ROS:
+                raise InputError(
+                    f'{domain_id} is not allowed, give 0 to {HIGHEST_OF_ROS}', 'domain id')
             self.domain_id = domain_id
             self._file = _locked(domain_id)
             return
@@ -77,6 +79,23 @@ class DomainLock:
         if self._file is not None:
             self._file.close()
             self._file = None
+
+
+def own_domain() -> int:
+    """
+    Return the ROS domain of this environment, 0 where ``ROS_DOMAIN_ID`` is empty or not set.
+
+    Raises
+    ------
+    InputError
+        It is no domain.
+
+    """
+    text = os.environ.get('ROS_DOMAIN_ID') or '0'
+    if not text.isdecimal() or int(text) > HIGHEST_OF_ROS:
+        raise InputError(
+            f'{text!r} is not allowed, it must be 0 to {HIGHEST_OF_ROS}', 'ROS_DOMAIN_ID')
+    return int(text)
 
 
 def _locked(domain_id: int) -> TextIO | None:

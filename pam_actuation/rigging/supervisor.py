@@ -16,7 +16,6 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
-import os
 import tempfile
 import time
 from typing import Self, TYPE_CHECKING
@@ -25,6 +24,7 @@ from pam_actuation.bags.ending import ERROR, FINISHED, tell_recorder
 from pam_actuation.drivers.decision import EMERGENCY_STOP
 from pam_actuation.messages import is_fault
 from pam_actuation.namespaces import node_name_of
+from pam_actuation.rigging.domain import own_domain
 from pam_actuation.rigging.node_group import NodeGroup
 from pam_actuation.rigging.plan import DRIVER, RECORDER, REFERENCE, WATCHDOG
 from pam_actuation.rigging.transitions import SessionFailed
@@ -57,7 +57,7 @@ class Supervisor:
     def __init__(self, nodes: 'Iterable[NodeSpec]', domain_id: int | None = None,
                  realtime_priority: int = 0) -> None:
         if domain_id is None:
-            domain_id = int(os.environ.get('ROS_DOMAIN_ID', '0'))
+            domain_id = own_domain()
         self._notes = tempfile.TemporaryDirectory(prefix='pam_notes_')
         nodes = list(nodes)
         self._on_device = {node_name_of(node.name, node.namespace) for node in nodes
