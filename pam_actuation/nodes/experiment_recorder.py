@@ -169,9 +169,12 @@ class ExperimentRecorder(ManagedNode):
         if path:
             try:
                 with open(path, encoding='utf-8') as stream:
-                    return json.load(stream)
+                    texts = json.load(stream)
             except (OSError, ValueError) as error:
                 raise InputError(f'cannot be read: {error}', path) from None
+            if not isinstance(texts, dict):
+                raise InputError('is no JSON object, {"NAME": "TEXT"}', path)
+            return texts
         from pam_actuation.drivers.recorded import driver_facts
         valve, seed = self.value('valve_type'), self.value('seed')
         valve = '' if valve == UNKNOWN_VALVE else valve

@@ -148,6 +148,16 @@ def test_it_does_not_await_what_it_does_not_record(made, tmp_path):
     assert not recorder.subscriptions_polled and not (tmp_path / 'bag').exists()
 
 
+@pytest.mark.parametrize('text', ['["a"]', '7', 'null'])
+def test_a_metadata_file_holds_an_object(text, made, tmp_path):
+    file = tmp_path / 'metadata.json'
+    file.write_text(text)
+    recorder = made(metadata_file=str(file))
+    recorder.trigger_configure()
+    assert str(recorder.input_error) == f'{file}: is no JSON object, {{"NAME": "TEXT"}}'
+    assert not (tmp_path / 'bag').exists()
+
+
 def test_a_bag_is_finished_where_the_activation_fails_after_it_was_opened(made, tmp_path):
     recorder = made()
 
