@@ -56,8 +56,12 @@ class Access:
 
     def url(self, port: int) -> str:
         """Return what to open in a browser, the token included."""
-        name = 'localhost' if self.is_local else self.host
-        if self.host in ('0.0.0.0', '::'):
+        name = self.host
+        if self.host == LOOPBACK:
+            name = 'localhost'
+        elif self.is_local and self.host != 'localhost':    # of names that one alone is answered
+            name = str(socket.getaddrinfo(self.host, None)[0][4][0])
+        elif self.host in ('0.0.0.0', '::'):
             name = socket.gethostname()
         if ':' in name:
             name = f'[{name}]'

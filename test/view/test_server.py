@@ -230,6 +230,24 @@ def test_pages_of_other_sites_are_refused(server):
         asyncio.run(foreign())
 
 
+@pytest.mark.parametrize('host', ['127.0.0.1', 'localhost', '127.0.0.2', '::1', 'own_name'])
+def test_the_address_told_answers(host, monkeypatch):
+    look_up = socket.getaddrinfo        # a name in /etc/hosts, as Debian gives the machine
+    monkeypatch.setattr(socket, 'getaddrinfo', lambda name, *more, **named: look_up(
+        '127.0.1.1' if name == 'own_name' else name, *more, **named))
+    try:
+        one = ViewServer(MadeRig(10), Access(host), port=0)
+        one.start()
+    except InputError:
+        if host != '::1':
+            raise
+        pytest.skip('this machine has no IPv6')
+    try:
+        assert fetch(one.url)[0] == 200
+    finally:
+        one.stop()
+
+
 def test_from_other_machines_a_token_is_needed():
     assert Access().token == '' and Access('localhost').token == ''
     access = Access('0.0.0.0')
