@@ -88,13 +88,15 @@ def command_line():
                         help='with --work: begin no case after N minutes; start again to go on')
     parser.add_argument('--out', type=Path, help='write the report here as well')
     results_page.add_write(parser, 'hidden_effects')
+    parser.add_argument('--part', default='', metavar='WORD',
+                        help='with --write: the part of the page with this word')
     return parser
 
 
 def main():
     """Examine; return the exit code."""
     args = command_line().parse_args()
-    results_page.check(args, __file__)
+    results_page.check(args, __file__, args.part)
     args.together = args.together or args.jobs
     args.until = time.time() + 60.0 * args.minutes
     cases = truth_cases.plan(args.number, args.seed)
@@ -149,7 +151,7 @@ def examine(cases, work, args):
         f'{os.cpu_count()} cores ({platform.machine()}), '
         f'{sum(a["wall_s"] for a in answers.values()) / 60.0:.0f} min of answers.', '',
         report(found, FAMILIES, others), ''])
-    with results_page.printed(args, __file__):
+    with results_page.printed(args, __file__, args.part):
         print(text)
     if args.out:
         write_text(args.out, text)
