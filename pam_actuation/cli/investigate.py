@@ -23,6 +23,7 @@ from pam_actuation.cli.common import (
     note_implausible, progress)
 from pam_actuation.cli.options import (
     count, EXIT_INTERRUPTED, number, out_path, Parser, source)
+from pam_actuation.rigging.domain import HIGHEST_OF_ROS
 
 if TYPE_CHECKING:
     from pam_actuation.bags.load import RecordedRun
@@ -72,7 +73,7 @@ def add_arguments(parser: Parser) -> None:
                         help='as of pam gap (default: %(default)g)')
     parser.add_argument('--namespace', default=None,
                         help='namespace of the muscle in the bags that are there')
-    parser.add_argument('--domain-id', type=count(0, 232), default=None, metavar='N',
+    parser.add_argument('--domain-id', type=count(0, HIGHEST_OF_ROS), default=None, metavar='N',
                         help='ROS domain of live nodes (default: a free one for a simulated rig, '
                         'for a real one ROS_DOMAIN_ID, else 0)')
     add_seed_option(parser, 'seed of the simulated sensors in the first round')

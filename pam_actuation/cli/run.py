@@ -25,6 +25,7 @@ from pam_actuation.cli.common import (
 from pam_actuation.cli.lasting import lasting_output
 from pam_actuation.cli.options import count, EXIT_INTERRUPTED, out_path, Parser
 from pam_actuation.cli.viewed import add_view_option, viewed
+from pam_actuation.rigging.domain import HIGHEST_OF_ROS
 
 HELP = ('Run an experiment on live nodes (real ROS 2 processes), of a muscle or a joint, and '
         'record it. The rig is simulated; `pam up rig --hardware FILE --record DIR` drives and '
@@ -37,7 +38,7 @@ def add_arguments(parser: Parser) -> None:
     add_experiment_options(parser)
     parser.add_argument('--out', type=out_path, default=None, metavar='DIR',
                         help='bag directory (default: runs/EXPERIMENT_VALVE_TIME)')
-    parser.add_argument('--domain-id', type=count(0, 232), default=None, metavar='N',
+    parser.add_argument('--domain-id', type=count(0, HIGHEST_OF_ROS), default=None, metavar='N',
                         help='ROS domain (default: a free one, this machine only)')
     parser.add_argument('--namespace', default=None,
                         help='namespace of the rig (default: /muscle, of a joint /knee)')

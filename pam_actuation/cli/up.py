@@ -24,6 +24,7 @@ from pam_actuation.cli.common import (
 from pam_actuation.cli.lasting import lasting_output
 from pam_actuation.cli.options import count, HIGHEST_SEED, number, out_path, Parser, source
 from pam_actuation.cli.viewed import add_view_option, viewed
+from pam_actuation.rigging.domain import HIGHEST_OF_ROS
 from pam_sim.errors import InputError
 from pam_sim.files import check_file
 from pam_sim.valve import VALVES
@@ -70,7 +71,7 @@ def add_arguments(parser: Parser) -> None:
                              'by the namespace, left_knee in /left/knee)')
     parser.add_argument('--seed', type=count(0, HIGHEST_SEED - 3), default=None, metavar='N',
                         help='seed of the simulated sensors (default: by the namespace)')
-    parser.add_argument('--domain-id', type=count(0, 232), default=None, metavar='N',
+    parser.add_argument('--domain-id', type=count(0, HIGHEST_OF_ROS), default=None, metavar='N',
                         help='ROS domain (default: ROS_DOMAIN_ID, else 0; this machine only)')
     parser.add_argument('--realtime-priority', type=count(0, 96), default=0,
                         metavar='N', help='of all nodes, 1 to 96 (default: none)')

@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING
 from pam_actuation.cli.common import add_overwrite_option, add_recover_option, EXIT_DONE
 from pam_actuation.cli.options import count, out_path, Parser, source
 from pam_actuation.cli.viewed import need_tornado
+from pam_actuation.rigging.domain import HIGHEST_OF_ROS
 from pam_sim.errors import InputError
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ def add_arguments(parser: Parser) -> None:
                         help='recording to show (default: the rig that runs)')
     parser.add_argument('--namespace', default=None,
                         help='show this namespace only (default: all)')
-    parser.add_argument('--domain-id', type=count(0, 232), default=None, metavar='N',
+    parser.add_argument('--domain-id', type=count(0, HIGHEST_OF_ROS), default=None, metavar='N',
                         help='ROS domain (default: ROS_DOMAIN_ID, else 0; if pam runs nodes in '
                              'another domain of this machine only, that one)')
     parser.add_argument('--host', type=source, default=None, metavar='ADDRESS',
