@@ -187,7 +187,7 @@ class MuscleLaw:
 
     Parameters
     ----------
-    controller : SelfOrganizingFuzzyController, PidController or ForceController
+    controller : CompiledController or ForceController
 
     """
 

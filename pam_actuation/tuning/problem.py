@@ -42,7 +42,7 @@ class Problem:
     Parameters
     ----------
     loops : list of ClosedLoop or of JointLoop
-    controller : SelfOrganizingFuzzyController, PidController, LqiController or JointController
+    controller : CompiledController or JointController
         Every rollout starts from its rules.
 
     """

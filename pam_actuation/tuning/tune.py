@@ -76,7 +76,7 @@ class TuneResult:
 
     Attributes
     ----------
-    controller : SelfOrganizingFuzzyController, PidController, LqiController or JointController
+    controller : CompiledController or JointController
         With the tuned settings and initial rules, ready to run.
     changed : dict of str -> (float, float)
         Settings before and after.
@@ -236,7 +236,7 @@ def tune(rig: 'Rig | JointRig | Sequence[Rig | JointRig]', controller: 'Law',
     rig : Rig or JointRig, or list of either
         Cost is the mean over all (nominal and randomised ones, for instance). The valve driver
         knows the data sheet of the first one only.
-    controller : SelfOrganizingFuzzyController, PidController, LqiController or JointController
+    controller : CompiledController or JointController
         Start of the search; not changed. Its rules are where every rollout starts.
     experiment : Experiment or list of Experiment
         Domain ``contraction``, of a joint ``joint_angle``; cost is the mean over all.
