@@ -72,6 +72,25 @@ def test_start_takes_over_the_pressures_that_are_there(joint):
     assert settle(controller, joint, 0.0, 0.0) == pytest.approx((P_ATM_PA + 3e5,) * 2)
 
 
+@pytest.mark.parametrize('law', ['sofc', 'pid'])
+def test_start_without_pressures_begins_with_both_muscles_vented(joint, law):
+    controller = load_controller(TEXT.replace('sofc', law), joint)
+    for _ in range(2):
+        flexor_pa, extensor_pa = controller.step(0.0, 0.0, 0.0, 0.0, 0.0)
+        assert max(flexor_pa, extensor_pa) - P_ATM_PA < 1e4      # was 300 kPa in the extensor
+        for _ in range(400):
+            commands = controller.step(0.0, 0.0, 0.0, 0.0, 0.0)
+        assert commands == pytest.approx((P_ATM_PA + 3e5,) * 2, abs=1e3)
+        controller.pause()
+
+
+def test_after_another_law_it_goes_on_from_those_commands(joint):
+    controller = load_controller(TEXT, joint)
+    commands = (P_ATM_PA + 2.5e5, P_ATM_PA + 1.5e5)
+    controller.stand_aside(commands)
+    assert controller.step(0.0, 0.0, 0.0, 0.0, 0.0) == pytest.approx(commands, abs=2e4)
+
+
 def test_out_of_reach_saturates_without_winding_up(joint):
     controller = load_controller(TEXT, joint)
     settle(controller, joint, 0.0, 0.9, 2000)

@@ -236,7 +236,7 @@ class JointController(WrappedLaw):
         self._commands = np.full(size_of(COMMANDS), P_ATM_PA)
         self._parameters, self._state = cells(self._par, PARAMETERS), cells(self._st, STATE)
         self._inputs = cells(self._raw, JOINT_INPUT)
-        self._error_rad = math.nan
+        self._error_rad, self._begins = math.nan, True
         self._inputs.age_s[...] = self._inputs.pressure_age_s[...] = 0.0
         # Compiled before time counts.
         _joint_inputs(self._par, self._raw, np.zeros_like(law.input_array))
@@ -269,7 +269,8 @@ class JointController(WrappedLaw):
             Time between the measurements of this and the former tick; NaN: one period.
         pressures_pa, forces_n : pair of float
             Measured at flexor and extensor, absolute Pa and N; NaN where not known. Used for
-            the bumpless start, for freezing the learning, and by a model of the muscles.
+            the bumpless start, for freezing the learning, and by a model of the muscles. A start
+            without them begins where the last commands were: after a pause, both muscles vented.
         held_back : float
             0 while both drivers follow their commands, else a code of ``following``.
         ages_s : pair of float
@@ -291,6 +292,10 @@ class JointController(WrappedLaw):
         raw.elapsed_s[...] = elapsed_s
         raw.held_back[...] = held_back
         raw.age_s[...], raw.pressure_age_s[...] = ages_s
+        if self._begins and not all(map(math.isfinite, pressures_pa)):
+            # At the atmosphere alone, a law would begin with one muscle full and one empty.
+            pressures_pa = self._commands.tolist()
+        self._begins = False
         raw.flexor_pressure_pa[...], raw.extensor_pressure_pa[...] = pressures_pa
         raw.flexor_force_n[...], raw.extensor_force_n[...] = forces_n
         _joint_inputs(self._par, self._raw, self.law.input_array)
@@ -358,6 +363,7 @@ class JointController(WrappedLaw):
         super().pause()
         self._st[:] = 0.0
         self._commands[:] = P_ATM_PA
+        self._begins = True
         self._error_rad = math.nan
 
     def file_entries(self) -> dict[str, object]:
