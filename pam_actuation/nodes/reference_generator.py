@@ -28,6 +28,7 @@ from pam_actuation.nodes.diagnostics import OK, Values
 from pam_actuation.nodes.endpoints import PolledSubscription
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.runner import run
+from pam_actuation.nodes.timing import ClockSteps
 from pam_sim.errors import InputError
 from pam_sim.joint.parameters import SIDES
 from pam_sim.valve import VALVES
@@ -37,6 +38,7 @@ MEASURED = {'contraction': 'contraction_m', 'force': 'force_n', 'pressure': 'pre
             'joint_state': 'angle_rad'}
 OF_DOMAIN = {'contraction': ('contraction',), 'force': ('force',),
              'joint_angle': ('joint_state',)}
+CLOCK_STEP_S = 0.3          # as the driver; a clock that is slewed stays far below it
 UNTRACKED = 'pressure', 'contraction', 'force'      # of an experiment that tracks nothing
 
 
@@ -76,6 +78,7 @@ class ReferenceGenerator(ManagedNode):
 
     loop: Any = None            # a ReferenceLoop, once configured
     begin_ns: int | None = None
+    _played_s = 0.0             # of the experiment, at the last tick
 
     def check(self) -> None:
         """Refuse to wait in lockstep, where everybody waits for the reference."""
@@ -106,7 +109,8 @@ class ReferenceGenerator(ManagedNode):
         """Play from the beginning."""
         self.loop.start_ns = None
         self.begin_ns = None
-        self._received_s = 0.0
+        self._received_s = self._played_s = 0.0
+        self._clock_steps = ClockSteps()
         self.add_loop(1.0 / self.loop.rate_hz)
 
     def _received(self) -> bool:
@@ -145,9 +149,14 @@ class ReferenceGenerator(ManagedNode):
 
     def tick(self) -> None:
         """Send what is due."""
-        now_ns = self.now_ns()
+        loops = self.loops.time
+        clocks_ns = loops.now_ns(), self.now_ns(), loops.now_ns()
+        now_ns = clocks_ns[1]
         if self.begin_ns is None and self._may_begin(now_ns):
             self.begin_ns = now_ns + round(self.value('start_delay_s') * 1e9)
+            self._clock_steps.begin(*clocks_ns)
+        if self._plays and self._clock_was_set(clocks_ns):
+            return
         if self.exit_code is not None:
             return
         if self.begin_ns is None or now_ns < self.begin_ns:
@@ -155,12 +164,32 @@ class ReferenceGenerator(ManagedNode):
             return
         for topic, plain in self.loop.tick(now_ns).items():
             self.send(topic, plain)
+        self._played_s = self.loop.elapsed_s(now_ns)
         if not self.loop.finished(now_ns):
             self.diagnostics.update(OK, f'{PLAYING} {self.experiment.name}')
             return
         self.diagnostics.update(OK, f'{FINISHED} {self.experiment.name}')
         if self.value('exit_when_finished'):
             self.exit_code = 0
+
+    @property
+    def _plays(self) -> bool:
+        return self.begin_ns is not None and self._played_s < self.experiment.duration_s
+
+    def _clock_was_set(self, clocks_ns: tuple[int, int, int]) -> bool:
+        """
+        Fail where the clock of the stamps was set during the experiment; tell whether it was.
+
+        An experiment is counted by its stamps: it would jump, or stand still.
+        """
+        step_s = self._clock_steps.step_s(*clocks_ns)
+        if self.simulated_time is not None and self.loop.elapsed_s(clocks_ns[1]) < 0.0:
+            self.fail('the experiment ends here: the simulated time began anew')
+        elif abs(step_s) > CLOCK_STEP_S:
+            self.fail(f'the experiment ends here: the clock of this computer was set '
+                      f'{"ahead" if step_s > 0.0 else "back"} by {abs(step_s):.1f} s; let it '
+                      f'settle (`timedatectl`, `chronyc tracking`) and record again')
+        return self.exit_code is not None
 
     def safe_stop(self, why: str) -> None:
         """Take the disturbance off and, where it speaks to the valve, ask it to vent."""
@@ -175,8 +204,7 @@ class ReferenceGenerator(ManagedNode):
 
     def diagnostic_values(self) -> Values:
         """Add how far the experiment is."""
-        elapsed_s = self.loop.elapsed_s(self.now_ns()) if self.loop else 0.0
-        return (*super().diagnostic_values(), ('elapsed_s', f'{elapsed_s:.3f}'))
+        return (*super().diagnostic_values(), ('elapsed_s', f'{self._played_s:.3f}'))
 
 
 def main(args: Sequence[str] | None = None) -> int:

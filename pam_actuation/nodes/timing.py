@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How regularly a loop runs and how late its inputs are; no ROS here."""
+"""How regularly a loop runs and how late its inputs are, clocks that were set; no ROS."""
 
 import math
 
@@ -60,6 +60,33 @@ class Latency:
             (f'{name}.{key}_ms', f'{time_ns * 1e-6:.3f}') for key, time_ns in (
                 ('p50', self.quantile_ns(0.5)), ('p99', self.quantile_ns(0.99)),
                 ('max', self.max_ns)))
+
+
+class ClockSteps:
+    """
+    Tells whether the clock of the stamps was set since ``begin``.
+
+    Each method takes the time by that clock, read between two times of the clock that the loops
+    run on, so that a process that stood still between two of the readings proves nothing. All
+    times in ns.
+    """
+
+    def __init__(self) -> None:
+        self._begin_ns: tuple[int, int, int] | None = None
+
+    def begin(self, before_ns: int, now_ns: int, after_ns: int) -> None:
+        """Note where both clocks are."""
+        self._begin_ns = before_ns, now_ns, after_ns
+
+    def step_s(self, before_ns: int, now_ns: int, after_ns: int) -> float:
+        """Return by how much the clock was set [s], at least that; 0 before ``begin``."""
+        if self._begin_ns is None:
+            return 0.0
+        first_before_ns, first_ns, first_after_ns = self._begin_ns
+        passed_ns = now_ns - first_ns
+        ahead_ns = passed_ns - (after_ns - first_before_ns)
+        back_ns = passed_ns - (before_ns - first_after_ns)
+        return (max(ahead_ns, 0) + min(back_ns, 0)) * 1e-9
 
 
 class LoopTiming:
