@@ -165,6 +165,7 @@ class MuscleLoop:
         for name, course in (('external_force_n', external_force_n), ('supply_pa', supply_pa)):
             if course is not None:
                 disturbances[name] = [course(k * (1.0 / rate_hz)) for k in range(self.ticks)]
+        fields(self._state, layout.STATE).supply_pa = disturbances['supply_pa'][0]
         self._driver = DriverLaw(rig, driver or driver_config(rig), rate_hz)
         self._steps = steps, min(int(round(latency_s / PHYSICS_S)), steps - 1)
 

@@ -110,13 +110,13 @@ def actuate(tick: int, command_pa: float, plant: Plant, hsv: bool, driver: Drive
     plant_state, plant_par, plant_inp, plant_out = plant
     steps, driver_every, latency_steps = timing
     disturbances, row = disturbance.view(DISTURBANCE), log.view(LOG)[tick]
-    acting = part(plant_inp, 0, layout.INPUT)
+    acting, seen = part(plant_inp, 0, layout.INPUT), part(plant_out, 0, layout.OUTPUT)
     command_pa = risen(part(rise, 0, RISE), command_pa)
     signal_0, signal_1 = acting.signal_0, acting.signal_1
     if tick % driver_every == 0:
         signal_0, signal_1 = drive(
-            driver, hsv, command_pa, part(inputs, 0, INPUT).pressure_pa,
-            disturbances[max(tick - 1, 0)].supply_pa, row.measured_m)
+            driver, hsv, command_pa, part(inputs, 0, INPUT).pressure_pa, seen.supply_pa,
+            row.measured_m)
     acting.external_force_n = disturbances[tick].external_force_n
     part(plant_par, 0, layout.PARAMETERS).supply_pa = disturbances[tick].supply_pa
     for j in range(steps):

@@ -77,6 +77,17 @@ def test_our_own_plant_gives_the_bits_of_the_compiled_loop(rig):
         assert np.array_equal(getattr(foreign, name), getattr(compiled, name)), name
 
 
+def test_the_driver_of_a_rollout_is_told_the_supply_behind_a_reservoir():
+    rig = load_rig('dmsp_5_300_realistic', valve='hsv').with_(
+        effects=[{'name': 'supply_droop', 'parameters': {'reservoir_volume_m3': 2e-4}}])
+    controller = load_controller('sofc_hsv', rig)
+    compiled = ClosedLoop(rig, MOTION, seed=2).run(controller)
+    controller.reset()
+    foreign = ForeignLoop(rig.plant, rig, MOTION, seed=2).run(controller)
+    assert np.array_equal(foreign.signal, compiled.signal)
+    assert np.array_equal(foreign.contraction_m, compiled.contraction_m)
+
+
 def test_a_hidden_rig_is_tracked_and_answers_to_load_and_supply(rig):
     controller = load_controller(f'pid{"_hsv" * (rig.valve == "hsv")}', rig)
     plant = truth_realistic.HiddenPlant(rig.valve, 5)
