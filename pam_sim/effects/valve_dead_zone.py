@@ -86,8 +86,14 @@ def set_point(set_point_pa: float, time_constant_s: float, pressure_pa: float,
 
 @compiled
 def mean_opening(duty: float, period_s: float, open_s: float, close_s: float) -> float:
-    """Return the mean opening of one valve, shut at first, driven with a constant duty."""
+    """
+    Return the mean opening of one valve, shut at first, driven with a constant duty.
+
+    A coil that is always on has opened its valve for good, whatever time that took.
+    """
     pulse = duty * period_s
+    if pulse >= period_s:
+        return 1.0
     if pulse <= 0.0 or pulse <= open_s:
         return 0.0
     if period_s - pulse < close_s:

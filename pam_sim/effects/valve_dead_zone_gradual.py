@@ -94,6 +94,8 @@ def mean_opening_with_lift(duty: float, period_s: float, open_s: float, close_s:
     rise_s, fall_s = min(rise_s, 2.0 * open_s), min(fall_s, 2.0 * close_s)
     pulse = duty * period_s
     lifted = pulse - open_s + 0.5 * rise_s      # since the lift began
+    if pulse >= period_s:
+        return 1.0                       # always on
     if pulse <= 0.0 or lifted <= 0.0:
         return 0.0
     if period_s - pulse < close_s:

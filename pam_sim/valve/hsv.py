@@ -81,19 +81,22 @@ def pulse_edges(pulse_s: float, last_off_s: float, period_s: float, open_time_s:
     pulse_s : float
         Energised time, duty x period.
     last_off_s : float
-        Closing edge in the period before, from that period's start.
+        Second edge of the period before, from that period's start.
     period_s : float
         PWM period.
     open_time_s, close_time_s : float
         Delay from energising to open and from de-energising to shut, s. A
-        pulse shorter than the first is swallowed; a valve not yet shut stays open.
+        pulse shorter than the first is swallowed; a valve not yet shut stays open. A duty of 1
+        is one long pulse: while the valve is on its way, the second edge is negative, the time
+        for which the coil has been on.
 
     """
     carry = max(last_off_s - period_s, 0.0)
     if pulse_s <= 0.0:
         return 0.0, carry
-    if carry > 0.0:
+    if last_off_s >= period_s:
         return 0.0, max(carry, pulse_s + close_time_s)
-    if pulse_s <= open_time_s:
-        return 0.0, 0.0
-    return open_time_s, pulse_s + close_time_s
+    energised_s = max(-last_off_s, 0.0)
+    if energised_s + pulse_s <= open_time_s:
+        return 0.0, -(energised_s + pulse_s) if pulse_s >= period_s else 0.0
+    return open_time_s - energised_s, pulse_s + close_time_s

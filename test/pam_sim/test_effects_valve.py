@@ -149,6 +149,16 @@ def test_pulses_shorter_than_the_opening_time_let_in_no_air_however_slow_the_val
 
 
 @pytest.mark.parametrize('fidelity', ['averaged', 'switching'])
+def test_a_coil_that_is_always_on_opens_its_valve_whatever_time_that_takes(fidelity):
+    slow = held('hsv', ('valve_dead_zone', {'open_time_s': 15e-3}), fidelity=fidelity)
+    vented = slow.simulate(np.tile((0.0, 1.0), (1500, 1)), initial_pressure_pa=P_ATM_PA + 400e3)
+    assert vented.pressure_pa[-1] == pytest.approx(P_ATM_PA, abs=100.0)
+    for edges in ((0.0, 0.0, -10e-3), (-10e-3, 5e-3, 10e-3), (10e-3, 0.0, 10e-3)):
+        assert pulse_edges(10e-3, edges[0], 10e-3, 15e-3, 0.0) == pytest.approx(edges[1:])
+    assert mean_opening_with_lift(1.0, 10e-3, 15e-3, 0.0, 1e-3, 0.0) == 1.0
+
+
+@pytest.mark.parametrize('fidelity', ['averaged', 'switching'])
 def test_two_equal_ramps_are_the_gradual_dead_zone(fidelity):
     edges = {'open_time_s': 1.5e-3, 'close_time_s': 1.2e-3}
     signal = np.linspace(0.0, 0.6, 1000)[:, np.newaxis] * [1.0, 0.5]
