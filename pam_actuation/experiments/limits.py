@@ -50,13 +50,12 @@ def check_rig(experiment: 'Experiment', rig: 'JointRig | Rig') -> None:
     and its range. Pressure: the limit of the driver and the supply of the valves; a regulator
     that ends below it stays at its end, which ``reach_remarks`` tells. Raw valve signal: the
     valve it is meant for, and the input range of a regulator. Disturbance: a load that moves
-    freely. Measured topics it needs.
+    freely, and no joint. Measured topics it needs.
     """
     place = f'experiment "{experiment.name}"'
     if experiment.domain == 'joint_angle' or isinstance(rig, JointRig):
         _check_joint(experiment, rig, place)
-        return
-    if experiment.domain == 'contraction':
+    elif experiment.domain == 'contraction':
         _check_stroke(experiment, rig, place)
     elif experiment.domain == 'force':
         _check_force(experiment, rig, place)
@@ -68,10 +67,8 @@ def check_rig(experiment: 'Experiment', rig: 'JointRig | Rig') -> None:
             f'{_VALVE_OF[experiment.domain]}, the rig {rig.name} has {rig.valve}', place)
     elif experiment.domain == 'ppr_voltage':
         _check_voltage(experiment, rig, place)
-    if experiment.disturbance and 'mass_kg' not in rig.parameters:
-        raise InputError(
-            f'it pushes on the load, and the load `{rig.load}` of {rig.name} has no mass that '
-            'could move', place)
+    if experiment.disturbance:
+        _check_push(rig, place)
     if 'supply_pressure' in experiment.needs and rig.valve != 'hsv':
         raise InputError(
             f'it needs supply_pressure, which {rig.name} with valve {rig.valve} does not measure',
@@ -198,6 +195,17 @@ def _check_joint(experiment: 'Experiment', joint: 'JointRig | Rig', place: str) 
         raise InputError(
             f'asks for {worst[0]:.3f} to {worst[1]:.3f} rad; {joint.name} allows {lower:.3f} to '
             f'{upper:.3f} rad', place)
+
+
+def _check_push(rig: 'JointRig | Rig', place: str) -> None:
+    if isinstance(rig, JointRig):
+        raise InputError(
+            f'its `disturbance` is a force on a load; the joint {rig.name} takes torques only, '
+            'on the topic external_torque', place)
+    if 'mass_kg' not in rig.parameters:
+        raise InputError(
+            f'it pushes on the load, and the load `{rig.load}` of {rig.name} has no mass that '
+            'could move', place)
 
 
 def _check_pressure(experiment: 'Experiment', rig: 'Rig', place: str) -> None:

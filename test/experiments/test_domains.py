@@ -178,6 +178,18 @@ def test_a_rig_refuses_what_it_cannot_do_before_anything_is_written(
     assert not (tmp_path / 'bag').exists()
 
 
+@pytest.mark.parametrize('more, valve, says', [
+    ('needs: [supply_pressure]', 'ppr', 'does not measure'),
+    ('disturbance: [{step: {to_n: 100.0, duration_s: 1}}]', 'hsv', 'takes torques only')])
+def test_a_joint_refuses_what_it_does_not_measure_and_a_force_on_a_load(more, valve, says):
+    text = f'name: bend\ndomain: joint_angle\n{more}\nsegments:\n  - rest: {{duration_s: 1}}\n'
+    joint = pam_sim.load_joint('joint_dmsp_5_300_realistic')
+    with pytest.raises(InputError, match=says):
+        load_experiment(text).check_reachable(joint.with_(valve=valve))
+    if 'needs' in more:
+        load_experiment(text).check_reachable(joint.with_(valve='hsv'))
+
+
 @pytest.mark.parametrize('rig, valve, number', [
     ('dmsp_5_300_realistic', 'hsv', {'supply_pa': 401_325.0}),
     ('dmsp_5_300_isometric', 'ppr', {'K_m': 50e3}),               # 0 to 6 V
