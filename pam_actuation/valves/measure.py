@@ -160,22 +160,25 @@ def measure_flow(rig: 'Rig') -> dict[str, Any]:
     """
     Return how the effect of a signal depends on the pressure, without any feedback.
 
-    PPR: pressure per volt at rest. HSV: pressure rate per duty, filling and venting.
-    ``ratio`` is the largest over the smallest.
+    PPR: pressure per volt at rest, both above the zero of the regulator, which does not go
+    lower. HSV: pressure rate per duty, filling and venting. ``ratio`` is the largest over the
+    smallest.
     """
     fill: list[float] = []
     vent: list[float] = []
-    for start in OPEN_LOOP_PA:
+    zero_v, zero_pa = (rig.parameters[name] for name in ('ppr_lowest_v', 'ppr_zero_pa'))
+    levels = [pa for pa in OPEN_LOOP_PA if rig.valve == 'hsv' or pa > zero_pa]
+    for start in levels:
         if rig.valve == 'ppr':
             voltage = voltage_v(start, rig.parameters)
             end = rig.simulate(np.full(_steps(2.0), voltage),
                                initial_pressure_pa=P_ATM_PA + start).true_pressure_pa[-1]
-            fill.append(float(end - P_ATM_PA) / voltage)
+            fill.append(float(end - P_ATM_PA - zero_pa) / (voltage - zero_v))
             continue
         for duties, rates in (((OPEN_LOOP_DUTY, 0.0), fill), ((0.0, OPEN_LOOP_DUTY), vent)):
             rates.append(_rate(rig, start, duties) / OPEN_LOOP_DUTY)
     sizes = np.abs(fill + vent)
-    return {'at_gauge_pa': list(OPEN_LOOP_PA), 'fill': fill, 'vent': vent,
+    return {'at_gauge_pa': levels, 'fill': fill, 'vent': vent,
             'unit': 'Pa/V' if rig.valve == 'ppr' else 'Pa/s',
             'ratio': float(sizes.max() / sizes.min())}
 

@@ -138,6 +138,16 @@ def test_the_regulator_is_linear_and_the_pair_is_not(result):
     assert vent[0] < vent[1] < vent[2] and hsv['fill'][0] > hsv['fill'][2]
 
 
+@pytest.mark.parametrize('numbers, levels', [
+    ({'ppr_lowest_v': 1.0, 'ppr_highest_v': 5.0, 'K_m': 150e3}, 3),
+    ({'ppr_zero_pa': 5e3, 'K_m': 99e3}, 3), ({'ppr_zero_pa': 100e3}, 2)])
+def test_a_zero_of_the_regulator_is_no_change_of_its_gain(numbers, levels):
+    rig = load_rig('dmsp_5_300_hanging_mass').with_(parameters=numbers)
+    flow = measure.measure_flow(rig)
+    assert flow['fill'] == pytest.approx([rig.parameters['K_m']] * levels)
+    assert flow['at_gauge_pa'] == [100e3, 300e3, 500e3][-levels:]
+
+
 def test_the_switching_pair_ripples_more_than_its_mean(result):
     valves = result['valves']
     ripples = [valves[name]['accuracy']['ripple_moving_rms_pa'] for name in CHAINS]
