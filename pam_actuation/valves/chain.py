@@ -80,9 +80,18 @@ class Bench:
     seed : int
         Of the sensor noise.
 
+    Raises
+    ------
+    InputError
+        The PWM period of on/off valves is no whole number of steps.
+
     """
 
     def __init__(self, rig: Rig, seed: int = 0) -> None:
+        steps = rig.parameters['pwm_period_s'] / STEP_S
+        if rig.valve == 'hsv' and abs(steps - round(steps)) > 1e-6:
+            raise InputError(f'`pwm_period_s` is {steps:g} ms; the measurements need a whole '
+                             'number of ms', rig.name)
         self.rig, self.seed = rig, seed
         self._config = driver_config(rig, _AT_ONCE)
 

@@ -63,8 +63,8 @@ def compare(rig: 'Rig', seed: int = 0, power: dict[str, float] | None = None,
     Raises
     ------
     InputError
-        The hold is too short or too long, the load's motion must be prescribed, or the
-        driver cannot follow on this rig.
+        The hold is too short or too long, the load's motion must be prescribed, the PWM period
+        is no whole number of ms, or the driver cannot follow on this rig.
 
     """
     if not LEAST_HOLD_S <= hold_s <= MOST_HOLD_S:
@@ -74,19 +74,19 @@ def compare(rig: 'Rig', seed: int = 0, power: dict[str, float] | None = None,
         raise InputError(f'load `{rig.load}` needs a recorded contraction; choose a rig with '
                          'another load', rig.name)
     power = power_values() if power is None else power
-    valves = {}
-    for name, (valve, fidelity) in CHAINS.items():
-        chosen = rig.with_(valve=valve, fidelity=fidelity)
-        valves[name] = _measure(chosen, seed, power, hold_s, progress or (lambda: None))
+    benches = {name: Bench(rig.with_(valve=valve, fidelity=fidelity), seed)
+               for name, (valve, fidelity) in CHAINS.items()}
+    valves = {name: _measure(bench, power, hold_s, progress or (lambda: None))
+              for name, bench in benches.items()}
     return {'schema': 1, 'rig': rig.name, 'load': rig.load,
             'effects': [item.name for item in rig.effects], 'seed': seed, 'hold_s': hold_s,
             'hold_gauge_pa': measure.HOLD_PA, 'cycle_gauge_pa': list(measure.CYCLE_PA),
             'power': power, 'valves': valves}
 
 
-def _measure(rig: 'Rig', seed: int, power: dict[str, float], hold_s: float,
+def _measure(bench: Bench, power: dict[str, float], hold_s: float,
              done: Callable[..., Any]) -> dict[str, Any]:
-    bench = Bench(rig, seed)
+    rig = bench.rig
     steps = measure.measure_steps(bench)
     done()
     accuracy, signal = measure.measure_accuracy(bench)
@@ -101,7 +101,7 @@ def _measure(rig: 'Rig', seed: int, power: dict[str, float], hold_s: float,
     leaks = forms_of(rig.effects, 'leakage')
     leaking = rig.with_(effects=[
         *(item for item in rig.effects if item not in leaks), measure.LEAK])
-    leak = measure.measure_hold(Bench(leaking, seed), hold_s, power)
+    leak = measure.measure_hold(Bench(leaking, bench.seed), hold_s, power)
     done()
     loss = measure.measure_power_loss(bench)
     flow = measure.measure_flow(rig)

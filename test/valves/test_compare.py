@@ -214,6 +214,8 @@ def test_what_cannot_be_compared_is_refused():
         compare(load_rig('dmsp_5_300_driven'))
     with pytest.raises(InputError, match='allowed 2 to 3600 s'):
         compare(load_rig('dmsp_5_300_realistic'), hold_s=0.0)
+    with pytest.raises(InputError, match='`pwm_period_s` is 2.5 ms'):
+        compare(load_rig('dmsp_5_300_realistic').with_(parameters={'pwm_period_s': 0.0025}))
 
 
 def test_the_verb_writes_and_repeats(tmp_path, capsys, result):
