@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from pam_sim.muscle.law import MuscleLaw
 
 COLUMNS = ('pressure_gauge_pa', 'load_n', 'strain', 'air_mass_kg')
-_DEAD_VOLUME = re.compile(r'dead volume ([\d.e+-]+) mL')
+_DEAD_VOLUME = re.compile(r'dead volume ((?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?) mL')
 
 
 @short_repr
@@ -97,7 +97,7 @@ class LookupTable:
 
     @property
     def dead_volume_m3(self) -> float | None:
-        """Volume [m^3] of tube and fittings whose air is in the table; None if not said."""
+        """Volume [m^3] of tube and fittings whose air is in the table; None if no number is."""
         found = _DEAD_VOLUME.search(self.source)
         return 1e-6 * float(found[1]) if found else None
 

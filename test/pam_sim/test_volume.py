@@ -245,6 +245,14 @@ def test_a_law_without_a_volume_is_refused_in_place_of_one_with_it():
         rig.with_(volume='air')
 
 
+@pytest.mark.parametrize('words, dead_ml', [
+    ('3', 3.0), ('3.', 3.0), ('.5', 0.5), ('1e-05', 1e-5), ('3-4', None), ('1.2.3', None),
+    ('-3', None)])
+def test_the_dead_volume_of_a_table_is_one_number(words, dead_ml):
+    table = table_with(source=f'measured; dead volume {words} mL')
+    assert table.dead_volume_m3 == (None if dead_ml is None else 1e-6 * dead_ml)
+
+
 def test_a_table_whose_air_cannot_be_simulated_is_refused():
     muscle = get_muscle('dmsp_5_300')
     table = read_table(SHIPPED)
