@@ -17,8 +17,9 @@ The rules a tuned controller begins with: learned on the model, not drawn by han
 
 On every rig the controller tracks the experiments one after the other, the last one first, and
 keeps what it learns. List slow ones first: they then refine what fast ones taught roughly. Three
-tables are then compared: the old one, the one of the first (nominal) rig, and the mean over all
-rigs. The criterion is the cost of the tuned settings that start from them.
+tables are then compared: the old one, the one of the nominal rig (of the first within reach if
+that is beyond it), and the mean over all rigs. The criterion is the cost of tuned settings that
+start from them.
 """
 
 from typing import TYPE_CHECKING
@@ -29,12 +30,14 @@ from pam_actuation.tuning.problem import Problem, rebuild
 if TYPE_CHECKING:
     from pam_actuation.control.sofc.rule_table import RuleBase
     from pam_actuation.workers import Workers
+    from pam_sim.joint.rig import JointRig
+    from pam_sim.rig import Rig
 
 _PASSES = 3                     # times a rig's experiments are tracked
 
 
-def initial_rules(workers: 'Workers', problem: Problem,
-                  settings: dict[str, float]) -> 'tuple[tuple[str, RuleBase, float], int]':
+def initial_rules(workers: 'Workers', problem: Problem, settings: dict[str, float],
+                  nominal: 'Rig | JointRig') -> 'tuple[tuple[str, RuleBase, float], int]':
     """
     Return (name, rules, cost) of the best table for a start, and the rollouts it took.
 
@@ -43,9 +46,11 @@ def initial_rules(workers: 'Workers', problem: Problem,
     workers : Workers
         Where the rollouts run.
     problem : Problem
-        Its controller has rules; its first loop is one of the nominal rig.
+        Its controller has rules; its first loops are those of the nominal rig, if it has any.
     settings : dict
         Tuned settings.
+    nominal : Rig or JointRig
+        Its table is called so.
 
     """
     rigs = list(dict.fromkeys(id(loop.rig) for loop in problem.loops))
@@ -54,7 +59,8 @@ def initial_rules(workers: 'Workers', problem: Problem,
     learned = workers.map(_learn, problem, [(group, settings) for group in groups])
     before = rebuild(problem.controller, settings).rules
     assert before is not None
-    tables = [('as before', before), ('learned on the nominal rig', as_initial(learned[0]))]
+    first = 'nominal rig' if problem.loops[0].rig is nominal else 'first rig within reach'
+    tables = [('as before', before), (f'learned on the {first}', as_initial(learned[0]))]
     if len(learned) > 1:
         tables.append((f'mean of {len(learned)} rigs', as_initial(mean_rules(learned))))
     costs = workers.map(

@@ -323,7 +323,7 @@ def tune(rig: 'Rig | JointRig | Sequence[Rig | JointRig]', controller: 'Law',
             after, cost_after = {}, cost_before
         tuned, rules, extra = rebuild(controller, after), '', 0
         if learn_rules and controller.rules is not None:
-            (rules, table, cost_after), extra = initial_rules(workers, problem, after)
+            (rules, table, cost_after), extra = initial_rules(workers, problem, after, rigs[0])
             tuned = rebuild(controller, after, table)
         costs_after = held_out_costs(Problem(test, tuned))
     held_after = held_found = float(np.mean(costs_after))

@@ -42,16 +42,24 @@ def problem(rig):
         load_controller('sofc_ppr', rig))
 
 
-def test_a_learned_table_is_chosen_and_starts_fresh(problem):
+def test_a_learned_table_is_chosen_and_starts_fresh(problem, rig):
     before = problem.cost({})
     with Workers() as workers:
-        (name, rules, cost), rollouts = initial_rules(workers, problem, {})
+        (name, rules, cost), rollouts = initial_rules(workers, problem, {}, rig)
     assert cost < 0.9 * before and name != 'as before'
     assert rollouts == 2 * 3 + 3 * 2
     assert not rules.feedforward_fired.any()
     assert np.array_equal(rules.feedforward_initial, rules.feedforward)
     taught = rebuild(problem.controller, {}, rules)
     assert Problem(problem.loops, taught).cost({}) == cost
+
+
+@pytest.mark.parametrize('loop, name', [(0, 'nominal rig'), (1, 'first rig within reach')])
+def test_a_table_is_called_that_of_the_nominal_rig_where_it_is(problem, rig, loop, name):
+    alone = Problem(problem.loops[loop:loop + 1], problem.controller)
+    with Workers() as workers:
+        (found, _, _), _ = initial_rules(workers, alone, {}, rig)
+    assert found == f'learned on the {name}'
 
 
 def test_other_knots_start_untaught_and_equal_ones_keep_the_rules(problem):
