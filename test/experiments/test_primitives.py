@@ -238,6 +238,15 @@ def test_multisine_keeps_its_peak_bound():
     assert max(abs(v - 0.01) for v in values) <= 0.005 * 1.02
 
 
+@pytest.mark.parametrize('seed', range(1, 4))
+def test_multisine_exceeds_its_bound_by_what_the_guide_says(seed):
+    keys = {'amplitude_m': 0.01, 'center_m': 0.02, 'min_hz': 0.5, 'max_hz': 1.0, 'lines': 3}
+    one = make_primitive('multisine', {**keys, 'duration_s': 20.0, 'seed': seed}, 0.0, 0.0, 'm')
+    highest = max(abs(one.at(0.01 * k)[0] - 0.02) for k in range(2001))
+    assert 0.0 <= highest / 0.01 - 1.0 < 0.05
+    assert '`amplitude` bounds the peak to 5 %' in GUIDE
+
+
 @pytest.mark.parametrize('name', NAMED)
 def test_named_experiments_load_and_round_trip(name):
     experiment = load_experiment(name)
