@@ -28,7 +28,7 @@ class Staircase(Primitive):
     start: float
     low: float = key('value of the first stair')
     high: float = key('value of the last stair')
-    steps: int = key('number of stairs')
+    steps: int = key('number of jumps; the holds are one more')
     hold_s: float = key('time of each hold')
 
     @property
