@@ -23,6 +23,7 @@ import subprocess
 import sys
 import time
 
+from pam_sim import load_rig
 from pam_sim.errors import InputError
 import pytest
 
@@ -118,6 +119,13 @@ def test_a_command_that_a_benchmark_does_not_take_is_refused(capsys):
     with pytest.raises(SystemExit):
         parser.parse_args(['--colour', 'red'])
     assert '--colour' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('valve, names', [
+    ('ppr', ['1 kg more']), ('hsv', ['1 kg more', 'supply -15 %'])])
+def test_a_supply_is_changed_only_where_the_model_has_one(valve, names):
+    rig = load_rig('dmsp_5_300_realistic', valve=valve)
+    assert [*importlib.import_module('tracking').changes(rig, 45.0)] == names
 
 
 def test_help_runs_nothing():
