@@ -19,6 +19,9 @@ Forward selection by BIC over the same library: free runs of the whole chain, wh
 no held-out part, no test of materiality. Sparse regression of residuals as in SINDy
 (pysindy, if installed): derivatives of the recorded signals, one term per effect that can be
 written as a term. Each method gets the bags of a case and returns the data of a ``gap.json``.
+
+The first names no wrong number of the model. The second has no equation of on/off valves, so it
+can name no effect of theirs.
 """
 
 import importlib.util

@@ -69,7 +69,9 @@ def _rivals(cases, rivals):
     parts = ['Other methods on the same records:', '',
              '| method | right single name (gap ≥ 1 σ) | null records with a name | wrong name, '
              'all cases |', '|---|---|---|---|']
-    for name, found in {'pam gap': cases, **rivals}.items():
+    answered = {c.key['name'] for found in rivals.values() for c in found}
+    ours = [c for c in cases if c.key['name'] in answered]
+    for name, found in {'pam gap': ours, **rivals}.items():
         singles = [c for c in found if c.key['kind'] == 'single' and c.gap >= 1.0]
         nulls = [c for c in found if c.key['kind'] in ('null', 'hard_null')]
         parts.append(f'| {name} | {_share(singles, _right)} | '

@@ -83,6 +83,13 @@ def test_one_wrong_answer_is_found_and_named(keys):
     assert listed.count('\n') == 2 and '| leakage | ' in listed and 'creep 1 |' in listed
 
 
+def test_other_methods_are_compared_on_the_cases_they_answered(keys):
+    cases = [scored(k, oracle(k)) for k in keys]
+    rows = re.findall(r'^\| (?:pam gap|rival) (\|.*)$', report(
+        cases, FAMILIES, {'rival': cases[:30]}), re.M)
+    assert len(rows) == 2 and rows[0] == rows[1] and '(0/30;' in rows[0]
+
+
 def test_a_number_by_another_name_is_right():
     key = {'effects': ['dead_volume'], 'wrong': {}, 'outside': []}
     assert is_right(read_answer({'verdict': 'parameter', 'parameters': [{'name': 'V_dead'}]}), key)
