@@ -244,7 +244,7 @@ def test_multisine_exceeds_its_bound_by_what_the_guide_says(seed):
     one = make_primitive('multisine', {**keys, 'duration_s': 20.0, 'seed': seed}, 0.0, 0.0, 'm')
     highest = max(abs(one.at(0.01 * k)[0] - 0.02) for k in range(2001))
     assert 0.0 <= highest / 0.01 - 1.0 < 0.05
-    assert '`amplitude` bounds the peak to 5 %' in GUIDE
+    assert '`amplitude` bounds the peak, to within 5 %' in GUIDE
 
 
 @pytest.mark.parametrize('name', NAMED)

@@ -23,7 +23,7 @@ from pam_actuation.experiments.primitives.base import key, Primitive
 @dataclass
 class Multisine(Primitive):
     """
-    Sum of sines with equal amplitudes and random phases; ``amplitude`` bounds the peak to 5 %.
+    Sum of sines with equal amplitudes and random phases; ``amplitude`` bounds the peak within 5 %.
 
     The peak is sought at ten points of a period of the quickest sine. Between two of them it may
     be larger by 1 / cos(pi / 10).
@@ -32,7 +32,7 @@ class Multisine(Primitive):
     QUANTITIES = ('center', 'amplitude')
     start: float
     center: float = key('centre of the motion')
-    amplitude: float = key('bound of the sum of all sines, to 5 %')
+    amplitude: float = key('bound of the sum of all sines, to within 5 %')
     min_hz: float = key('lowest frequency')
     max_hz: float = key('highest frequency')
     lines: int = key('number of sines')
