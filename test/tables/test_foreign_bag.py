@@ -17,7 +17,9 @@
 import numpy as np
 from pam_actuation.bags.load import load_run
 from pam_actuation.cli.main import main
+from pam_actuation.tables.formats import bag as bag_format, read_tables
 from pam_actuation.tables.own_bag import needs_no_import
+from pam_sim.errors import InputError
 from pam_sim.units import P_ATM_PA
 import pytest
 from rosbags.rosbag1 import Writer as Ros1Writer
@@ -186,6 +188,38 @@ def test_a_bag_of_our_topics_needs_no_import(exo, tmp_path, capsys):
     assert main(['import', stack, '--map', 'pressure=/thigh/no:Pa_abs']) == 2
     assert 'as it is' not in capsys.readouterr().err
     assert needs_no_import(exo) == '' and needs_no_import(tmp_path / 'a.csv') == ''
+
+
+def arrays(place, data, topic='/Sensors'):
+    """Write a bag with one array a message; return its path."""
+    with Writer(place, version=9) as writer:
+        connection = writer.add_connection(topic, 'std_msgs/msg/Float64MultiArray',
+                                           typestore=STORE)
+        for row, values in enumerate(data):
+            message = made('std_msgs/msg/Float64MultiArray', data=np.array(values, float), layout=(
+                made('std_msgs/msg/MultiArrayLayout', dim=[], data_offset=0)))
+            writer.write(connection, START_NS + row * STEP_NS,
+                         STORE.serialize_cdr(message, message.__msgtype__))
+    return str(place)
+
+
+def test_messages_without_numbers_are_rows_without_values(tmp_path):
+    table, = read_tables(arrays(tmp_path / 'a', [[], [1.0], [], [2.0], [3.0] * 4000]))
+    np.testing.assert_array_equal(
+        table.numbers('/Sensors.data[0]'), [np.nan, 1.0, np.nan, 2.0, 3.0])
+    assert table.stamp_ns.tolist() == (START_NS + STEP_NS * np.arange(5)).tolist()
+    for place, data in (('image', [[3.0] * 4000, [1.0]]), ('empty', [[], []])):
+        with pytest.raises(InputError, match='holds no rows of numbers'):
+            read_tables(arrays(tmp_path / place, data))
+
+
+def test_a_topic_that_is_cut_says_so(tmp_path, monkeypatch):
+    monkeypatch.setattr(bag_format, 'MOST_ROWS', 10)
+    bag = arrays(tmp_path / 'a', [[float(row)] for row in range(41)])
+    table, = read_tables(bag, every=2)
+    assert (len(table), table.remarks) == (10, [
+        'of 41 messages on /Sensors the first 20 are read; keep one of several, with --every 5'])
+    assert [table.remarks for table in read_tables(bag, every=5)] == [[]]
 
 
 def test_a_bag_of_ros_1(tmp_path, capsys):

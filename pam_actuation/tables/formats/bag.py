@@ -37,7 +37,8 @@ def read(path: str, every: int, wanted: Collection[str] | None,
     A column is called ``/topic.field``. Where a message names the items of its arrays, as
     ``JointState`` does, each name has a table of its own, with columns such as
     ``/joint_states.position[knee]``. Times are header stamps, or receive times for messages
-    without header. Of topics that are not ``wanted`` only the first messages are read.
+    without header. Of topics that are not ``wanted`` only the first messages are read. A message
+    without numbers, such as a state before the first reading, is a row without values.
     """
     from rosbags.highlevel import AnyReader, AnyReaderError
     place = Path(path)
@@ -51,7 +52,14 @@ def read(path: str, every: int, wanted: Collection[str] | None,
                 read_messages = _messages(reader, connection, every, None if used else _PREVIEWED)
                 done += connection.msgcount
                 progress(done / total)
-                tables += _tables(path, connection.topic, connection.msgtype, read_messages)
+                own = _tables(path, connection.topic, connection.msgtype, read_messages)
+                if connection.msgcount > MOST_ROWS * every:
+                    for table in own:
+                        table.remarks.append(
+                            f'of {connection.msgcount} messages on {table.topic} the first '
+                            f'{MOST_ROWS * every} are read; keep one of several, with --every '
+                            f'{-(-connection.msgcount // MOST_ROWS)}')
+                tables += own
             return tables
     except (AnyReaderError, KeyError, ValueError, AssertionError, OSError) as error:
         raise InputError(f'is no readable bag: {error}', path) from None
@@ -69,18 +77,17 @@ def _messages(reader: Any, connection: Any, every: int, most: int | None) -> lis
             break
         if count % every:
             continue
-        if len(raw) > _LARGE_BYTES:
+        if not found and len(raw) > _LARGE_BYTES:
             break
         message = reader.deserialize(raw, connection.msgtype)
-        values = dict(_numbers(message, ''))
-        if not values:
-            break
-        found.append(Message(_stamp_ns(message) or log_time_ns, items_named(message), values))
+        found.append(Message(_stamp_ns(message) or log_time_ns, items_named(message),
+                             dict(_numbers(message, ''))))
     return found
 
 
 def _tables(path: str, topic: str, msgtype: str, found: list[Message]) -> list[Table]:
     """Return the table of a topic, or one for each name in its messages."""
+    found = found if any(one.values for one in found) else []
     if not any(one.names for one in found):
         return [_table(path, topic, msgtype, found)] if found else []
     tables = []
