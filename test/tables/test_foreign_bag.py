@@ -213,6 +213,16 @@ def test_messages_without_numbers_are_rows_without_values(tmp_path):
             read_tables(arrays(tmp_path / place, data))
 
 
+@pytest.mark.parametrize('column', ['/Sensors.data[0]', ' /sensors.DATA[0]', '#1'])
+def test_a_topic_is_wanted_by_any_name_that_means_its_column(column, tmp_path, monkeypatch):
+    monkeypatch.setattr(bag_format, '_PREVIEWED', 3)
+    bag = arrays(tmp_path / 'a', [[float(row)] for row in range(9)])
+    table, = read_tables(bag, wanted=[column])
+    assert table.name_of(column) and len(table) == 9
+    table, = read_tables(bag, wanted=['/Sensors2.data[0]'])
+    assert len(table) == 3
+
+
 def test_a_topic_that_is_cut_says_so(tmp_path, monkeypatch):
     monkeypatch.setattr(bag_format, 'MOST_ROWS', 10)
     bag = arrays(tmp_path / 'a', [[float(row)] for row in range(41)])

@@ -66,6 +66,8 @@ def read(path: str, every: int, wanted: Collection[str] | None,
 
 
 def _is_of(column: str, topic: str) -> bool:
+    """Return whether a column can be one of a topic, as ``Table.name_of`` compares names."""
+    column, topic = column.strip().lower(), topic.lower()
     return column == topic or column.startswith(f'{topic}.') or column.startswith('#')
 
 
