@@ -50,7 +50,7 @@ class Table:
     remarks : list of str
         What was odd about the file.
     numbered : ndarray of int64, optional
-        Number of every row from 0, where rows between were left out.
+        Number of every row in the file from 0, where rows between were left out.
     called : dict of str to str
         What the file calls a column whose name stands twice; its own is its number.
     decimal : str

@@ -331,6 +331,20 @@ def test_a_part_and_every_tenth_row(tmp_path, monkeypatch):
                                101_325.0 + 1e5 * np.arange(1.0, 2.005, 0.01))
 
 
+@pytest.mark.parametrize('ending', ['csv', 'npz'])
+def test_a_rate_is_that_of_the_rows_of_the_file(ending, tmp_path):
+    path, values = str(tmp_path / f'a.{ending}'), 0.5 * np.arange(50)
+    if ending == 'npz':
+        np.savez(path, p_bar=values)
+    else:
+        Path(path).write_text('p_bar\n' + ''.join(f'{one}\n' for one in values),
+                              encoding='utf-8')
+    table, = read_tables(path, every=10)
+    clock = clock_of(table, TableMapping(rate_hz=100.0))
+    assert (clock.stamp_ns - messages.START_NS).tolist() == [10**8 * k for k in range(5)]
+    assert clock.told == '100 rows a second'
+
+
 def test_a_file_without_names_begins_with_its_time(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     Path('a.csv').write_text(''.join(

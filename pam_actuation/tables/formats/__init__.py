@@ -21,6 +21,7 @@ from pathlib import Path
 import shlex
 from typing import Any
 
+import numpy as np
 from pam_actuation.bags.layout import METADATA_FILE
 from pam_actuation.tables.table import Table
 from pam_sim.errors import InputError
@@ -80,6 +81,10 @@ def read_tables(path: StrPath, every: int = 1, wanted: Collection[str] | None = 
         raise InputError(f'cannot be read: {error}', shown(path)) from None
     if not any(len(table) for table in tables):
         raise InputError('holds no rows of numbers', shown(path))
+    if every > 1:
+        for table in tables:
+            table.numbered = every * (
+                np.arange(len(table)) if table.numbered is None else table.numbered)
     return tables
 
 
