@@ -33,9 +33,9 @@ from pam_actuation.tables.guess import is_exported, unit_of_column
 from pam_actuation.tables.lengths import size_of_mapping
 from pam_actuation.tables.mapping import TableMapping
 from pam_actuation.tables.plausible import Doubt, doubts, held_at_m, missing_values
-from pam_actuation.tables.signals import are_of_joint, BY_NAME, of_muscles, Signal
+from pam_actuation.tables.signals import are_of_joint, BY_NAME, of_muscles
 from pam_actuation.tables.table import no_column_in, Table
-from pam_actuation.tables.units import ANGLE, LENGTH, of_output
+from pam_actuation.tables.units import of_output
 from pam_actuation.tables.words import unit_in
 from pam_actuation.topics.contents import Make
 from pam_actuation.topics.table import topic_of
@@ -96,7 +96,8 @@ class Recording:
         """
         Return what lies between two times after the start; InputError if that is nothing.
 
-        A signal without a value there is left out, and a doubt says so.
+        A signal without a value there is left out, and a doubt says so. So is one that makes no
+        message without it.
         """
         first = min(int(stamps[0]) for stamps, _ in self.signals.values())
         signals, found = {}, [*self.found]
@@ -108,6 +109,12 @@ class Recording:
             elif np.isfinite(values).any():
                 found.append(Doubt(f'{name} (column "{self.mapping.signals[name].column}") has '
                                    'no value in the time asked for, and is not in the bag'))
+        for name in [*signals]:
+            partner = _partner_of(name)
+            if partner in self.signals and partner not in signals:
+                del signals[name]
+                found.append(Doubt(f'{name} (column "{self.mapping.signals[name].column}") is '
+                                   f'left out with {partner}; {_has_both(name)}'))
         if not signals:
             raise InputError(f'no value lies between {begin_s:g} and {end_s:g} s; the recording '
                              f'has {self.duration_s:.6g} s', '--from and --to')
@@ -224,7 +231,10 @@ def _check(result: Recording, size: Size, accept: bool) -> None:
                          'angle="COLUMN:deg"', '--map')
     for place, names in of_muscles(result.signals).items():
         _check_muscle(place, names, result.is_of_joint)
-    _check_rates([BY_NAME[name] for name in result.signals])
+    for name in result.signals:
+        partner = _partner_of(name)
+        if partner and partner not in result.signals:
+            raise InputError(f'{name} is mapped, {partner} is not; {_has_both(name)}', '--map')
     for name, (_, values) in result.signals.items():
         if BY_NAME[name].topic.endswith('contraction') and (
                 held_m := held_at_m(values, size)) is not None:
@@ -246,22 +256,20 @@ def _check_muscle(place: str, names: set[str], is_joint: bool) -> None:
     if {'reference', 'reference_force'} <= names:
         raise InputError('reference and reference_force are both mapped; a message wants a '
                          'contraction or a force, so leave one out', '--map')
-    duties = {*VALVE_NAMES['hsv']} & names
-    if len(duties) == 1:
-        other, = {*VALVE_NAMES['hsv']} - duties
-        raise InputError(f'{place}{duties.pop()} is mapped, {place}{other} is not; a valve signal '
-                         'has both', '--map')
 
 
-def _check_rates(signals: Sequence[Signal]) -> None:
-    """Raise InputError where a rate has no position beside it."""
-    for one in signals:
-        if one.is_rate and not any(
-                other.topic == one.topic and other.quantity in (LENGTH, ANGLE)
-                for other in signals):
-            position, _, _ = one.name.rpartition('_')
-            raise InputError(f'{one.name} is mapped, {position} is not; a message with a rate '
-                             'has both', '--map')
+def _partner_of(name: str) -> str:
+    """Return the signal without which one makes no message, '' where it needs none."""
+    if BY_NAME[name].is_rate:
+        return name.rpartition('_')[0]
+    place, slash, own = name.rpartition('/')
+    fill, vent = VALVE_NAMES['hsv']
+    other = {fill: vent, vent: fill}.get(own, '')
+    return other and place + slash + other
+
+
+def _has_both(name: str) -> str:
+    return f'a message on {BY_NAME[name].topic} has both'
 
 
 def write_bag(recording: Recording, path: StrPath, *, rig: Any = None, namespace: str = '',

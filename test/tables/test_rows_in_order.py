@@ -17,6 +17,11 @@
 import numpy as np
 from pam_actuation.bags.load import load_run
 from pam_actuation.cli.main import main
+from pam_actuation.tables.importer import Recording, write_bag
+from pam_actuation.tables.mapping import ColumnMap, TableMapping
+from pam_actuation.tables.repeats import without_repeats
+from pam_actuation.tables.signals import BY_NAME
+from pam_actuation.tables.units import Unit
 import pytest
 
 ROWS = 2000
@@ -94,3 +99,22 @@ def test_the_counts_are_of_what_is_in_the_bag(call, tmp_path):
     code = main(['import', 'b.csv', '--out', 'b', '--from', '0.6', '--to', '0.8', '--map',
                  'pressure=p_bar:bar_gauge'])
     assert code == 1 and set(load_run('b').topics) == {'contraction'}
+
+
+@pytest.mark.parametrize('lost, left', [
+    ('vent_duty', 'fill_duty'), ('flexor/fill_duty', 'flexor/vent_duty'),
+    ('contraction', 'contraction_velocity'), ('reference_angle', 'reference_angle_rate')])
+def test_what_makes_no_message_alone_is_left_out_with_its_partner(lost, left, tmp_path):
+    other = 'flexor/pressure' if '/' in lost or 'angle' in lost else 'pressure'
+    mapping = TableMapping(signals={
+        name: ColumnMap(f'a {name}', Unit('', 1.0)) for name in (lost, left, other)})
+    stamps, values = 10**6 * NUMBERS, 1e5 + NUMBERS % 7
+    gone = np.where(NUMBERS < 1000, values, np.nan)
+    whole = Recording({other: (stamps, values), left: (stamps, values), lost: (stamps, gone)},
+                      mapping)
+    recording = without_repeats(whole.between(1.2, 1.8))
+    assert list(recording.signals) == [other]
+    assert recording.found[-1].sentence.endswith(f'is left out with {lost}; a message on '
+                                                 f'{BY_NAME[lost].topic} has both')
+    assert [*write_bag(recording, tmp_path / 'bag').values()] == [601]
+    assert set(whole.between(0.2, 1.8).signals) == {other, left, lost}
