@@ -35,7 +35,7 @@ from pam_actuation.report.errors import (
 from pam_actuation.report.learning import learned_worse, times_rolled_back
 from pam_sim.annotations import FloatArray
 from pam_sim.short_repr import short_repr
-from pam_sim.units import GAS_CONSTANT_AIR, RHO_REFERENCE, TEMPERATURE_K
+from pam_sim.units import GAS_CONSTANT_AIR, P_ATM_PA, RHO_REFERENCE, TEMPERATURE_K
 
 if TYPE_CHECKING:
     from pam_actuation.control.delay_estimate import PathEstimate
@@ -44,6 +44,7 @@ if TYPE_CHECKING:
 
 STEP_MIN_M = 1.5e-3          # a reference jump this large within 30 ms counts as a step
 STEP_WITHIN_S = 0.03
+EMPTY_PA = 10e3              # gauge: an open vent of an emptier muscle limits nothing
 SETTLING_BAND = 0.05         # of the step, the usual 5 % band
 SETTLING_BAND_MIN_M = 0.3e-3  # below this a band would test the sensor, not the loop
 
@@ -194,13 +195,15 @@ def saturation_share(run: 'Run', rig: 'Rig | None' = None) -> tuple[float | None
     Return (low, high): share of valve messages at the lower / upper limit, or None.
 
     PPR: the lowest and highest input of the regulator of ``rig``; without the rig they are not
-    known. HSV: high is either duty fully open; low has no meaning there (both shut is the
-    wanted rest state) and is None.
+    known. HSV: high is either duty fully open, the vent while there is air to vent; low has no
+    meaning there (both shut is the wanted rest state) and is None.
     """
     duty = signals.series(run, 'valve_signal', 'fill_duty')
     vent = signals.series(run, 'valve_signal', 'vent_duty')
     if duty is not None and vent is not None:
-        full = (duty[1] >= 0.999) | (vent[1] >= 0.999)
+        air = signals.series(run, 'pressure') or signals.series(run, 'pressure_command')
+        to_vent = air is None or np.interp(vent[0], *air) > P_ATM_PA + EMPTY_PA
+        full = (duty[1] >= 0.999) | (vent[1] >= 0.999) & to_vent
         return None, float(np.mean(full))
     volts = signals.series(run, 'valve_signal', 'ppr_voltage')
     if volts is None or not len(volts[1]) or rig is None:

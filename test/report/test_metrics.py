@@ -22,6 +22,7 @@ from pam_actuation.report.decimate import decimate_min_max, decimate_steps
 from pam_actuation.report.sections import metrics_table
 from pam_sim import load_rig
 from pam_sim.run import Series
+from pam_sim.units import P_ATM_PA
 import pytest
 
 from tracking_runs import step_run, tracking_run
@@ -163,6 +164,21 @@ def test_saturation_of_an_hsv_pair_is_either_valve_fully_open():
     values['fill_duty'][:] = 0.0
     values['vent_duty'][:] = 0.0
     values['vent_duty'][: values['vent_duty'].size // 2] = 1.0
+    assert metrics.saturation_share(run) == (None, pytest.approx(0.5, abs=1e-3))
+
+
+@pytest.mark.parametrize('told_by', ['pressure', 'pressure_command'])
+def test_a_vent_that_is_open_on_an_empty_muscle_is_no_saturation(told_by):
+    run = tracking_run(AMPLITUDES, valve='hsv')
+    for topic in {'pressure', 'pressure_command'} - {told_by}:
+        del run.topics[topic]
+    values, air = run.topics['valve_signal'].values, run.topics[told_by].values['pressure_pa']
+    values['fill_duty'][:] = 0.0
+    values['vent_duty'][:] = 1.0            # the signal that vents
+    quarter = air.size // 4
+    air[quarter:] = P_ATM_PA + 2e3
+    assert metrics.saturation_share(run) == (None, pytest.approx(0.25, abs=1e-3))
+    values['fill_duty'][-quarter:] = 1.0    # no air comes
     assert metrics.saturation_share(run) == (None, pytest.approx(0.5, abs=1e-3))
 
 
