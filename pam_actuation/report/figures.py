@@ -84,7 +84,7 @@ def line(x: ArrayLike, y: ArrayLike, name: str, role: str, held: bool = False,
     if dash:
         style['dash'] = dash
     return {'type': 'scatter', 'mode': 'lines', 'name': name, 'line': style,
-            'x': [round(float(v), 4) for v in kept_x], 'y': rounded(kept_y)}
+            'x': rounded(kept_x, 7), 'y': rounded(kept_y)}
 
 
 def points(x: Sequence[float] | FloatArray, y: Sequence[float] | FloatArray, name: str,

@@ -119,6 +119,13 @@ def test_spikes_do_not_stretch_the_axis_of_residuals():
     assert [one['text'] for one in layout['annotations']] == [said]
 
 
+@pytest.mark.parametrize('x', [
+    [0.9e-13, 1e-13, 1.1e-13], [2.99e-6, 3e-6, 3.01e-6], [999.0001, 999.0002, 999.0003],
+    [9999.001, 9999.002, 9999.003], [0.0, 0.1, 5.0]])
+def test_a_line_keeps_its_abscissa_whatever_the_size(x):
+    assert figures.line(x, x, 'profile', 'measured')['x'] == pytest.approx(x, rel=1e-10, abs=0.0)
+
+
 def found(evidence):
     """Return a gap result with hardly more than its evidence."""
     return GapResult('unknown', 'Something is missing.', evidence=evidence)
