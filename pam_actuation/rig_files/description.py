@@ -135,7 +135,8 @@ class Description:
         if 'max_strain' in self.dimensions:
             return
         angle_rad = self.dimensions.get('braid_angle_rad', BRAID_ANGLE_RAD)
-        end = MAX_STRAIN if angle_rad == BRAID_ANGLE_RAD else round(most_strain(angle_rad), 3)
+        is_nominal = math.isclose(angle_rad, BRAID_ANGLE_RAD)       # it is stated in degrees
+        end = MAX_STRAIN if is_nominal else round(most_strain(angle_rad), 3)
         if self.force_map_strain > end:
             end = self.force_map_strain
             self.notes['max_strain'] = 'not stated: the largest contraction of the force map'

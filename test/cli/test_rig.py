@@ -250,7 +250,10 @@ def test_a_braid_of_another_angle_shortens_by_more(capsys):
     stated = new('--length-mm', '400', '--bore-mm', '20', '--angle-deg', '25', '--max-strain',
                  '0.3', '--overwrite')
     assert stated.muscle.stroke_m == pytest.approx(0.12)
-    assert new('--length-mm', '400', '--overwrite').muscle.max_strain == 0.25
+    for nominal in ((), ('--angle-deg', '28.6')):
+        rig = new('--length-mm', '400', *nominal, '--overwrite')
+        assert (rig.muscle.max_strain, rig.muscle.braid_angle_rad) == (
+            0.25, pytest.approx(math.radians(28.6)))
     assert '# max_strain: 0.25' in open('made.yaml', encoding='utf-8').read()
 
 
