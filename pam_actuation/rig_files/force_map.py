@@ -18,12 +18,13 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 import math
 import os
+from pathlib import Path
 import re
 from typing import TYPE_CHECKING
 
 from pam_actuation.tables.separated import rows_of_text
 from pam_sim.errors import InputError
-from pam_sim.files import check_file
+from pam_sim.files import check_file, whole_file
 from pam_sim.muscle.geometry import BRAID_ANGLE_RAD
 from pam_sim.muscle.lookup_table import COLUMNS, read_commented_csv, read_table
 from pam_sim.muscle.table_remarks import max_strain_in
@@ -90,7 +91,7 @@ def force_map_of(path: str, size: Mapping[str, float], out: str, overwrite: bool
     Give (path of the table the muscle law ``lookup`` reads, what a reader should know of it).
 
     A table of another form (force over pressure and length, for instance) is characterised. The
-    result stands beside the rig file, and is removed if the block fails.
+    result stands beside the rig file. If the block fails, what stood there before does so again.
 
     Parameters
     ----------
@@ -126,11 +127,14 @@ def force_map_of(path: str, size: Mapping[str, float], out: str, overwrite: bool
     check_file(table_path, overwrite)
     found = characterise_table(measured, Dimensions(**{
         name: value for name, value in size.items() if name != 'max_strain'}))
-    there = os.path.exists(table_path)
+    before = Path(table_path).read_bytes() if os.path.exists(table_path) else None
     found.table().write_csv(check_file(table_path, overwrite))
     try:
         yield table_path, found.remarks
     except BaseException:
-        if not there:
+        if before is None:
             os.remove(table_path)
+        else:
+            with whole_file(table_path) as temporary:
+                Path(temporary).write_bytes(before)
         raise

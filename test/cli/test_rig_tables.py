@@ -39,6 +39,19 @@ def forces_of(folder, begin_kpa=0):
     return '--force-map', 'forces.csv', '--length-mm', '180', '--bore-mm', '20'
 
 
+def test_a_file_that_is_refused_leaves_the_force_map_of_the_old_one(folder, capsys):
+    new(*forces_of(folder))
+    table = folder / 'made_force_map.csv'
+    before = table.read_bytes(), sorted(folder.iterdir())
+    options = forces_of(folder, begin_kpa=100)
+    assert main(['rig', 'new', *options, '--regulator', 'nosuch', '--overwrite', '--out',
+                 'made.yaml']) == 2
+    assert 'nosuch' in capsys.readouterr().err
+    assert (table.read_bytes(), sorted(folder.iterdir())) == before
+    new(*options, '--overwrite')
+    assert table.read_bytes() != before[0]
+
+
 def test_a_table_above_0_kpa_says_what_a_vented_muscle_would_pull(folder, capsys):
     said = ('The table begins at 100 kPa, and below that its edge is used: a vented muscle would '
             'still pull 150 N at rest. Measure at 0 kPa as well')
