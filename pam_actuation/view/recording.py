@@ -20,6 +20,7 @@ from functools import partial
 from pam_actuation.bags.markers import is_marker, markers_of
 from pam_actuation.bags.series import table
 from pam_actuation.bags.source import Bag, read_bag
+from pam_actuation.namespaces import lies_in
 from pam_actuation.topics.codec import decode
 from pam_actuation.topics.table import BY_NAME, MARKER, short_name
 from pam_actuation.view.plots import KEPT
@@ -72,7 +73,7 @@ def load(path: StrPath, recover: bool = False, namespace: str = '') -> Recording
         if short == MARKER:
             continue
         if short == DIAGNOSTICS:
-            _add_statuses(store, bag, full_name)
+            _add_statuses(store, bag, full_name, namespace)
             continue
         if namespace and not full_name.startswith(f'{namespace}/'):
             continue
@@ -98,10 +99,11 @@ def _is_shown(name: str, type_name: str, encoding: str) -> bool:
         and BY_NAME[short].type_name == type_name)
 
 
-def _add_statuses(store: Store, bag: Bag, full_name: str) -> None:
+def _add_statuses(store: Store, bag: Bag, full_name: str, namespace: str) -> None:
     read = partial(decode, DIAGNOSTICS)
     for raw in bag.topics[full_name].payloads:
         try:
-            store.add_statuses(read(raw))
+            store.add_statuses(status for status in read(raw)
+                               if not namespace or lies_in(status.name, namespace))
         except InputError:
             continue            # pam info tells of it

@@ -133,6 +133,13 @@ def test_a_bag_shows_the_same_values_and_what_its_nodes_said_then(tmp_path):
         load(bag, namespace='/none')
 
 
+@pytest.mark.parametrize('namespace, shown', [('', 1), ('/muscle', 1), ('/mus', 0), ('/other', 0)])
+def test_of_a_bag_the_nodes_of_the_shown_namespace_are_shown(namespace, shown, tmp_path):
+    bag = write_bag(tmp_path / 'bag', 20, ('/muscle', '/mus', '/other'))
+    nodes = load(bag, namespace=namespace).store.state(None)['nodes']
+    assert [node['name'] for node in nodes] == ['/muscle/valve_driver'] * shown
+
+
 def test_the_surface_of_the_rules_shows_the_newest_output_at_each_place():
     store = Store()
     feed_rules(store, 0, 5000)
