@@ -23,7 +23,8 @@ import numpy as np
 from pam_actuation.report import errors, figures, metrics, signals
 from pam_actuation.report.learning import learned_worse, times_rolled_back
 from pam_actuation.report.page import plot, render, Section, table
-from pam_actuation.report.pages import cycle_numbers, default_titles, early_section
+from pam_actuation.report.pages import (
+    cycle_numbers, default_titles, early_section, implausible_section)
 from pam_actuation.report.sections.markers import markers_sections
 from pam_actuation.report.sections.metrics_table import (
     each_part, interrupted_text, rolled_back_text, told_of_learning)
@@ -137,7 +138,8 @@ def joint_report(runs: Sequence[Run], out_path: str | os.PathLike[str],
     titles = default_titles(runs)
     found = [joint_metrics(run) for run in runs]
     named = list(zip(titles, found))
-    sections = [*filter(None, [early_section(runs)]), _merits(named)]
+    sections = [*filter(None, [early_section(runs), implausible_section(list(zip(titles, runs)))]),
+                _merits(named)]
     for k, (title, run) in enumerate(zip(titles, runs)):
         heading = 'Signals over time' + (f': {title}' if len(runs) > 1 else '')
         sections.append(_plots(run, f'signals-{k}', heading))

@@ -95,7 +95,7 @@ def bag_report(runs: 'Sequence[Run]', out_path: StrPath, titles: Sequence[str] |
     measured = [recorded_metrics(run) for run in runs]
     named = list(zip(titles, measured))
     spread = over_seeds(list(zip(titles, runs, measured)))
-    sections = [early_section(runs), _implausible(list(zip(titles, runs))),
+    sections = [early_section(runs), implausible_section(list(zip(titles, runs))),
                 full_valves_section(zip(titles, runs)), metrics(named), seeds_section(spread),
                 cycles(named), overlaid(list(zip(titles, runs)))]
     for k, (title, run) in enumerate(zip(titles, runs)):
@@ -121,7 +121,7 @@ def early_section(runs: 'Sequence[Run]') -> Section | None:
     return Section('ended', title, ''.join(map(paragraph, found))) if found else None
 
 
-def _implausible(runs: 'Sequence[tuple[str, Run]]') -> Section | None:
+def implausible_section(runs: 'Sequence[tuple[str, Run]]') -> Section | None:
     """Return the section on values that cannot be right, None where there are none."""
     found = [(title, sentence) for title, run in runs
              for sentence in getattr(run, 'implausible', ())]

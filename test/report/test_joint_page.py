@@ -73,6 +73,18 @@ def test_the_page_shows_angle_and_both_muscles(bag, tmp_path, capsys):
             'extensor vent_duty'} <= set(names)
 
 
+def test_the_page_says_what_cannot_be_right_in_the_data(bag, tmp_path):
+    title, out = 'What cannot be right in the data', tmp_path / 'page.html'
+    joint_report([load_recording(bag)], out)
+    assert title not in out.read_text(encoding='utf-8')
+    run = load_recording(bag)
+    values = run.topics['extensor/pressure'].values
+    values['pressure_pa'] = 1e-3 * values['pressure_pa']
+    joint_report([run], out)
+    content = out.read_text(encoding='utf-8')
+    assert title in content and '/knee/extensor/pressure' in content
+
+
 def test_a_muscle_is_not_shown_on_the_page_of_a_joint(bag, tmp_path):
     with pytest.raises(InputError, match='no recording of a joint'):
         joint_report([load_recording(bag), tracking_run(np.full(2, 1e-3))], tmp_path / 'page.html')
