@@ -18,13 +18,15 @@ The last word at a device: a small process that vents when the valve driver can 
 A device holds its last signal when the process that drives it is killed or stopped. The driver
 therefore starts this module as a separate process. It tells the process once which attributes to
 write to vent, and with every signal whether the muscle may be under pressure. The process knows
-nothing else, needs neither ROS nor a network, and ends when the driver has ended.
+nothing else, needs neither ROS nor a network, and ends when the driver has ended. A device that
+refuses to the end it vents after that, as soon as it takes the value.
 
 What it can not cover is a computer that stands still or loses its power: see
 docs/explanation/safety.md.
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 import json
 import os
 from pathlib import Path
@@ -75,12 +77,12 @@ class DeviceWatchdog:
         self._start()
         self._wait_until_ready()
 
-    def _start(self) -> None:
+    def _start(self, said: bytes = b'') -> None:
         try:
             self._process = subprocess.Popen(
                 [sys.executable, '-m', __name__], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
                 bufsize=0, start_new_session=True)
-            _pipes(self._process)[0].write(self._order.encode() + b'\n')
+            _pipes(self._process)[0].write(self._order.encode() + b'\n' + said)
         except OSError as error:
             raise DeviceError(f'cannot be started ({error.strerror})', WHERE) from None
         for pipe in _pipes(self._process):
@@ -103,11 +105,12 @@ class DeviceWatchdog:
             The process ended, and was started again, or does not read.
 
         """
+        said = IN_USE if in_use else AT_REST
         try:
-            taken = _pipes(self._process)[0].write(IN_USE if in_use else AT_REST)
+            taken = _pipes(self._process)[0].write(said)
         except BrokenPipeError:
             ended = self._process       # kept where no other starts: it is tried again
-            self._start()
+            self._start(said)
             _end(ended)
             raise DeviceError('ended and was started again', WHERE) from None
         if not taken:
@@ -125,14 +128,23 @@ class DeviceWatchdog:
         self._vents += said.count(VENTED)
         return self._vents
 
-    def close(self) -> None:
-        """End the process; it vents first if the muscle may be under pressure."""
-        _pipes(self._process)[0].close()
-        try:
-            self._process.wait(END_TIMEOUT_S)
-        except subprocess.TimeoutExpired:
-            pass                # it is still trying to vent a device that refuses: so did we
-        _end(self._process)
+    def close(self, vented: bool) -> None:
+        """
+        End the process.
+
+        Where the device is not ``vented`` the process goes on alone. It ends when the device has
+        taken the safe value, or after ``LONGEST_TRY_S``.
+        """
+        if not vented:
+            with suppress(DeviceError):
+                self.tell(True)
+        inlet, outlet = _pipes(self._process)
+        inlet.close()
+        if vented:
+            with suppress(subprocess.TimeoutExpired):
+                self._process.wait(END_TIMEOUT_S)
+            _end(self._process)
+        outlet.close()
 
 
 def _pipes(process: subprocess.Popen[bytes]) -> tuple[IO[bytes], IO[bytes]]:

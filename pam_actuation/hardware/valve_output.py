@@ -154,6 +154,7 @@ class GuardedOutput:
         self._device = device
         self._watchdog = watchdog
         self._last_resort = weakref.finalize(self, _vent_quietly, device)
+        self._vented = False
         self.failures = 0
         self.unvented = ''
 
@@ -191,7 +192,9 @@ class GuardedOutput:
         return problem
 
     def _vent(self) -> None:
+        self._vented = False
         self._device.vent()
+        self._vented = True
         if self._watchdog is not None:
             self._watchdog.tell(False)
 
@@ -206,7 +209,7 @@ class GuardedOutput:
         if not problem:
             self._last_resort.detach()
         if self._watchdog is not None:
-            self._watchdog.close()
+            self._watchdog.close(self._vented)
             self._watchdog = None
         problem = problem or self._try(self._device.close)      # not vented: open for a last try
         self._device.release()

@@ -22,6 +22,7 @@ import sys
 import time
 
 from fake_sysfs import break_attribute, duties, make_dac, make_pwm, number_in, PERIOD_NS, put
+from pam_actuation.hardware import device_watchdog
 from pam_actuation.hardware.device_watchdog import DeviceWatchdog
 from pam_actuation.hardware.sysfs import DeviceError
 from pam_actuation.hardware.valve_output import GuardedOutput, ValveOutput
@@ -131,7 +132,7 @@ def test_it_is_silent_at_rest_and_ends_with_the_driver(tmp_path):
     watchdog.tell(False)
     put(path, 7)
     pid = watchdog.pid
-    watchdog.close()
+    watchdog.close(vented=True)
     assert gone(pid) and number_in(path) == 7
 
 
@@ -146,7 +147,7 @@ def test_a_device_that_refuses_is_tried_again(tmp_path):
     path.unlink()
     put(path, 5)                                # it is back, with its old value
     soon(lambda: number_in(path) == 0, 'vented')
-    watchdog.close()
+    watchdog.close(vented=True)
 
 
 def test_a_watchdog_that_was_killed_is_a_fault_and_comes_back(tmp_path):
@@ -164,6 +165,49 @@ def test_a_watchdog_that_was_killed_is_a_fault_and_comes_back(tmp_path):
     soon(lambda: number_in(path) == 0, 'vented by the new one')
     soon(lambda: output.watchdog_vents == 1, 'counted')
     assert output.close() == '' and output.watchdog_vents is None
+
+
+def test_one_that_is_started_again_knows_that_the_muscle_is_under_pressure(tmp_path):
+    path = tmp_path / 'volts'
+    put(path, 0)
+    watchdog = DeviceWatchdog([(path, 0)], 0.05)
+    first = watchdog.pid
+    os.kill(first, signal.SIGKILL)
+    soon(lambda: gone(first), 'killed')
+    put(path, 5)
+    with pytest.raises(DeviceError, match='ended and was started again'):
+        watchdog.tell(True)                     # and then the driver stands still
+    soon(lambda: number_in(path) == 0, 'vented')
+    watchdog.close(vented=True)
+
+
+@pytest.mark.parametrize('volts', [5.0, 0.0])
+def test_a_device_that_refuses_to_the_end_is_vented_as_soon_as_it_takes_it(tmp_path, volts):
+    path = tmp_path / 'volts'
+    put(path, 0)
+    watchdog = DeviceWatchdog([(path, 0)], 60.0)
+    process = watchdog._process
+    output = GuardedOutput(OneAttribute(path), watchdog)
+    assert output.send((volts,)) == ''
+    path.unlink()
+    assert 'No such file' in output.close() and process.poll() is None
+    put(path, 5)                                # it is back, with its old value or another one
+    soon(lambda: number_in(path) == 0, 'vented')
+    assert process.wait(5.0) == 0
+
+
+def test_one_that_hangs_is_ended_with_a_driver_whose_device_is_vented(tmp_path, monkeypatch):
+    monkeypatch.setattr(device_watchdog, 'END_TIMEOUT_S', 0.05)
+    path = tmp_path / 'volts'
+    put(path, 3)
+    watchdog = DeviceWatchdog([(path, 0)], 60.0)
+    pid = watchdog.pid
+    os.kill(pid, signal.SIGSTOP)
+    with pytest.raises(DeviceError, match='does not read'):
+        while True:                             # until the pipe is full
+            watchdog.tell(True)
+    assert 'does not read' in GuardedOutput(OneAttribute(path), watchdog).close()
+    assert number_in(path) == 0 and gone(pid)
 
 
 def test_one_that_can_not_be_started_is_told(tmp_path, monkeypatch):
