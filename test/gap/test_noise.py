@@ -16,7 +16,7 @@
 
 import numpy as np
 from pam_sim.gap.data.noise import (
-    autocorrelation_time, noise_of, noise_sd, quantisation_step, rms_rate)
+    autocorrelation_time, LAG_S, Noise, noise_of, noise_sd, quantisation_step, rms_rate)
 import pytest
 
 
@@ -62,3 +62,21 @@ def test_noise_of_a_slow_log_is_found_in_quick_motion_and_at_uneven_instants():
     read = motion + 1e-5 * random.standard_normal(t.size)
     assert noise_of(t, read).sd == pytest.approx(1e-5, rel=0.1)
     assert noise_sd(read) > 3e-5             # third differences of even samples hold the motion
+
+
+def test_a_log_whose_samples_are_too_far_apart_finds_no_shorter_memory():
+    random, true = np.random.default_rng(0), Noise(20.0, 150.0, 0.05)
+    of_hz = {}
+    for hz in (80.0, 100.0):
+        t = np.arange(0.0, 400.0, 1.0 / hz)
+        of_hz[hz] = noise_of(t, true.draw(t, random)).memory_s
+    assert of_hz[80.0] == pytest.approx(of_hz[100.0], rel=0.35)
+
+
+@pytest.mark.parametrize('hz', [100.0, 200.0, 1000.0])
+def test_stamps_that_are_a_little_off_change_no_memory(hz):
+    random, values = np.random.default_rng(0), Noise(60.0, 150.0, 0.03)
+    t = np.arange(0.0, 40.0, 1.0 / hz)
+    read = values.draw(t, random)
+    found = noise_of(1.001 * t, read)
+    assert found.memory_s > 0.5 * LAG_S and noise_of(1.002 * t, read) == found

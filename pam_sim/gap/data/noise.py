@@ -136,7 +136,10 @@ def noise_of(time_s: FloatArray, values: FloatArray) -> Noise:
     if total < (1.0 + SLOW_SHARE) * white ** 2 or together[0] <= SLOW_SHARE * white ** 2:
         return Noise(white)
     ratio = min(max(together[1] / together[0], 0.05), 0.95)
-    return Noise(white, float(np.sqrt(total - white ** 2)), -LAG_S / float(np.log(ratio)))
+    # Longer where samples are too far apart. A little more is how stamps scatter, and a shorter
+    # one counts as 10 ms: in windows so short the memory is found too short already.
+    lag_s = lag * period if lag * period > 1.02 * LAG_S else LAG_S
+    return Noise(white, float(np.sqrt(total - white ** 2)), -lag_s / float(np.log(ratio)))
 
 
 def quantisation_step(values: FloatArray) -> float:
