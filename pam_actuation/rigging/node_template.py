@@ -185,7 +185,10 @@ class NodeTemplate:
         if not select.select([self._channel], [], [], wait_s)[0]:
             return []
         spoiled, self._spoiled = self._spoiled, True     # if a signal comes half way
-        data = self._channel.recv(READ_BYTES)
+        try:
+            data = self._channel.recv(READ_BYTES)
+        except ConnectionResetError:
+            data = b''          # it ended with a request unread
         *lines, self._unread = (self._unread + data).split(b'\n')
         answers = [json.loads(line) for line in lines]
         self._ended.update(

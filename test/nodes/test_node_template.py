@@ -179,6 +179,29 @@ def test_a_lost_template_ends_its_nodes_and_the_next_ones_start_by_themselves(
     assert alone.wait(END_S) and alone.exit_code == 2
 
 
+def test_a_template_that_ends_with_a_request_unread_leaves_the_nodes_to_themselves(monkeypatch):
+    class Ends:
+
+        def __init__(self, words, pass_fds, **_):
+            self.end = os.dup(pass_fds[0])
+
+        def poll(self):
+            return None                     # it has just ended: the system has not told yet
+
+        def wait(self, timeout_s=None):
+            return 0
+
+        kill = terminate = wait
+
+    monkeypatch.setattr(subprocess, 'Popen', Ends)
+    template = NodeTemplate([], {})
+    template.compile_ahead(['dmsp_5_300_realistic'])
+    os.close(template._process.end)
+    assert template.wait_until_compiled() == '' and not template.usable
+    assert template.start(['valve_driver'], {}, os.devnull) is None
+    template.close()
+
+
 def test_nodes_end_with_the_process_that_asked_for_them(environment, tmp_path):
     parent = subprocess.Popen(
         [sys.executable, '-c', PARENT.format(
