@@ -31,7 +31,7 @@ PORTS_EACH, PARTICIPANTS = 2, 20        # the first ones may have left
 
 class DomainLock:
     """
-    Hold a ROS domain id: no other session on this machine gets the same.
+    Hold a ROS domain id: no other session on this machine that takes a free one gets the same.
 
     ``domains_in_use`` finds it for as long as it is held.
 
@@ -73,6 +73,11 @@ class DomainLock:
             return False
         self._file = handle
         return True
+
+    @property
+    def is_held(self) -> bool:
+        """Tell whether no other session on this machine holds the domain."""
+        return self._file is not None
 
     def release(self) -> None:
         """Give the domain back."""

@@ -78,7 +78,7 @@ class NodeGroup:
     Raises
     ------
     InputError
-        ROS 2 is not installed, or another group uses the domain.
+        ROS 2 is not installed, no domain is free, or the id is none.
 
     """
 
@@ -94,7 +94,7 @@ class NodeGroup:
         self._folder, self._own_folder = folder, folder is None
         closing.now()       # of a group before this one
         self._lock = DomainLock(domain_id)
-        self._is_shared = not is_silent(self._lock.domain_id)
+        self._is_shared = not (self._lock.is_held and is_silent(self._lock.domain_id))
         self._asked: set[str] = set()           # to become active
         self._uncertain: set[str] = set()       # those that have not answered yet
         self.domain_id = self._lock.domain_id
@@ -164,9 +164,9 @@ class NodeGroup:
                 template.compile_ahead(compiled)
             # Meanwhile: from here on this process has threads, and leaves forking to the template.
             self.client = self._new_client(self.domain_id)
-            self._refuse_namesakes()
             template.wait_until_compiled(tell)      # what is wrong, the nodes say
             template.wait_until_ready()
+            self._refuse_namesakes()        # only now: of two at once, the other has begun as well
         elif compiled:
             compile_ahead(*compiled)
         for name, node in self._nodes.items():

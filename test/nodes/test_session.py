@@ -14,6 +14,8 @@
 
 """Test whole sessions: real processes, a complete bag, and an orderly end of every kind."""
 
+from types import SimpleNamespace
+
 import pytest
 
 pytest.importorskip('rclpy')
@@ -205,6 +207,22 @@ def test_mistakes_are_told_before_anything_starts(tmp_path):
         session.run_experiment(SHORT, out_dir=tmp_path / 'other', namespace='/left knee')
     with pytest.raises(InputError, match='domain id'):
         DomainLock(999)
+
+
+def test_of_two_that_begin_at_once_in_a_domain_the_second_finds_the_first(monkeypatch):
+    lock, heard = DomainLock(), []
+    monkeypatch.setattr(node_group, 'NAMESAKES_S', 0.1)
+    monkeypatch.setattr(node_group, 'NodeProcess', None)
+    monkeypatch.setattr(node_group, 'template_for', lambda *_: SimpleNamespace(
+        wait_until_compiled=lambda tell: '',
+        wait_until_ready=lambda: heard.append('/muscle/valve_driver')))     # of the first
+    nodes = {'driver': node_group.NodeSpec('valve_driver', '/muscle')}
+    with node_group.NodeGroup(nodes, domain_id=lock.domain_id) as group:
+        group._new_client = lambda _: SimpleNamespace(
+            spin=lambda timeout_s: None, nodes=lambda: heard, close=lambda: None)
+        with pytest.raises(InputError, match='/muscle/valve_driver: is already running'):
+            group.start()
+    lock.release()
 
 
 def test_two_sessions_get_two_domains():
