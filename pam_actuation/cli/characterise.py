@@ -21,7 +21,7 @@ from typing import Any, TYPE_CHECKING
 from pam_actuation.cli.common import (
     add_overwrite_option, add_recover_option, add_seed_option, add_topic_option, emit, EXIT_DONE,
     note_implausible, progress)
-from pam_actuation.cli.options import count, number, out_path, Parser, source
+from pam_actuation.cli.options import count, number, out_path, Parser, refuse_unused, source
 
 if TYPE_CHECKING:
     from pam_actuation.bags.load import RecordedRun
@@ -30,6 +30,9 @@ if TYPE_CHECKING:
     from pam_sim.rig import Rig
 
 HELP = 'Make the surfaces P(m_air, load), strain(P, load), F(strain, P) from fixed-load runs.'
+# Options that would change nothing: of a simulation, or of bags.
+UNUSED = {'bags': ('experiment', 'seed'),
+          'a table': ('experiment', 'seed', 'namespace', 'load_n', 'recover', 'renamed')}
 EXAMPLE = 'pam characterise --simulate dmsp_5_300_realistic --out surfaces'
 
 
@@ -131,6 +134,9 @@ def _characterised(args: argparse.Namespace, sources: list[str]) -> 'Characteris
         raise InputError('goes with recordings of held lengths; a fixed load is another record',
                          '--held-mm')
     tables = [path for path in sources if str(path).lower().endswith('.csv')]
+    if not args.simulate:
+        asked = 'a table' if tables else 'bags'
+        refuse_unused(args, add_arguments, UNUSED[asked], asked)
     if not tables:
         runs = []
         with progress(args, len(sources), ' bags', 'reading') as bar:

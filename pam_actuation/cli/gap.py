@@ -25,7 +25,7 @@ from typing import Any, TYPE_CHECKING
 from pam_actuation.cli.common import (
     add_overwrite_option, add_topic_option, effect_names, emit, EXIT_DONE, EXIT_FINDING,
     note_implausible, progress)
-from pam_actuation.cli.options import number, out_path, Parser, source
+from pam_actuation.cli.options import number, out_path, Parser, refuse_unused, source
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -90,7 +90,10 @@ def run(args: argparse.Namespace) -> int | None:
     from pam_actuation.report.joint_gap import questions
     from pam_actuation.report.model_held import recorded_model
     from pam_sim.errors import InputError
-    _refuse_unused(args)
+    kind = '--explain' if args.explain is not None else '--plan' if args.plan else 'a recording'
+    refuse_unused(args, add_arguments, UNUSED[kind], kind)
+    if args.explain is not None and len(args.run) > 1:
+        raise InputError(f'takes one bag, {len(args.run)} were given', '--explain')
     if args.explain is not None:
         return _explain(args)
     if args.plan:
@@ -116,19 +119,6 @@ def run(args: argparse.Namespace) -> int | None:
         '\n'.join(lines))
     refused = any(result.verdict == 'refused' for result in found.values())
     return EXIT_FINDING if refused else EXIT_DONE
-
-
-def _refuse_unused(args: argparse.Namespace) -> None:
-    """Refuse an option that the answer would not regard; InputError."""
-    from pam_sim.errors import InputError
-    asked = '--explain' if args.explain is not None else '--plan' if args.plan else 'a recording'
-    declared = Parser()
-    add_arguments(declared)
-    for action in declared._actions:
-        if action.dest in UNUSED[asked] and getattr(args, action.dest) != action.default:
-            raise InputError(f'does not go with {asked}', action.option_strings[0])
-    if args.explain is not None and len(args.run) > 1:
-        raise InputError(f'takes one bag, {len(args.run)} were given', '--explain')
 
 
 def _joint_model(question: 'Question', model: str) -> str:

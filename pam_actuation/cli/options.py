@@ -28,7 +28,7 @@ import re
 import sys
 from typing import Any, NoReturn
 
-from pam_sim.errors import did_you_mean
+from pam_sim.errors import did_you_mean, InputError
 from pam_sim.files import shown
 
 EXIT_DONE = 0
@@ -192,6 +192,35 @@ def pair(text: str) -> tuple[str, str]:
         raise argparse.ArgumentTypeError(
             f'{shown(text)!r} is not NAME=TOPIC, such as pressure=/daq/p1')
     return name, other
+
+
+def refuse_unused(args: argparse.Namespace, declare: Callable[[Parser], None],
+                  unused: Sequence[str], asked: str) -> None:
+    """
+    Refuse an option that the answer to what is ``asked`` would not regard.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        The options as given.
+    declare : callable
+        Declares the options of the verb.
+    unused : sequence of str
+        Attributes of ``args`` that make no difference.
+    asked : str
+        For the sentence: ``does not go with ...``.
+
+    Raises
+    ------
+    InputError
+        One of them is given.
+
+    """
+    declared = Parser()
+    declare(declared)
+    for action in declared._actions:
+        if action.dest in unused and getattr(args, action.dest) != action.default:
+            raise InputError(f'does not go with {asked}', action.option_strings[0])
 
 
 class Pairs(argparse.Action):

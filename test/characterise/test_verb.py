@@ -92,6 +92,11 @@ def test_a_table_of_others_is_taken_and_what_it_lacks_is_said(tmp_path, capsys):
     (['--simulate', 'dmsp_5_300_realistic', '--experiment', 'step_10mm'], 'pressure domain'),
     (['--simulate', 'dmsp_5_300_realistic', '--load-n', '0', '10', '5'], 'ascending'),
     (['no_such_bag'], 'no_such_bag'),
+    ([str(MAP), '--length-m', '0.25', '--load-n', '5'], '--load-n: does not go with a table'),
+    ([str(MAP), '--length-m', '0.25', '--namespace', '/a'], '--namespace: does not go with'),
+    ([str(MAP), '--length-m', '0.25', '--topic', 'pressure=/p'], '--topic: does not go with'),
+    (['bag', '--experiment', 'step_10mm'], '--experiment: does not go with bags'),
+    (['bag', '--seed', '1'], '--seed: does not go with bags'),
 ])
 def test_mistakes_are_one_sentence_and_write_nothing(arguments, words, tmp_path, capsys):
     assert main(['characterise', *arguments, '--out', str(tmp_path / 'out')]) == 2
