@@ -166,16 +166,16 @@ def _characterised(args: argparse.Namespace, sources: list[str]) -> 'Characteris
 def _dimensions(args: argparse.Namespace, runs: 'list[RecordedRun]') -> 'Dimensions | None':
     """Return the Dimensions that the options give, None where the bags shall say them."""
     from dataclasses import replace
-    from pam_sim import load_rig
     from pam_sim.characterise import Dimensions
+    from pam_sim.characterise.characterise import rig_of
     from pam_sim.errors import InputError
     given = {'length_m': args.length_m, 'bore_m': args.bore_m,
              'dead_volume_m3': args.dead_volume_m3, 'braid_angle_rad': (
                  None if args.angle_deg is None else round(math.radians(args.angle_deg), 12))}
     given = {name: value for name, value in given.items() if value is not None}
-    text = next((run.metadata['rig'] for run in runs if run.metadata.get('rig')), None)
-    if text is not None:
-        return replace(Dimensions.of_rig(load_rig(text)), **given) if given else None
+    rig = next((rig for run in runs if (rig := rig_of(run)) is not None), None)
+    if rig is not None:
+        return replace(Dimensions.of_rig(rig), **given) if given else None
     if runs and not given:
         return None
     if 'length_m' not in given:

@@ -14,14 +14,19 @@
 
 """``pam characterise`` as a user meets it: bags and tables in, a folder out, exit codes."""
 
+import argparse
+from dataclasses import replace
 import json
+from types import SimpleNamespace
 import xml.etree.ElementTree as ElementTree
 
 import numpy as np
+from pam_actuation.cli.characterise import _dimensions
 from pam_actuation.cli.main import main
 from pam_actuation.experiments import load_experiment
 from pam_actuation.experiments.load_series import LOADS_N, simulate_loads, with_sensor_noise
-from pam_sim import load_rig
+from pam_sim import load_joint, load_rig
+from pam_sim.characterise import Dimensions
 from pam_sim.errors import InputError
 from pam_sim.muscle.laws.lookup import SHIPPED
 from pam_sim.muscle.lookup_table import read_table
@@ -103,6 +108,13 @@ def test_mistakes_are_one_sentence_and_write_nothing(arguments, words, tmp_path,
     said = capsys.readouterr().err
     assert words in said and said.count('\n') == 1
     assert not (tmp_path / 'out').exists()
+
+
+def test_a_size_may_be_stated_beside_the_bag_of_a_joint():
+    flexor = Dimensions.of_rig((joint := load_joint('joint_dmsp_5_300')).flexor)
+    run = SimpleNamespace(path='bag', namespace='/knee/flexor', metadata={'rig': joint.to_yaml()})
+    stated = argparse.Namespace(length_m=None, bore_m=None, angle_deg=None, dead_volume_m3=1e-5)
+    assert _dimensions(stated, [run]) == replace(flexor, dead_volume_m3=1e-5)
 
 
 def test_a_series_is_that_of_the_chapter_and_never_overwrites(bags, tmp_path):
