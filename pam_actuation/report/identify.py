@@ -87,9 +87,15 @@ def page(result: 'Identification', runs: 'Sequence[Run]') -> str:
     return render(f'Unknown numbers of {result.rig.name}', lead, [
         Section('numbers', 'Numbers', body), Section('profiles', 'Profile likelihoods', profiles),
         Section('errors', 'What is left', left),
-        provenance([(f'recording {k}: {record["kind"]}', run)
-                    for k, (record, run) in enumerate(zip(result.records, runs), 1)])],
+        provenance([(f'recording {k}: {_kinds(result, run)}', run)
+                    for k, run in enumerate(runs, 1)])],
         footer=FOOTER)
+
+
+def _kinds(result: 'Identification', run: 'Run') -> str:
+    """Return what the stretches of a recording tell of."""
+    return ', '.join(dict.fromkeys(record['kind'] for record in result.records
+                                   if record['path'] == (run.path or 'recording')))
 
 
 def _profile(one: 'Found') -> str:

@@ -15,15 +15,18 @@
 """``pam identify`` as a command."""
 
 import json
+import re
 import shlex
 
 from jsonschema import Draft202012Validator
 from made_records import RIG, spring
 from pam_actuation.bags.load import load_run
 from pam_actuation.cli.main import main
+from pam_actuation.report.identify import page
 from pam_sim import load_rig
 from pam_sim.identify.result import Identification
 from pam_sim.identify.schema import identify_schema
+from pam_sim.run import Run
 import pytest
 
 EXPERIMENT = """\
@@ -103,3 +106,11 @@ def test_the_next_experiment_is_run_on_the_rig_that_was_recorded(bag, tmp_path, 
     assert before.startswith('before it: put 1.2 kg more into `mass_kg` of a copy of ')
     assert following == (f'next: pam run {out / "next_experiment.yaml"} '
                          f'--rig {out / "rig.yaml"}')
+
+
+def test_a_recording_on_the_page_has_the_kind_of_all_its_stretches():
+    records = [{'path': path, 'kind': kind, 'added_kg': 0.0} for path, kind in (
+        ('a', 'valve'), ('a', 'valve'), ('b', 'valve'), ('b', 'muscle and load'))]
+    html = page(Identification(RIG, [], [], records, {}, False), [Run({}, path=p) for p in 'ab'])
+    assert re.findall('<th[^>]*>(recording [^<]*)', html) == [
+        'recording 1: valve', 'recording 2: valve, muscle and load']
