@@ -150,15 +150,15 @@ def _column(
 
 def load_grid(load_n: FloatArray, step_n: float | None = None) -> FloatArray:
     """
-    Return the loads of the surfaces [N], from 0 to the largest measured one.
+    Return the loads of the surfaces [N], ascending from 0.
 
     Parameters
     ----------
     load_n : ndarray
         Measured loads, ascending.
     step_n : float, optional
-        Spacing; by default the measured one rounded to 1 N where it is regular,
-        else the measured loads themselves are the grid.
+        Spacing, up to the largest measured load; by default the measured one rounded to 1 N where
+        it is regular and reaches that load, else the measured loads themselves are the grid.
 
     Raises
     ------
@@ -166,18 +166,20 @@ def load_grid(load_n: FloatArray, step_n: float | None = None) -> FloatArray:
         Fewer than 3 loads on the grid.
 
     """
-    spacing = np.diff(load_n)
-    usual = float(np.median(spacing))
-    if step_n is None and (np.any(np.abs(spacing[1:] - usual) > 0.2 * usual) or usual < 1.0):
-        inner = np.round(load_n[load_n > 0.05], 1)
-        return _with_middles(np.concatenate([[0.0], inner[inner > 0.25 * usual]]))
-    return _with_middles(stepped_loads(
-        float(load_n[-1]), float(np.round(usual) if step_n is None else step_n)))
+    largest_n, spacing = float(load_n[-1]), np.diff(load_n)
+    if step_n is None:
+        usual = float(np.median(spacing))
+        step_n = float(np.round(usual))
+        if (usual < 1.0 or np.any(np.abs(spacing[1:] - usual) > 0.2 * usual)
+                or largest_n - step_n * _steps(largest_n, step_n) > 0.1 * usual):
+            inner = np.round(load_n[load_n > 0.05], 1)
+            return _with_middles(np.concatenate([[0.0], inner[inner > 0.25 * usual]]))
+    return _with_middles(stepped_loads(largest_n, step_n))
 
 
 def stepped_loads(largest_n: float, step_n: float) -> FloatArray:
     """
-    Return loads [N] at equal steps from 0 to the largest.
+    Return loads [N] at equal steps from 0, up to the largest.
 
     Raises
     ------
@@ -187,11 +189,16 @@ def stepped_loads(largest_n: float, step_n: float) -> FloatArray:
     """
     if not step_n > 0.0:
         raise InputError(f'is {step_n:g}; allowed is above 0', '--load-step-n')
-    grid = step_n * np.arange(int(largest_n / step_n + 0.02) + 1)
+    grid = step_n * np.arange(_steps(largest_n, step_n) + 1)
     if grid.size < 3:
         raise InputError(f'of {step_n:g} N makes {grid.size} loads up to {largest_n:.1f} N; '
                          f'3 or more are needed', '--load-step-n')
     return grid
+
+
+def _steps(largest_n: float, step_n: float) -> int:
+    """Return how many steps there are up to the largest load, which may be a little too small."""
+    return int(largest_n / step_n + 0.02)
 
 
 def _with_middles(axis: FloatArray) -> FloatArray:

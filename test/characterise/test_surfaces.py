@@ -21,7 +21,7 @@ from pam_sim import load_rig
 from pam_sim.characterise import against_rig, characterise_runs, Dimensions
 from pam_sim.characterise import characterise
 from pam_sim.characterise.fixed_load import by_load, fixed_load, FixedLoad
-from pam_sim.characterise.points import points_of, with_no_load
+from pam_sim.characterise.points import load_grid, points_of, with_no_load
 from pam_sim.errors import InputError
 from pam_sim.joint import load_joint
 from pam_sim.muscle.registry import make_law
@@ -42,6 +42,14 @@ def test_contraction_is_recovered_at_sensor_noise(found):
     assert truth['between_rms_percent'] < 0.2 and truth['within_2u_share'] > 0.9
     assert found.surfaces.load_n.tolist() == list(range(0, 151, 10))
     assert found.surfaces.pressure_gauge_pa == pytest.approx(LEVELS_PA)
+
+
+@pytest.mark.parametrize('step_n, count, grid', [
+    (12.5, 9, [0.0, 12.5, 25.0, 37.5, 50.0, 62.5, 75.0, 87.5, 100.0]),      # not to 96 N
+    (7.5, 4, [0.0, 7.5, 15.0, 22.5]),
+    (10.02, 16, range(0, 151, 10)), (2.5, 5, range(0, 11, 2))])
+def test_loads_of_the_table_reach_the_largest_measured_one(step_n, count, grid):
+    assert load_grid(step_n * np.arange(count)).tolist() == list(grid)
 
 
 def test_the_law_of_the_table_is_the_law_of_the_muscle(found):
