@@ -17,6 +17,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 import threading
+from time import monotonic
 from typing import Any, Final
 
 import numpy as np
@@ -29,7 +30,7 @@ from pam_sim.annotations import FloatArray, IntArray
 SPAN_NS: Final = 60_000_000_000         # of what is kept of a live rig
 RATE_NS: Final = 1_000_000_000          # over which a rate is counted
 MOST_MARKERS: Final = 100               # of a live rig
-SILENT_AFTER_NS: Final = 2_000_000_000         # nodes speak twice a second
+SILENT_AFTER_S: Final = 2.0             # nodes speak twice a second
 Key = tuple[str, str]                   # namespace and short name of a topic
 
 
@@ -70,6 +71,7 @@ class Store:
         self._statuses: dict[str, list[Status]] = {}
         self._differences: dict[tuple[str, str], int] = {}      # rows that are dealt with
         self._drawn: dict[Key, set[str]] = {}                   # values that were ever finite
+        self._heard_s: dict[Key | str, float] = {}              # topics and nodes, steady clock
 
     def add(self, namespace: str, topic: str, times_ns: IntArray,
             values: Mapping[str, FloatArray], lost: int | None = None) -> None:
@@ -96,6 +98,7 @@ class Store:
             if name in values:
                 row[:] = values[name]
         with self.lock:
+            self._heard_s[namespace, topic] = monotonic()
             if lost is not None:
                 self.lost[namespace, topic] = lost
             self._append((namespace, topic), names, times_ns, rows)
@@ -143,6 +146,7 @@ class Store:
                 if self._span_ns is not None:
                     known.clear()
                 known.append(status)
+                self._heard_s[status.name] = monotonic()
 
     def add_markers(self, namespace: str, markers: Iterable[Marker]) -> None:
         """Take markers of a rig, each once, however often it comes; of a live rig the recent."""
@@ -197,6 +201,8 @@ class Store:
         """
         Return what is true at a time, for the page.
 
+        A live rig is silent by the steady clock: no stamp tells that no message comes.
+
         Parameters
         ----------
         now_ns : int, optional
@@ -212,20 +218,28 @@ class Store:
         """
         with self.lock:
             topics = [{
-                'name': f'{namespace}/{topic}', 'rate_hz': self._rate(history, now_ns),
+                'name': f'{namespace}/{topic}', 'rate_hz': self._rate((namespace, topic), now_ns),
                 'lost': self.lost.get((namespace, topic)), 'late': history.late}
                 for (namespace, topic), history in sorted(self.histories.items())
                 if not topic.startswith(DERIVED)]
             found = [_at(statuses, now_ns if self._span_ns is None else None)
                      for _, statuses in sorted(self._statuses.items())]
+            nodes = [_node(status, self._age_s(status.name, status.stamp_ns, now_ns))
+                     for status in found if status is not None]
             markers = [{'namespace': namespace, 'time_s': one.stamp_ns * 1e-9, 'text': one.text}
                        for namespace, one in self.markers]
-        return {'nodes': [_node(status, now_ns) for status in found if status is not None],
-                'topics': topics, 'markers': markers}
+        return {'nodes': nodes, 'topics': topics, 'markers': markers}
 
-    @staticmethod
-    def _rate(history: History, now_ns: int | None) -> float:
-        if now_ns is None or not len(history):
+    def _age_s(self, key: Key | str, stamp_ns: int, now_ns: int | None) -> float:
+        """Return for how long a topic or a node, whose last stamp is known, said nothing [s]."""
+        if self._span_ns is not None:
+            return monotonic() - self._heard_s[key]
+        return 0.0 if now_ns is None else (now_ns - stamp_ns) * 1e-9
+
+    def _rate(self, key: Key, now_ns: int | None) -> float:
+        history = self.histories[key]
+        if now_ns is None or not len(history) or (
+                self._age_s(key, now_ns, now_ns) > RATE_NS * 1e-9):
             return 0.0
         begin, end = np.searchsorted(
             history.times_ns, [now_ns - RATE_NS, now_ns], side='right')
@@ -244,11 +258,10 @@ def _at(statuses: list[Status], now_ns: int | None) -> Status | None:
     return next((one for one in reversed(statuses) if one.stamp_ns <= now_ns), None)
 
 
-def _node(status: Status, now_ns: int | None) -> dict[str, Any]:
-    age_ns = 0 if now_ns is None else now_ns - status.stamp_ns
+def _node(status: Status, age_s: float) -> dict[str, Any]:
     level, message = status.level, status.message
-    if age_ns > SILENT_AFTER_NS:
+    if age_s > SILENT_AFTER_S:
         level = LEVEL_STALE
-        message = f'silent for {age_ns * 1e-9:.0f} s; last: {message}'
+        message = f'silent for {age_s:.0f} s; last: {message}'
     return {'name': status.name, 'level': level, 'message': message,
             'values': dict(status.values)}

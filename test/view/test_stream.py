@@ -18,6 +18,7 @@ import json
 
 from made_rig import feed, feed_rules, MadeRig, Page, START_NS, STEP_NS
 import numpy as np
+from pam_actuation.view import store as store_module
 from pam_actuation.view.recording import load
 from pam_actuation.view.store import Store
 from pam_actuation.view.stream import COLUMNS, decode, Stream
@@ -99,13 +100,32 @@ def test_a_wrong_stamp_of_one_topic_moves_nothing():
     assert rig.store.now_ns() == now_ns
 
 
-def test_a_node_that_falls_silent_is_told():
+def test_a_rig_that_falls_silent_is_told_also_where_all_of_it_does(monkeypatch):
+    steady_s = 100.0
+    monkeypatch.setattr(store_module, 'monotonic', lambda: steady_s)
     rig = MadeRig(2000)
-    later_ns = START_NS + 2000 * STEP_NS + 5 * 10**9
-    node, = rig.store.state(later_ns)['nodes']
+    steady_s += 0.5
+    later_ns = rig.store.now_ns() + 5 * 10**9       # a clock of another computer is ahead
+    assert [node['level'] for node in rig.store.state(later_ns)['nodes']] == [0]
+    before = {one['rate_hz'] for one in rig.store.state(rig.store.now_ns())['topics']}
+    assert before == {100.0, 1000.0}
+    steady_s += 4.5
+    state = rig.store.state(rig.store.now_ns())
+    node, = state['nodes']
     assert node['level'] == 3 and node['message'].startswith('silent for 5 s; last: following')
-    node, = rig.store.state(rig.store.now_ns())['nodes']
-    assert node['level'] == 0
+    assert {one['rate_hz'] for one in state['topics']} == {0.0}
+    rig.go_on()
+    state = rig.store.state(rig.store.now_ns())
+    assert state['nodes'][0]['level'] == 0
+    assert {one['rate_hz'] for one in state['topics']} == before
+
+
+def test_a_node_of_a_bag_is_silent_by_the_stamps():
+    store = Store(span_ns=None)
+    feed(store, 0, 2000)
+    for later_s, level in ((1.0, 0), (5.0, 3)):
+        later_ns = START_NS + 2000 * STEP_NS + round(later_s * 1e9)
+        assert [node['level'] for node in store.state(later_ns)['nodes']] == [level]
 
 
 def test_a_bag_shows_the_same_values_and_what_its_nodes_said_then(tmp_path):
