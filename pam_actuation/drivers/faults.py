@@ -31,6 +31,8 @@ HOLD = 'hold'
 IGNORE = 'ignore'
 CLAMP = 'clamp'
 BY_HAND = 'shut the supply and open the dump valve'     # where nobody else is known to vent
+# What a driver says of a device that refused the safe signal, as it works and as it ends.
+MAY_NOT_BE_VENTED, NOT_VENTED = 'the device may not be vented', 'not vented'
 
 
 @dataclass(frozen=True)

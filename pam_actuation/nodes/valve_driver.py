@@ -20,6 +20,7 @@ import time
 from typing import Any
 
 from pam_actuation.drivers.config import DRIVER_PARAMETERS, DriverConfig
+from pam_actuation.drivers.faults import MAY_NOT_BE_VENTED, NOT_VENTED
 from pam_actuation.drivers.limits import DEVICE_WATCHDOG_S
 from pam_actuation.drivers.parameter import node_parameter
 from pam_actuation.drivers.vented import check_vents
@@ -284,7 +285,7 @@ class ValveDriver(ManagedNode):
         level, message = self.loop.state()
         if self.output.unvented:
             level = ERROR
-            message += f'; the device may not be vented: {self.output.unvented}'
+            message += f'; {MAY_NOT_BE_VENTED}: {self.output.unvented}'
         self.diagnostics.update(level, message, self.loop.values)
 
     def safe_stop(self, why: str) -> None:
@@ -297,7 +298,7 @@ class ValveDriver(ManagedNode):
         if problem:
             self.result_code = 1
             self.get_logger().error(f'the valve did not take the signal that vents: {problem}')
-            self.diagnostics.update(ERROR, f'not vented: {problem}')
+            self.diagnostics.update(ERROR, f'{NOT_VENTED}: {problem}')
 
     def last_status(self, why: str) -> tuple[int, str, Values]:
         """Return level, message and values of the last status: that it ended, and vented."""
@@ -305,7 +306,7 @@ class ValveDriver(ManagedNode):
         values = tuple((key, ended.get(key, text)) for key, text in self.diagnostics.values_of())
         level, message, _ = super().last_status(why)
         if self._not_vented:
-            return ERROR, f'{message}, not vented: {self._not_vented}', values
+            return ERROR, f'{message}, {NOT_VENTED}: {self._not_vented}', values
         # What a lifecycle manager asked for itself is told in the word it knows.
         return level, message if why == DEACTIVATED else f'{message}, vented', values
 

@@ -17,7 +17,7 @@
 from collections.abc import Mapping
 
 from pam_actuation.drivers.decision import OK
-from pam_actuation.drivers.faults import BY_HAND
+from pam_actuation.drivers.faults import BY_HAND, MAY_NOT_BE_VENTED, NOT_VENTED
 from pam_actuation.drivers.watchdog import RESTS, VENTS
 from pam_actuation.hardware.device_watchdog import GONE, OPENED
 from pam_actuation.hardware.files import BACK_END, entries, matches, PARAMETERS
@@ -57,7 +57,8 @@ def has_vented(process: NodeProcess, last: Status, watchdog: str) -> bool:
         return True
     if watchdog.startswith((VENTS, RESTS)):
         return True
-    if 'device_watchdog_vents' not in values:
+    refused = f'{MAY_NOT_BE_VENTED}:' in message or f'{NOT_VENTED}:' in message
+    if 'device_watchdog_vents' not in values or refused:
         return False
     return values.get('state') != OK or GONE in process.printed()
 

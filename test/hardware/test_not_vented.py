@@ -15,6 +15,7 @@
 """Test that the end of a rig says where a muscle may still be under pressure."""
 
 import signal
+from types import SimpleNamespace
 
 import pytest
 
@@ -26,7 +27,7 @@ from own_dac import BLOCKED, TIMED_OUT                           # noqa: E402
 from pam_actuation.rigging.node_spec import NodeSpec                        # noqa: E402
 from pam_actuation.rigging.supervisor import Supervisor                     # noqa: E402
 from pam_actuation.rigging.transitions import SessionFailed                 # noqa: E402
-from pam_actuation.rigging.venting import NOT_KNOWN                         # noqa: E402
+from pam_actuation.rigging.venting import has_vented, NOT_KNOWN             # noqa: E402
 
 pytestmark = pytest.mark.ros
 
@@ -105,6 +106,14 @@ def test_a_device_that_fails_when_it_is_to_vent(own):
     *ended, last = own.end()
     assert last == f'{NAME}: {NOT_KNOWN}'
     assert any('did not take the signal that vents' in one for one in ended)
+
+
+def test_a_device_that_refused_the_safe_signal_is_not_known_to_be_vented():
+    process = SimpleNamespace(exit_code=1, printed=lambda: '')
+    values = {'device_watchdog_vents': '0', 'state': 'ended'}
+    for message, vented in (('stopped', True), ('stopped, not vented: write failed', False),
+                            ('latched; the device may not be vented: write failed', False)):
+        assert has_vented(process, (2, message, values), '') == vented
 
 
 def test_a_driver_whose_watchdog_process_vents_is_not_told_of(tmp_path):
