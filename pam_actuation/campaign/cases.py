@@ -114,7 +114,7 @@ def find_cases(source: StrPath, without: StrPath | None = None,
     else:
         raise InputError('no such folder or list of recordings', root)
     cases = [case for row in listed for case in _cases_of(row, folder, without, joints)]
-    return sorted(_dated(cases), key=lambda case: (case.rig, case.time, case.path))
+    return sorted(_dated(cases), key=lambda case: (case.rig, case.time, *_in_order(case)))
 
 
 def _bags_below(folder: Path, without: StrPath | None) -> Iterator[Path]:
@@ -281,6 +281,12 @@ def _dated(cases: Sequence[Case]) -> list[Case]:
     for several in of_rig.values():
         if len(several) > 1 and len({case.time for case in several}) == 1:
             several = [replace(case, day=str(number), time=float(number)) for number, case in
-                       enumerate(sorted(several, key=lambda case: case.path), 1)]
+                       enumerate(sorted(several, key=_in_order), 1)]
         dated += several
     return dated
+
+
+def _in_order(case: Case) -> tuple[list[str | int], str]:
+    """Return what sorts paths as a person does: check_2 before check_10."""
+    parts = re.split(r'(\d+)', case.path)
+    return [int(part) if k % 2 else part for k, part in enumerate(parts)], case.path

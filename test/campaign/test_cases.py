@@ -80,10 +80,14 @@ def test_digits_that_are_no_date_name_the_rig(tmp_path, path, rig, day):
 
 
 def test_recordings_of_one_time_are_numbered(tmp_path):
-    for name in ('b', 'a'):
+    for name in ('b_10', 'b_2', 'b_02', 'a'):
         write_bag(tmp_path / name, 20)
     assert [(Path(case.path).name, case.day, case.rig) for case in find_cases(tmp_path)] == [
-        ('a', '1', 'rig'), ('b', '2', 'rig')]
+        ('a', '1', 'rig'), ('b_02', '2', 'rig'), ('b_2', '3', 'rig'), ('b_10', '4', 'rig')]
+    # So are several of one day in order.
+    table = tmp_path / 'list.csv'
+    table.write_text('path,day\nb_10,2026-03-01\nb_2,2026-03-01\na,2026-03-02\n')
+    assert [Path(case.path).name for case in find_cases(table)] == ['b_2', 'b_10', 'a']
 
 
 @pytest.fixture(scope='module')
