@@ -163,6 +163,8 @@ def _listed(path: Path) -> list[dict[str, str]]:
             raise InputError(f'has {len(values)} values for {len(head)} columns',
                              f'{path}:{number}')
         row = dict(zip(head, values))
+        if not row['path']:
+            raise InputError('path is empty', f'{path}:{number}')
         if row.get('day') and _date(row['day'], strictly=True) is None:
             raise InputError(f'day is {row["day"]!r}; write it as 2026-11-25 or '
                              '2026-11-25T09:30', f'{path}:{number}')

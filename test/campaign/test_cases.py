@@ -179,6 +179,7 @@ def test_each_muscle_has_its_model(exo):
 @pytest.mark.parametrize('text, says', [
     ('path,rigg\na,b\n', 'list.csv:1.*`rigg` .did you mean `rig`'),
     ('path,rig\na\n', 'list.csv:2.*1 values for 2 columns'),
+    ('path,rig,day\n.,a,\n,b,2026-12-01\n', 'list.csv:3.*path is empty'),
     ('path,day\na,Monday\n', "list.csv:2.*day is 'Monday'"),
     ('path,day\na,2026-11-25T25:00\n', "list.csv:2.*day is '2026-11-25T25:00'"),
     ('# only\n', 'lists no recording'),
