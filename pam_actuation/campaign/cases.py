@@ -118,15 +118,20 @@ def find_cases(source: StrPath, without: StrPath | None = None,
 
 
 def _bags_below(folder: Path, without: StrPath | None) -> Iterator[Path]:
-    """Give the bags below a folder, by name."""
+    """Give the bags below a folder, by name, also behind links that lead out of it; each once."""
     left_out = os.path.realpath(without) if without is not None else None
-    for place, names, files in os.walk(folder):
-        here = Path(place)
+    passed: set[Path] = set()
+    for place, names, files in os.walk(folder, followlinks=True):
+        here, real = Path(place), Path(place).resolve()
+        if real in passed or here.is_symlink() and real.is_relative_to(folder):
+            names[:] = []
+            continue
+        passed.add(real)
         names[:] = sorted(name for name in names if not name.startswith('.')
                           and os.path.realpath(here / name) != left_out)
         bags = sorted(name for name in files
                       if name.endswith(BAG_FILES) and not name.startswith('.'))
-        if 'metadata.yaml' in files or bags and _is_split(here.name, bags):
+        if 'metadata.yaml' in files or bags and _is_split(real.name, bags):
             names[:] = []
             yield here
         else:

@@ -54,6 +54,19 @@ def test_folders_name_rig_and_day_and_every_muscle_is_a_case(lab):
         'exo/left_knee/extensor', 'exo/left_knee/flexor']
 
 
+def test_links_lead_to_recordings_and_each_is_one_case(tmp_path):
+    runs, store = tmp_path / 'runs', tmp_path / 'store'
+    for day in (runs / 'rig_1' / '2026-03-01', store / 'rig_b' / '2026-03-02'):
+        write_bag(day / 'run', 2)
+    (runs / 'rig_2').symlink_to(store / 'rig_b')
+    for where, to in ((runs / 'a', runs / 'rig_1'), (runs / 'rig_3', store),
+                      (store / 'rig_b' / 'round', store), (store / 'z', runs)):
+        where.symlink_to(to)
+    assert [(case.rig, case.day) for case in find_cases(runs)] == [
+        ('rig_1', '2026-03-01'), ('rig_2', '2026-03-02')]
+    assert [case.rig for case in find_cases(runs, without=store / 'rig_b')] == ['rig_1']
+
+
 def test_a_list_names_them_as_it_likes(lab):
     table = lab / 'list.csv'
     table.write_text('path, rig, day, namespace\n# a remark\nbench/2026-03-01/run, A, 2026-04-05,'
