@@ -23,9 +23,9 @@ import platform
 import time
 from typing import Any
 
-from pam_actuation.campaign.cases import Case
+from pam_actuation.campaign.cases import Case, RESULT
 from pam_actuation.campaign.code import code_digest
-from pam_actuation.campaign.store import CASES, key_of, RESULT, Store
+from pam_actuation.campaign.store import CASES, key_of, Store
 from pam_actuation.campaign.work import NEED_A_MODEL, Settings, work_on
 from pam_actuation.kept_folders import kept_folder
 from pam_actuation.workers import ClusterLost, WorkerLost, Workers

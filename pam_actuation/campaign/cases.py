@@ -36,6 +36,7 @@ from pam_sim.joint.parameters import SIDES
 
 COLUMNS = ('path', 'rig', 'day', 'namespace', 'model')
 BAG_FILES = ('.mcap', '.db3')
+RESULT = 'case.json'            # in the folder of each case that a campaign keeps
 ONE_RIG = 'rig'                 # where neither folder nor list names one
 # 2026-11-25, 20261125, and with a time behind it: 2026-11-25T0930, 20261125_093000.
 DAY = re.compile(
@@ -118,12 +119,17 @@ def find_cases(source: StrPath, without: StrPath | None = None,
 
 
 def _bags_below(folder: Path, without: StrPath | None) -> Iterator[Path]:
-    """Give the bags below a folder, by name, also behind links that lead out of it; each once."""
+    """
+    Give the bags below a folder, by name, also behind links that lead out of it; each once.
+
+    What a campaign wrote for a case is no bag.
+    """
     left_out = os.path.realpath(without) if without is not None else None
     passed: set[Path] = set()
     for place, names, files in os.walk(folder, followlinks=True):
         here, real = Path(place), Path(place).resolve()
-        if real in passed or here.is_symlink() and real.is_relative_to(folder):
+        is_result = RESULT in files and 'metadata.yaml' not in files
+        if is_result or real in passed or here.is_symlink() and real.is_relative_to(folder):
             names[:] = []
             continue
         passed.add(real)

@@ -27,13 +27,13 @@ import os
 from pathlib import Path
 from typing import Any
 
-from pam_actuation.campaign.cases import Case
+from pam_actuation.campaign.cases import Case, RESULT
 from pam_actuation.campaign.code import code_digest
 from pam_actuation.campaign.work import Settings
 from pam_actuation.kept_folders import add_files, only_one
 from pam_sim.files import check_folder, make_folder, StrPath
 
-CASES, RESULT, TIMES = 'cases', 'case.json', 'times.csv'
+CASES, TIMES = 'cases', 'times.csv'
 
 
 class Store:

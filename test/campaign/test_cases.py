@@ -67,6 +67,17 @@ def test_links_lead_to_recordings_and_each_is_one_case(tmp_path):
     assert [case.rig for case in find_cases(runs, without=store / 'rig_b')] == ['rig_1']
 
 
+def test_results_of_campaigns_are_no_recordings(tmp_path):
+    write_bag(tmp_path / 'bench' / 'run', 2)
+    found = find_cases(tmp_path, without=tmp_path)
+    for out in ('.', 'of_another_campaign'):
+        case = tmp_path / out / 'cases' / '0123'
+        case.mkdir(parents=True)
+        (case / 'case.json').write_text('{}')
+        (case / 'compare.mcap').write_bytes(b'results')
+    assert find_cases(tmp_path, without=tmp_path) == found and len(found) == 1
+
+
 def test_a_list_names_them_as_it_likes(lab):
     table = lab / 'list.csv'
     table.write_text('path, rig, day, namespace\n# a remark\nbench/2026-03-01/run, A, 2026-04-05,'
