@@ -20,6 +20,7 @@ from dataclasses import asdict, dataclass, replace
 import os
 from pathlib import Path
 import platform
+import shutil
 import time
 from typing import Any
 
@@ -136,6 +137,8 @@ def run_campaign(cases: Sequence[Case], settings: Settings, out: StrPath, jobs: 
         keys = [key_of(case, settings, text) for case, text in zip(cases, texts)]
         todo = {key: Task(key, replace(case, model=text))
                 for key, case, text in zip(keys, cases, texts) if store.result(key) is None}
+        for key in todo:        # the folder of a damaged result would stand in the way
+            shutil.rmtree(store.cases / key, ignore_errors=True)
         lost: dict[str, str] = {}
         count, known = len(todo), len(set(keys)) - len(todo)
         progress(known)

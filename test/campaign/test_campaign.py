@@ -218,6 +218,16 @@ def test_a_failure_of_the_machine_is_no_result(lab, tmp_path, monkeypatch, error
     assert again.worked_on == 1 and again.rows[0]['verdict'] == 'reported'
 
 
+def test_a_damaged_case_is_worked_on_once_more(lab, tmp_path, monkeypatch):
+    _, broken = find_cases(lab)
+    monkeypatch.setattr(campaign, 'Workers', lambda *given, **more: Workers())
+    first = run_campaign([broken], Settings('report'), tmp_path)
+    (tmp_path / 'cases' / first.rows[0]['key'] / 'case.json').write_text('')
+    for worked_on in (1, 0):
+        again = run_campaign([broken], Settings('report'), tmp_path)
+        assert again.worked_on == worked_on and again.rows == first.rows
+
+
 def test_recordings_of_equal_bytes_keep_their_own_reason(tmp_path):
     for rig in ('a', 'b'):
         broken = tmp_path / 'lab' / rig / '2026-03-01'
