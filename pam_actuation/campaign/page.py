@@ -48,7 +48,7 @@ def campaign_page(campaign: Campaign, findings: Findings) -> str:
 
     """
     rows = campaign.rows
-    days = sorted({row['case'].day for row in rows})
+    days = _days(rows)
     numbers = [
         (str(len(rows)), 'recordings', f'{len(campaign.rigs)} rigs, {days[0]} to {days[-1]}', ''),
         (str(len(findings.changes)), 'changes over time', f'at a level of {LEVEL:g} in all',
@@ -61,6 +61,12 @@ def campaign_page(campaign: Campaign, findings: Findings) -> str:
                 _series(findings), _all(campaign, findings), _method(findings)]
     return render(f'Campaign: {campaign.settings.work}', LEAD, sections, numbers, FOOTER,
                   of=f'campaign of {campaign.settings.work}')
+
+
+def _days(rows: Sequence[dict[str, Any]]) -> list[str]:
+    """Return the days of rows as told, by time, each once."""
+    cases = sorted((row['case'] for row in rows), key=lambda case: case.time)
+    return list(dict.fromkeys(case.day for case in cases))
 
 
 def _changes(findings: Findings) -> Section:
@@ -85,7 +91,7 @@ def _map(campaign: Campaign) -> Section:
         return Section('map', 'Rigs and days', paragraph(
             'Each recording has a row in the list below.'))
     marks = dict(zip(names, MARKS))
-    days = sorted({(row['case'].time, row['case'].day) for row in campaign.rows})
+    days = _days(campaign.rows)
     cells: dict[tuple[str, str], list[str]] = {}
     for row in campaign.rows:
         found = ''.join(dict.fromkeys(marks[size['name']] for size in row['sizes']))
@@ -93,9 +99,9 @@ def _map(campaign: Campaign) -> Section:
         cells.setdefault((row['case'].rig, row['case'].day), []).append(
             f'<a href="{_report(campaign, row)}" title="{text(row["case"].day)}: '
             f'{text(row["verdict"])}">{mark}</a>')
-    head = ''.join(f'<th>{text(day[5:] if len(day) > 6 else day)}</th>' for _, day in days)
+    head = ''.join(f'<th>{text(day[5:] if len(day) > 6 else day)}</th>' for day in days)
     lines = ''.join(f'<tr><td>{text(rig)}</td>' + ''.join(
-        f'<td>{" ".join(cells.get((rig, day), []))}</td>' for _, day in days) + '</tr>'
+        f'<td>{" ".join(cells.get((rig, day), []))}</td>' for day in days) + '</tr>'
         for rig in campaign.rigs)
     key = '; '.join(f'{mark} {name}' for name, mark in marks.items())
     return Section('map', 'Rigs and days', (

@@ -25,7 +25,7 @@ import sys
 
 import pam_actuation
 from pam_actuation.campaign import campaign, code, store
-from pam_actuation.campaign.campaign import run_campaign, Task, work_and_keep
+from pam_actuation.campaign.campaign import Campaign, run_campaign, Task, work_and_keep
 from pam_actuation.campaign.cases import Case, find_cases
 from pam_actuation.campaign.code import code_digest
 from pam_actuation.campaign.findings import find
@@ -250,6 +250,22 @@ def test_recordings_of_equal_bytes_keep_their_own_reason(tmp_path):
     table.write_text('path\nmoved\n')
     again = run_campaign(find_cases(table), Settings('report'), tmp_path / 'out', jobs=1)
     assert again.worked_on == 0 and f'{tmp_path}/moved/a/' in again.rows[0]['reason']
+
+
+@pytest.mark.parametrize('cases, span, columns', [
+    # Numbers, and stamps within one minute on three rigs.
+    ([('rig', str(k), float(k)) for k in range(1, 13)], '1 rigs, 1 to 12', 12),
+    ([(f'rig{k}', '2026-11-25T09:30', 20000.0 + 1e-4 * k) for k in range(3)],
+     '3 rigs, 2026-11-25T09:30 to 2026-11-25T09:30', 1)])
+def test_the_page_has_a_column_for_each_day(cases, span, columns):
+    done = Campaign(Settings('report'), [
+        {'case': Case(f'/{rig}/{day}', rig, day, time), 'key': 'k', 'verdict': 'reported',
+         'reason': '', 'sizes': [], 'ambiguous': [], 'least': {}, 'bad': False}
+        for rig, day, time in cases])
+    page = campaign_page(done, find(done))
+    grid = page[page.index('class="grid"'):page.index('All recordings</h2>')]
+    assert span in page
+    assert grid.count('<th>') == 1 + columns and grid.count('<a href') == len(cases)
 
 
 def test_a_full_disk_ends_the_campaign(lab, tmp_path, monkeypatch):
