@@ -26,7 +26,7 @@ from typing import Any
 
 from pam_actuation.campaign.cases import Case, RESULT
 from pam_actuation.campaign.code import code_digest
-from pam_actuation.campaign.store import CASES, key_of, Store
+from pam_actuation.campaign.store import CASES, digest_of, key_of, Store
 from pam_actuation.campaign.work import NEED_A_MODEL, Settings, work_on
 from pam_actuation.kept_folders import kept_folder
 from pam_actuation.workers import ClusterLost, WorkerLost, Workers
@@ -62,8 +62,9 @@ class Campaign:
     ----------
     settings : Settings
     rows : list of dict
-        One for each case, by rig and time: ``case`` (a Case), ``key``, and what ``work_on``
-        returned, or the verdict ``failed`` with the error as its reason.
+        One for each case, by rig and time: ``case`` (a Case), ``key``, ``recording`` (its
+        digest), and what ``work_on`` returned, or the verdict ``failed`` with the error as its
+        reason.
     worked_on : int
         Cases that were not there before.
     seconds : float
@@ -134,7 +135,9 @@ def run_campaign(cases: Sequence[Case], settings: Settings, out: StrPath, jobs: 
     Workers(cluster=cluster)        # refuses what is no address, before anything is written
     store = Store(out)
     with store.locked():
-        keys = [key_of(case, settings, text) for case, text in zip(cases, texts)]
+        digests = {path: digest_of(path) for path in dict.fromkeys(case.path for case in cases)}
+        keys = [key_of(case, settings, text, digests[case.path])
+                for case, text in zip(cases, texts)]
         todo = {key: Task(key, replace(case, model=text))
                 for key, case, text in zip(keys, cases, texts) if store.result(key) is None}
         for key in todo:        # the folder of a damaged result would stand in the way
@@ -156,9 +159,10 @@ def run_campaign(cases: Sequence[Case], settings: Settings, out: StrPath, jobs: 
 
         if todo:
             _work(todo, settings, store, jobs, cluster, done)
-        rows = [{'case': case, 'key': key, **(store.result(key) or {
-            'verdict': FAILED, 'reason': lost.get(key, 'not there'), **_LOST})}
-            for key, case in zip(keys, cases)]
+        rows = [{'case': case, 'key': key, 'recording': digests[case.path],
+                 **(store.result(key) or {'verdict': FAILED, **_LOST,
+                                          'reason': lost.get(key, 'not there')})}
+                for key, case in zip(keys, cases)]
         for row in rows:
             row['reason'] = row['reason'].replace(THE_RECORDING, row['case'].path)
     return Campaign(settings, rows, count - len(lost), time.perf_counter() - started)

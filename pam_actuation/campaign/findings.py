@@ -64,10 +64,50 @@ class Findings:
 
     def identities(self) -> list[str]:
         """Return what tells changes and odd recordings from those of another run."""
-        return sorted([
-            *(f'{group[0].series.rig} {group[0].series.name} {group[0].shape}'
-              for group in self.changes),
-            *(f'{one.row["case"].rig} {one.row["key"]}' for one in self.odd)])
+        return sorted([*(_identity(one, one.begin) for group in self.changes for one in group),
+                       *(_of_recording(one) for one in self.odd)])
+
+    def new(self, told: set[str]) -> list[str]:
+        """
+        Return the identities of what another run did not tell.
+
+        Parameters
+        ----------
+        told : set of str
+            What ``seen_before`` returned. A change is told if it was told with a beginning
+            within its interval.
+
+        """
+        found = [_of_recording(one) for one in self.odd
+                 if told.isdisjoint((_of_recording(one), one.row['case'].name))]
+        for group in self.changes:
+            possible = [{_identity(one, place) for place in range(one.earliest, one.latest + 1)}
+                        for one in group]
+            if told.isdisjoint(map(of_group, set().union(*possible))):
+                found += [_identity(one, one.begin) for one, several in zip(group, possible)
+                          if told.isdisjoint(several)]
+        return sorted(found)
+
+
+def identity(rig: str, name: str, quantity: str, shape: str, rises: bool, begin: str) -> str:
+    """Return what tells a change from others, also to a person."""
+    return f'{rig} {name} {quantity} {shape} {"up" if rises else "down"} from {begin}'
+
+
+def of_group(one: str) -> str:
+    """Return what tells a change, by its identity, together with all that began with it."""
+    return f'{one}, and what began with it'
+
+
+def _identity(change: Change, place: int) -> str:
+    """Return the identity of a change, if it began at that place of its series."""
+    one = change.series
+    return identity(one.rig, one.name, one.quantity, change.shape, change.after > change.before,
+                    one.days[place])
+
+
+def _of_recording(odd: Odd) -> str:
+    return f'{odd.row["case"].rig} {odd.row["recording"]}'
 
 
 def find(campaign: 'Campaign') -> Findings:

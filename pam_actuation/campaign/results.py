@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from pam_actuation.campaign.campaign import Campaign, plain
-from pam_actuation.campaign.findings import Findings, sentence
+from pam_actuation.campaign.findings import Findings, identity, of_group, sentence
 from pam_actuation.campaign.store import CASES
 from pam_actuation.campaign.work import PLOTLY
 from pam_sim.files import StrPath, whole_file, write_text
@@ -93,15 +93,22 @@ def write_results(campaign: Campaign, findings: Findings, folder: StrPath, page:
             'before': group[0].before, 'after': group[0].after, 'unit': group[0].series.unit,
             'quantity': group[0].series.quantity, 'text': sentence(group)}
             for group in findings.changes],
-         'odd': [{'case': odd.row['case'].name, 'key': odd.row['key'], 'why': odd.why}
-                 for odd in findings.odd],
+         'odd': [{'case': odd.row['case'].name, 'key': odd.row['key'],
+                  'recording': odd.row['recording'], 'why': odd.why} for odd in findings.odd],
          'identities': findings.identities()}, indent=2, ensure_ascii=False) + '\n')
     return remark
 
 
 def seen_before(folder: StrPath) -> set[str]:
-    """Return what the last finished run found, for alerts; empty where there was none."""
+    """Return what the last finished run told, for ``Findings.new``; empty where there was none."""
     try:
-        return set(json.loads((Path(folder) / SEEN).read_text(encoding='utf-8'))['identities'])
-    except (OSError, ValueError, KeyError):
+        seen = json.loads((Path(folder) / SEEN).read_text(encoding='utf-8'))
+        told = set(seen['identities'])
+        rows = {identity(one['rig'], one['name'], one['quantity'], one['shape'],
+                         one['after'] > one['before'], one['begin']) for one in seen['changes']}
+        # Former versions kept one change of each group, and the day of an odd recording.
+        told.update(map(of_group, rows - told))
+        told.update(one['case'] for one in seen['odd'] if 'recording' not in one)
+        return told
+    except (OSError, ValueError, KeyError, TypeError):
         return set()

@@ -86,18 +86,27 @@ class Store:
             stream.write(f'{key},{wall_s:.3f},{processor_s:.3f}\n')
 
 
-def key_of(case: Case, settings: Settings, model_text: str) -> str:
+def digest_of(path: str) -> str:
+    """Return what tells a recording from others by its bytes; one that is missing has it too."""
+    digest = hashlib.sha256()
+    add_files(digest, path, lambda file, error: f'{error.errno} {file}'.encode())
+    return digest.hexdigest()[:20]
+
+
+def key_of(case: Case, settings: Settings, model_text: str, recording: str) -> str:
     """
     Return the key of all that the result of a case depends on.
 
     Parameters
     ----------
     case : Case
-        Its path may be missing: that is a result as well.
+        Of it, the namespace.
     settings : Settings
         What is asked of it.
     model_text : str
         The model as YAML or the name of a preset, '' without one.
+    recording : str
+        What ``digest_of`` returned of its path.
 
     Raises
     ------
@@ -108,7 +117,6 @@ def key_of(case: Case, settings: Settings, model_text: str) -> str:
     digest = hashlib.sha256()
     options = {name: value for name, value in vars(settings).items() if name != 'model'}
     for part in (code_digest(), model_text, json.dumps(options, sort_keys=True),
-                 case.namespace or ''):
+                 case.namespace or '', recording):
         digest.update(part.encode() + b'\0')
-    add_files(digest, case.path, lambda file, error: f'{error.errno} {file}'.encode())
     return digest.hexdigest()[:20]

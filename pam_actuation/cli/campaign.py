@@ -106,7 +106,7 @@ def run(args: argparse.Namespace) -> int:
     before = seen_before(args.out)
     findings = find(campaign)
     remark = write_results(campaign, findings, args.out, campaign_page(campaign, findings))
-    new = [one for one in findings.identities() if one not in before]
+    new = findings.new(before)
     lines = _lines(campaign, findings)
     if args.alert:
         lines += [f'alert: {one}' for one in new]

@@ -156,17 +156,18 @@ def test_a_difference_of_rounding_counts_as_none(tmp_path, monkeypatch):
 
 def test_the_key_is_of_recording_model_settings_and_code(lab, tmp_path, monkeypatch):
     case, other = find_cases(lab)
-    key = key_of(case, Settings('gap'), 'model')
-    assert key == key_of(case, Settings('gap', model='said elsewhere'), 'model')
-    assert len({key, key_of(other, Settings('gap'), 'model'),
-                key_of(case, Settings('gap'), 'another'),
-                key_of(case, Settings('report'), 'model'),
-                key_of(case, Settings('gap', materiality=2.0), 'model')}) == 5
-    assert key_of(Case(str(tmp_path / 'gone'), 'r', 'd', 0.0), Settings('gap'), '') != key
+    key = key_of(case, Settings('gap'), 'model', 'bytes')
+    assert key == key_of(case, Settings('gap', model='said elsewhere'), 'model', 'bytes')
+    assert len({key, key_of(case, Settings('gap'), 'model', 'others'),
+                key_of(case, Settings('gap'), 'another', 'bytes'),
+                key_of(case, Settings('report'), 'model', 'bytes'),
+                key_of(case, Settings('gap', materiality=2.0), 'model', 'bytes')}) == 5
+    assert len({store.digest_of(str(tmp_path / 'gone')), store.digest_of(case.path),
+                store.digest_of(other.path)}) == 3
     (tmp_path / 'my_own.py').write_text('EFFECT = None')
     monkeypatch.setenv('PAM_EFFECTS_PATH', str(tmp_path))
     monkeypatch.setattr(store, 'code_digest', code_digest.__wrapped__)
-    assert key_of(case, Settings('gap'), 'model') != key
+    assert key_of(case, Settings('gap'), 'model', 'bytes') != key
 
 
 def test_the_code_is_that_of_what_works_on_recordings(tmp_path):

@@ -15,14 +15,17 @@
 """What changed over time: each shape is found on its day, and chance is not."""
 
 from dataclasses import replace
+import json
 import math
 
 import numpy as np
+from pam_actuation.campaign.campaign import Campaign
 from pam_actuation.campaign.cases import Case
-from pam_actuation.campaign.changes import changes_of, far_from_neighbours
-from pam_actuation.campaign.findings import sentence
+from pam_actuation.campaign.changes import Change, changes_of, far_from_neighbours
+from pam_actuation.campaign.findings import Findings, Odd, sentence
+from pam_actuation.campaign.results import seen_before, write_results
 from pam_actuation.campaign.series import IN_95, Series, series_of
-from pam_actuation.campaign.work import size
+from pam_actuation.campaign.work import Settings, size
 import pytest
 
 DAYS = 25
@@ -95,6 +98,57 @@ def test_a_sentence_counts_days_or_numbered_recordings():
     found.series.days = [f'2026-03-{k:02}' for k in range(1, DAYS + 1)]
     assert 'grows over all days from 2026-03-01: ' in sentence([found])
     assert ' a day (95 %: ' in sentence([found])
+
+
+def change(name, begin, rises=True, spread=1, shape='step'):
+    """Return a change that began on a day, give or take ``spread`` days."""
+    one = series(1.0 + DAY)
+    one.name, one.days = name, [f'2026-03-{k:02}' for k in range(1, DAYS + 1)]
+    before, after = (1.0, 2.0) if rises else (2.0, 1.0)
+    return Change(one, shape, begin, begin - spread, begin + spread, before, after,
+                  after - before, 0.1, 1e-5, [])
+
+
+def odd(day, recording, key):
+    row = {'case': Case('p', 'rig_1', day, 1.0), 'key': key, 'recording': recording}
+    return Odd(row, 'why', 9.0)
+
+
+def told(tmp_path, groups, several=()):
+    """Return what a run says that it told, from its files."""
+    write_results(Campaign(Settings('gap'), []), Findings([], groups, list(several)), tmp_path, '')
+    return seen_before(tmp_path)
+
+
+@pytest.mark.parametrize('now, new', [
+    ([change('friction', 6)], []), ([change('friction', 4)], []),
+    ([change('friction', 14)], ['rig_1 friction force_n step up from 2026-03-15']),
+    ([change('friction', 5, rises=False)], ['rig_1 friction force_n step down from 2026-03-06']),
+    ([change('leak', 5), change('noise', 5)], ['rig_1 leak force_n step up from 2026-03-06'])])
+def test_an_alert_is_of_what_was_not_told(now, new, tmp_path):
+    before = told(tmp_path, [[change('friction', 5), change('noise', 5)]])
+    assert Findings([], [now], []).new(before) == new
+
+
+def test_an_odd_recording_is_told_once_whatever_the_code(tmp_path):
+    before = told(tmp_path, [], [odd('2026-03-01', 'bytes', 'key')])
+    several = [odd('2026-03-01', 'bytes', 'key of other code'), odd('2026-03-01', 'others', 'k')]
+    assert Findings([], [], several).new(before) == ['rig_1 others']
+
+
+def test_what_a_former_version_told_is_told(tmp_path):
+    told(tmp_path, [[change('friction', 5)]], [odd('2026-03-01', 'bytes', 'key')])
+    path = tmp_path / 'findings.json'
+    seen = json.loads(path.read_text())
+    seen['identities'] = ['rig_1 friction step', 'rig_1 key']
+    del seen['odd'][0]['recording']
+    path.write_text(json.dumps(seen))
+    before = seen_before(tmp_path)
+    again = Findings([], [[change('leakage', 5), change('friction', 6)]],
+                     [odd('2026-03-01', 'bytes', 'key of other code')])
+    assert again.new(before) == []
+    later = Findings([], [[change('friction', 14)]], [odd('2026-03-02', 'bytes', 'key')])
+    assert len(later.new(before)) == 2
 
 
 def test_several_recordings_a_day_begin_together():
