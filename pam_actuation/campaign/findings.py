@@ -194,7 +194,7 @@ def sentence(group: list[Change]) -> str:
     new = abs(first.before - one.nothing) < IN_95 * float(one.sd[0]) and not bool(
         one.named[:max(first.begin, 1)].any())
     if first.shape == 'step':
-        does = 'begins' if new else 'rises' if abs(first.after) > abs(first.before) else 'falls'
+        does = 'begins' if new else 'rises' if first.after > first.before else 'falls'
         how = f'by {shown(first.amount, one.unit)} (95 %: {low} to {high})'
     else:
         does = 'grows' if abs(first.after) > abs(first.before) else 'shrinks'

@@ -100,6 +100,11 @@ def test_a_sentence_counts_days_or_numbered_recordings():
     assert ' a day (95 %: ' in sentence([found])
 
 
+def test_what_gets_larger_rises_below_zero_too():
+    [found] = changes_of([series(noisy(-2.0 + 3.0 * (DAY >= 11)))])
+    assert ' friction rises from ' in sentence([found])
+
+
 def change(name, begin, rises=True, spread=1, shape='step'):
     """Return a change that began on a day, give or take ``spread`` days."""
     one = series(1.0 + DAY)
