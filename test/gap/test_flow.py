@@ -14,10 +14,14 @@
 
 """Errors of a flow follow time or pressure, or only scatter more where much flows."""
 
+from types import SimpleNamespace
+
 from gap_runs import recorded
 import numpy as np
 from pam_sim import load_rig
+from pam_sim.errors import InputError
 from pam_sim.gap.data.recording import Recording
+from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.gap.subsystems.problems import subsystem_problems
 from pam_sim.gap.verify.flow import deviations, Flow
 import pytest
@@ -46,6 +50,23 @@ def test_what_errors_follow_shows_and_what_they_may_follow_does_not():
     assert abs(deviations(errors + 3.0 * row[:, 0], usual, row)[0]) > 10.0
     assert deviations(errors + 7.0, usual, row) == pytest.approx(deviations(errors, usual, row))
     assert deviations(errors[:11], usual[:11], row[:11]).size == 0
+
+
+class Bounded(SubsystemProblem):
+    """Two numbers, of which each value is three times one; more than 1 is refused."""
+
+    def __init__(self):
+        self.known, self.measured = [SimpleNamespace(step=0.05)] * 2, np.zeros(2)
+
+    def values(self, rig, known_z):
+        if known_z.max() > 1.0:
+            raise InputError('is beyond its range')
+        return 3.0 * known_z
+
+
+def test_a_number_at_the_end_of_its_range_has_a_slope():
+    assert np.array(Flow(Bounded(), HSV, np.array([1.0, 0.5])).slopes) == pytest.approx(
+        3.0 * np.eye(2))
 
 
 def most(late_ns, leakage=0.0):

@@ -30,6 +30,7 @@ from pam_sim.gap.select.candidates import (
 from pam_sim.gap.subsystems.effects import acts_on
 from pam_sim.gap.subsystems.parallel import parallel_map
 from pam_sim.gap.subsystems.problems import subsystem_problems
+from pam_sim.gap.subsystems.slopes import value_slopes
 from pam_sim.rig import Rig
 from pam_sim.short_repr import short_repr
 
@@ -203,8 +204,7 @@ class Sensitivities:
         """Return one column per known number and subsystem: what one deviation does."""
         columns = []
         for place, (problem, base) in enumerate(zip(self.problems, self._base)):
-            for k, unit in zip(problem.known, np.eye(len(problem.known))):
-                slope = (problem.values(self.rig, k.step * unit) - base) / k.step
+            for slope in value_slopes(problem, self.rig, np.zeros(len(problem.known)), base):
                 parts = [np.zeros(rows.sum()) for rows in self._rows]
                 parts[place] = (slope / self._floor[place])[self._rows[place]]
                 columns.append(np.concatenate(parts))

@@ -28,6 +28,7 @@ from pam_sim.gap.data.means import means_of, recent
 from pam_sim.gap.data.noise import autocorrelation_time
 from pam_sim.gap.subsystems.known import SKEW_SD_S
 from pam_sim.gap.subsystems.problem import SubsystemProblem
+from pam_sim.gap.subsystems.slopes import value_slopes
 from pam_sim.rig import Rig
 
 # The errors of stamps add up, and those of the sensor do not; they are as large after some tenths
@@ -63,8 +64,7 @@ class Flow:
         self.problem, self.base = problem, problem.values(rig, known)
         self._rig, self._known = rig, known
         self.errors = self.base - problem.measured
-        self.slopes = [(problem.values(rig, known + k.step * (np.arange(known.size) == j))
-                        - self.base) / k.step for j, k in enumerate(problem.known)]
+        self.slopes = value_slopes(problem, rig, known, self.base)
 
     @cached_property
     def late(self) -> FloatArray:
