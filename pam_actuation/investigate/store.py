@@ -27,7 +27,6 @@ from pathlib import Path
 import shutil
 from typing import Any
 
-from pam_actuation.investigate.recorder import RecordingFailed
 from pam_actuation.investigate.rounds import Round
 from pam_actuation.kept_folders import kept_folder, only_one
 from pam_sim.errors import InputError
@@ -145,8 +144,8 @@ class Store:
         with kept_folder(self.recordings, str(number)) as folder:
             try:
                 yield folder / BAG
-            except RecordingFailed:
-                # What was recorded on a rig is kept for the person who asks why.
+            except BaseException:
+                # What was recorded on a rig is kept for the person who asks why, also on Ctrl-C.
                 if (folder / BAG).is_dir():
                     os.rename(folder / BAG, self._free(f'{number}{STOPPED}'))
                 raise

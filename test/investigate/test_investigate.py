@@ -191,9 +191,11 @@ class Copies(Recorder):
     def record(self, experiment, bag, seed, why, progress):
         """Copy the bag, or raise what is due."""
         self.played.append((experiment.name, seed, why))
-        shutil.copytree(self.bag, bag)
-        if len(self.played) in self.failing:
-            raise self.failing[len(self.played)]
+        due = self.failing.get(len(self.played))
+        if not isinstance(due, Declined):       # of a declined motion there is no bag
+            shutil.copytree(self.bag, bag)
+        if due is not None:
+            raise due
 
     def to_dict(self):
         """Return how."""
@@ -265,6 +267,9 @@ def test_a_motion_that_is_declined_or_fails_ends_in_order(small, tmp_path):
     names = sorted(path.name for path in (tmp_path / 'out' / 'recordings').iterdir())
     assert names == ['1', '2_stopped'] and load_run(
         tmp_path / 'out' / 'recordings' / '2_stopped').topics
+    with pytest.raises(KeyboardInterrupt):
+        small([], {1: KeyboardInterrupt()})
+    assert (tmp_path / 'out' / 'recordings' / '2_stopped_2' / 'metadata.yaml').is_file()
     outcome, played = small(['effects'])
     assert outcome.answered and [one[0] for one in played] == ['tell_apart_edges']
 
