@@ -121,12 +121,12 @@ def identify(run: 'RecordedRun', model: str, settings: Settings, folder: Path) -
     data = found.to_dict()
     save_identification(found, [run], folder)
     share_plotly(folder / 'report.html')
-    known = [one for one in data['numbers'] if one['status'] == 'determined']
-    open_names = [one['name'] for one in data['numbers'] if one not in known]
+    open_names = found.open_names
     return {'verdict': 'incomplete' if found.incomplete else (
         'not determined' if open_names else 'determined'),
         'reason': f'not determined: {", ".join(open_names)}' if open_names else '',
-        'sizes': [size(one['name'], 'number', 'value', one, None) for one in known],
+        'sizes': [size(one['name'], 'number', 'value', one, None) for one in data['numbers']
+                  if one['name'] not in open_names],
         'ambiguous': [], 'least': {}, 'bad': False}
 
 

@@ -66,8 +66,8 @@ def save_identification(result: 'Identification', runs: 'Sequence[Run]', out_dir
 
 def page(result: 'Identification', runs: 'Sequence[Run]') -> str:
     """Return the page of a result as HTML."""
-    known = len(result.found) - len(result.open_names)
-    lead = f'{known} of {len(result.found)} unknown numbers are determined by these recordings.'
+    known = len(result.wanted) - len(result.open_names)
+    lead = f'{known} of {len(result.wanted)} unknown numbers are determined by these recordings.'
     body = table(('number', 'status', 'value', '95 % interval'),
                  [(one.number.name, one.verdict, *one.shown()) for one in result.found])
     body += ''.join(paragraph(f'Known together: {c.text()}.') for c in result.combinations)

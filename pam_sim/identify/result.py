@@ -121,6 +121,8 @@ class Identification:
         Name -> unit, ``rmse_before`` and ``rmse_after``, SI.
     incomplete : bool
         Whether the numbers alone leave more than noise, so that effects were fitted along.
+    wanted : list of str
+        Names of all unknown numbers, also of those that nothing in the recordings depends on.
     next_experiment : dict or None
         ``why``, ``determines`` (names), ``experiment`` (for ``pam run``) and ``added_kg``.
     remarks : list of str
@@ -135,6 +137,7 @@ class Identification:
     records: list[dict[str, Any]]
     signals: dict[str, dict[str, Any]]
     incomplete: bool
+    wanted: list[str]
     next_experiment: dict[str, Any] | None = None
     remarks: list[str] = field(default_factory=list)
     bent: list[str] = field(default_factory=list)
@@ -146,7 +149,8 @@ class Identification:
     @property
     def open_names(self) -> list[str]:
         """Return the names of the numbers that are not determined."""
-        return [one.number.name for one in self.found if one.status != DETERMINED]
+        known = {one.number.name for one in self.found if one.status == DETERMINED}
+        return [name for name in self.wanted if name not in known]
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data for JSON."""

@@ -130,6 +130,7 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
             law, f'{LAW_AND_EFFECT}; pam gap fits both', runs, rig,
             unknown=[name for name in unknown if name not in law], added_kg=added_kg, seed=seed,
             advise=advise, progress=progress, spare_certify=spare_certify)
+        found.wanted = [n.name for n in wanted]
         found.remarks = [*of_commands, *found.remarks]      # it has those of the offers
         return found
     forms: FloatArray = np.zeros(len(acting))       # doubt by the formulation, in coordinates
@@ -158,7 +159,7 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
     result = Identification(
         _identified(rig, numbers_found), numbers_found, combinations,
         [{'path': one.path, 'kind': one.kind, 'added_kg': one.added_kg} for one in offers],
-        _signals(before, _rms(squares)), incomplete, bent=bent)
+        _signals(before, _rms(squares)), incomplete, [n.name for n in wanted], bent=bent)
     result.remarks += [f'{one.path}: {one.rest.text()}' for one in offers if one.rest]
     result.remarks += [*of_commands, *of_offers]
     result.remarks += [] if force_compared else of_one_scale(acting)

@@ -42,6 +42,7 @@ import pam_sim
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.files import cannot_write, UNFINISHED, write_json, write_text
+from pam_sim.identify.result import Identification
 import pytest
 
 MODEL = 'dmsp_5_300_hanging_mass'
@@ -152,6 +153,14 @@ def test_a_difference_of_rounding_counts_as_none(tmp_path, monkeypatch):
     monkeypatch.setattr('pam_actuation.replay.model.is_joint', lambda run: False)
     found = WORKS['replay'](None, '', Settings('replay'), tmp_path)
     assert [one['value'] for one in found['sizes']] == [0.0, 1e-3, 0.0]
+
+
+def test_a_number_that_nothing_depends_on_is_not_determined(tmp_path, monkeypatch):
+    monkeypatch.setattr('pam_sim.identify.identify', lambda runs, rig, *given: Identification(
+        rig, [], [], [], {}, False, ['mass_kg', 'force_zero_n']))
+    found = WORKS['identify'](None, MODEL, Settings('identify'), tmp_path)
+    assert (found['verdict'], found['reason']) == (
+        'not determined', 'not determined: mass_kg, force_zero_n')
 
 
 def test_the_key_is_of_recording_model_settings_and_code(lab, tmp_path, monkeypatch):

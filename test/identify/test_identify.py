@@ -18,6 +18,7 @@ import json
 
 from made_records import inside, record, RIG, spring
 import numpy as np
+from pam_actuation.report.identify import page
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.identify import identify
@@ -95,6 +96,7 @@ def test_a_valve_is_identified_from_command_and_pressure_alone():
     assert inside(found['K_m'], 117e3) and inside(found['T_m'], 0.11)
     assert inside(found['pressure_zero_pa'], -6e3)
     assert 'mass_kg' in found.remarks[0] and 'record a contraction' in found.remarks[0]
+    assert found.open_names == ['mass_kg'] and '3 of 4 unknown numbers' in page(found, [run])
 
 
 def test_a_log_that_misses_pulses_of_on_off_valves_tells_nothing_of_the_valve():

@@ -96,7 +96,7 @@ def test_the_next_experiment_is_run_on_the_rig_that_was_recorded(bag, tmp_path, 
                                                                  monkeypatch):
     """The rig of the bag is a file of its own, so what was found of it is simulated."""
     def identify(runs, rig, *_, **__):
-        return Identification(rig, [], [], [], {}, False, next_experiment={
+        return Identification(rig, [], [], [], {}, False, [], next_experiment={
             'name': 'stairs_with_more_mass', 'why': 'the same steps', 'determines': [],
             'experiment': {'name': 'stairs'}, 'added_kg': 1.2, 'needs_force': True})
     monkeypatch.setattr('pam_sim.identify.identify', identify)

@@ -125,7 +125,7 @@ def test_beside_a_missing_effect_the_law_is_left_to_the_look_for_it():
                  keep=('pressure', 'contraction'))
     found = identify(run, RIG, ['law.a3', 'spring_n_per_m'], advise=False)
     assert [one.number.name for one in found.found] == ['spring_n_per_m']
-    assert 'law.a3' in found.rig.unknown
+    assert 'law.a3' in found.rig.unknown and 'law.a3' in found.open_names
     assert found.rig.number('law.a3') == RIG.number('law.a3')
     assert any('law.a3: as in the model' in remark for remark in found.remarks)
     with pytest.raises(InputError, match='record a force, or let pam gap fit both'):
