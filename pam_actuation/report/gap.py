@@ -145,6 +145,7 @@ def gap_of(runs: 'Sequence[Run]', model: 'StrPath | Rig', certify: 'Run | None' 
     result.model = held
     result.remarks += remarks + sayings
     if found is not None:
+        found.remarks = [one for one in found.remarks if one not in result.remarks]
         result.numbers_first, result.first_lines = numbers_block(found), numbers_text(found)
     pieces = not_played(rig.valve, played)
     if len(result.rivals) > 1 and pieces:

@@ -17,7 +17,9 @@
 from collections.abc import Callable, Sequence
 
 from pam_sim.errors import InputError
+from pam_sim.gap.criteria import CRITERIA
 from pam_sim.gap.data.health import check_for, without_dead
+from pam_sim.gap.data.holes import split_at_holes
 from pam_sim.identify.result import Identification
 from pam_sim.identify.settled import ZERO
 from pam_sim.identify.workflow import identify_beside
@@ -54,7 +56,8 @@ def numbers_first(runs: Sequence[Run], rig: Rig, holds_certify: bool, seed: int 
     """
     law = rig.unknown_of_law
     others = [name for name in rig.unknown if name not in law]
-    if not others or not all(check_for(run, rig).usable for run in runs):
+    parts, *_, refusals = split_at_holes(runs, None, CRITERIA.min_duration_s, rig.is_driven)
+    if not others or refusals or not all(check_for(run, rig).usable for run in parts):
         return rig, None, []
     try:
         found = identify_beside(law, FITTED_LATER, [without_dead(run) for run in runs], rig,

@@ -18,10 +18,15 @@ import json
 
 import jsonschema
 from made_records import record, RIG
-from pam_actuation.report.gap import write_gap
+from pam_actuation.report import gap
+from pam_actuation.report.gap import gap_of, write_gap
 from pam_sim import load_rig
 from pam_sim.gap.report.schema import report_schema
+from pam_sim.gap.result import GapResult
+from pam_sim.identify import before_gap
 from pam_sim.identify.before_gap import numbers_first
+from pam_sim.identify.records import offers_of
+from pam_sim.identify.result import Identification
 from pam_sim.tolerance import UNKNOWN
 import pytest
 
@@ -53,6 +58,26 @@ def test_without_an_unknown_number_or_with_a_bag_that_cannot_be_used_nothing_is_
     unknown = RIG.with_(tolerance={'mass_kg': UNKNOWN})
     rig, found, remarks = numbers_first([run], unknown, True)
     assert rig == unknown and found is None and remarks == []
+
+
+def test_a_recording_with_a_hole_is_used_first_too_and_the_hole_told_once(monkeypatch):
+    run, unknown = record(RIG, hold_s=1.6), RIG.with_(tolerance={'mass_kg': UNKNOWN})
+    for topic in run.topics.values():
+        keep = abs(topic.stamp_ns - 5.4e9) > 0.4e9
+        topic.stamp_ns = topic.stamp_ns[keep]
+        topic.values = {key: value[keep] for key, value in topic.values.items()}
+
+    def identified(law, why, runs, rig, **options):
+        _, hole = offers_of(runs, rig, [0.0])
+        return Identification(rig, [], [], [], {}, False, ['mass_kg'],
+                              remarks=[*hole, 'of the numbers'])
+
+    monkeypatch.setattr(before_gap, 'identify_beside', identified)
+    found = numbers_first([run], unknown, True)[1]
+    assert 'count as 2 recordings' in found.remarks[0]
+    monkeypatch.setattr(gap, 'find_gap', lambda *given, **options: GapResult(
+        'no_gap', '', remarks=found.remarks[:1]))
+    assert gap_of([run], unknown).numbers_first['remarks'] == ['of the numbers']
 
 
 def test_an_unknown_law_is_held_at_first_and_nobody_is_asked_to_state_it_as_unknown():
