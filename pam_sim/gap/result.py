@@ -98,6 +98,8 @@ class SubsystemVerdict:
         Of that signal.
     unexplained_fraction : float
         Share of the squared gap after calibration that is left, over all its signals.
+    is_slight : bool
+        Whether ``no_gap`` leaves what would matter with a materiality of 1.
 
     """
 
@@ -106,6 +108,7 @@ class SubsystemVerdict:
     signal: str
     gap: SignalGap
     unexplained_fraction: float
+    is_slight: bool = False
 
     @property
     def unexplained(self) -> float:
@@ -114,10 +117,10 @@ class SubsystemVerdict:
 
     def text(self) -> str:
         """Return it in a few words, such as ``creep and hysteresis, 0.4 mm unexplained``."""
-        if self.verdict == 'no_gap':
-            return 'no gap beyond noise'
         factor, unit = READABLE[self.signal]
         left = f'{self.unexplained * factor:.3g} {unit} unexplained'
+        if self.verdict == 'no_gap':
+            return f'{left}, too small to matter' if self.is_slight else 'no gap beyond noise'
         between = ' or ' if self.verdict == 'ambiguous' else ' and '
         return f'{between.join(self.names)}, {left}' if self.names else left
 
@@ -187,6 +190,8 @@ class GapResult:
         By ``valve`` or ``muscle``, why the recordings tell nothing of it.
     noticed : list of Notice
         What is no noise, where it makes an answer ``unknown``.
+    is_slight : bool
+        Whether ``no_gap`` leaves what would matter with a materiality of 1.
     model : dict, optional
         Which model was held against the recordings, and which rig they name: the entry of
         gap.json.
@@ -229,6 +234,7 @@ class GapResult:
     subsystems: dict[str, SubsystemVerdict] = field(default_factory=dict)
     not_judged: dict[str, str] = field(default_factory=dict)
     noticed: list[Any] = field(default_factory=list)
+    is_slight: bool = False
     model: dict[str, Any] | None = None
     recorded: dict[str, Any] = field(default_factory=dict)
     numbers_first: dict[str, Any] | None = None

@@ -67,10 +67,12 @@ def decide(result: GapResult, outcome: Outcome, validation: Validation, material
         return runs
 
     runs = judged(validation)
-    if result.verdict == 'unknown' and outcome.named:
-        # Too small for a name; the gap is another one.
-        small = join(w.name for w in outcome.named)
-        result.remarks.append(f'What {small} would explain is too small to matter.')
+    small = [w.name for w in outcome.named]
+    if result.verdict == 'unknown' and small or (
+            result.verdict == 'no_gap' and validation.final.hypothesis.names):
+        # Too small for a name, or a number within its tolerance; a gap that is left is another.
+        if small:
+            result.remarks.append(f'What {join(small)} would explain is too small to matter.')
         outcome.named = []
         runs = judged(validation.of(validation.base))
     if given_suffices(result, runs.validation, materiality):
@@ -148,6 +150,8 @@ def judge(result: GapResult, outcome: Outcome, validation: Validation, materiali
         is_left = _is_left(result, validation, max(materiality, 1.0))
         result.noticed = _noticed(validation, materiality, None if is_left else runs)
         result.verdict, result.effects, result.parameters = 'no_gap', [], []
+        result.is_slight = not is_left and materiality > 1.0 and _is_left(
+            result, validation, 1.0)
         if is_left or result.noticed:
             result.verdict, result.unexplained_fraction = 'unknown', 1.0
         return

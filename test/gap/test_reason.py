@@ -69,6 +69,15 @@ def test_a_quantity_in_words_has_no_unit(name, words):
     assert in_words(name) == words
 
 
+def test_no_gap_by_the_materiality_that_was_given_is_told_with_its_sizes():
+    assert said('no_gap', {'pressure': PRESSURE}, is_slight=True) == (
+        'The calibrated model misses 8 kPa of pressure. This is too small to matter by the '
+        'materiality that was given.')
+    assert 'within sensor noise' in said('no_gap', {'pressure': PRESSURE, 'force': FORCE})
+    slight = SubsystemVerdict('no_gap', (), 'force', FORCE, 1.0, is_slight=True)
+    assert slight.text() == '0.191 N unexplained, too small to matter'
+
+
 def test_a_search_that_was_cut_short_says_so_and_claims_nothing_of_what_was_not_tried():
     assert 'no known effect explains it' in said('unknown', {'pressure': PRESSURE})
     assert said('unknown', {'pressure': PRESSURE}, complete=False) == (

@@ -169,7 +169,8 @@ def test_a_valve_that_opens_as_late_as_it_closes_only_delays(form, open_s, close
 
 @pytest.mark.parametrize('off, materiality, highest, spread, verdict', [
     (0.9, 0.3, 1.0, 0.0, 'no_gap'), (1.3, 0.3, 1.0, 0.0, 'unknown'),
-    (1.3, 1.0, 1.0, 0.0, 'unknown'), (1.3, 1.5, 1.0, 0.0, 'no_gap'),
+    (1.3, 1.0, 1.0, 0.0, 'unknown'), (1.3, 1.5, 1.0, 0.0, 'slight'),
+    (0.9, 1.5, 1.0, 0.0, 'no_gap'),
     (1.3, 1.0, 1.4, 0.0, 'no_gap'),             # the drift of a valve may be half of it
     (1.3, 1.0, 1.0, 0.6, 'no_gap')])            # or the doubt about its numbers
 def test_a_gap_without_a_name_must_be_clear(
@@ -187,7 +188,30 @@ def test_a_gap_without_a_name_must_be_clear(
         noise={'pressure': 1.0}, highest_floor={'pressure': highest}, unexplained=lambda: 1.0,
         estimator=SimpleNamespace(criteria=CRITERIA, problems=[]), base=found, final=found)
     verdict_module.judge(result, outcome, validation, materiality, None)
-    assert result.verdict == verdict
+    assert result.verdict == ('no_gap' if verdict == 'slight' else verdict)
+    assert result.is_slight == (verdict == 'slight')
+
+
+@pytest.mark.parametrize('verdict, named, names, kept', [
+    ('no_gap', ['creep'], ('creep',), 'base'), ('no_gap', [], ('mass_kg',), 'base'),
+    ('unknown', ['creep'], ('creep',), 'base'), ('unknown', [], ('mass_kg',), 'final'),
+    ('effects', ['creep'], ('creep',), 'final')])
+def test_what_is_too_small_for_a_name_is_not_left_in_the_model(
+        monkeypatch, verdict, named, names, kept):
+    result = SimpleNamespace(verdict=verdict, remarks=[])
+    outcome = SimpleNamespace(named=[NamedEffect(n, 'muscle', [], (n,)) for n in named])
+    validation = SimpleNamespace(
+        kept='final', base='base', final=SimpleNamespace(hypothesis=SimpleNamespace(names=names)),
+        of=lambda final: SimpleNamespace(kept=final))
+    monkeypatch.setattr(verdict_module, 'OwnRuns', lambda validation: SimpleNamespace(
+        validation=validation))
+    for one in ('fill', 'judge', 'given_suffices'):
+        monkeypatch.setattr(verdict_module, one, lambda *given: False)
+    runs = verdict_module.decide(result, outcome, validation, 1.0)
+    assert runs.validation.kept == kept
+    small = bool(named) and kept == 'base'
+    assert result.remarks == ['What creep would explain is too small to matter.'] * small
+    assert bool(outcome.named) == (bool(named) and not small)
 
 
 @pytest.mark.parametrize('tied, named', [

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from pam_sim.gap.result import GapResult, SignalGap
 
 VERDICT_TEXT = {
-    'no_gap': 'No gap beyond noise', 'parameter': 'A parameter of the model is wrong',
+    'no_gap': 'No gap that matters', 'parameter': 'A parameter of the model is wrong',
     'unknown': 'A gap is there; its cause is not named', 'effects': 'Missing effects named',
     'partial': 'A part of the gap is named; much of it is not explained',
     'ambiguous': 'These data cannot tell the rivals apart', 'refused': 'Data not usable'}

@@ -63,7 +63,8 @@ def subsystem_verdicts(result: GapResult, named: list[NamedEffect], runs: OwnRun
                 found[s].unexplained_fraction >= criteria.partial_share):
             found[s] = replace(found[s], verdict='partial')
     if result.verdict == 'no_gap':
-        return found
+        return {s: replace(one, is_slight=result.is_slight and _left(
+            runs.gaps[s], result, criteria) > criteria.likely_sd) for s, one in found.items()}
     open_ones = [s for s, one in found.items() if one.verdict == 'no_gap']
     least = criteria.likely_sd * max(materiality, 1.0)
     left = {s: _left(runs.gaps[s], result, criteria) for s in open_ones}

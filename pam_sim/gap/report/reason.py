@@ -38,6 +38,8 @@ def explain(result: GapResult, outcome: Outcome, harms: Iterable[Harm] = ()) -> 
 
 
 def _told(result: GapResult, outcome: Outcome) -> str:
+    if result.verdict == 'no_gap' and result.is_slight:
+        return f'{_missed(result)}. This is too small to matter by the materiality that was given.'
     if result.verdict == 'no_gap' and 'valve' in result.not_judged:
         return 'Muscle and load of the model, driven by the measured pressure, follow the ' \
             'recording within sensor noise and stamps, their numbers calibrated within their ' \
