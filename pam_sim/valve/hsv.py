@@ -94,7 +94,8 @@ def pulse_edges(pulse_s: float, last_off_s: float, period_s: float, open_time_s:
     carry = max(last_off_s - period_s, 0.0)
     if pulse_s <= 0.0:
         return 0.0, carry
-    if last_off_s >= period_s:
+    still_on = close_time_s == 0.0 and last_off_s == period_s
+    if carry > 0.0 or still_on:
         return 0.0, max(carry, pulse_s + close_time_s)
     energised_s = max(-last_off_s, 0.0)
     if energised_s + pulse_s <= open_time_s:
