@@ -43,6 +43,7 @@ from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.files import cannot_write, UNFINISHED, write_json, write_text
 from pam_sim.identify.result import Identification
+from pam_sim.run import Run
 import pytest
 
 MODEL = 'dmsp_5_300_hanging_mass'
@@ -158,7 +159,7 @@ def test_a_difference_of_rounding_counts_as_none(tmp_path, monkeypatch):
 def test_a_number_that_nothing_depends_on_is_not_determined(tmp_path, monkeypatch):
     monkeypatch.setattr('pam_sim.identify.identify', lambda runs, rig, *given: Identification(
         rig, [], [], [], {}, False, ['mass_kg', 'force_zero_n']))
-    found = WORKS['identify'](None, MODEL, Settings('identify'), tmp_path)
+    found = WORKS['identify'](Run({}), MODEL, Settings('identify'), tmp_path)
     assert (found['verdict'], found['reason']) == (
         'not determined', 'not determined: mass_kg, force_zero_n')
 

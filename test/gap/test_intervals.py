@@ -136,7 +136,9 @@ def test_of_opening_and_closing_times_only_the_difference_is_told():
         assert 0.0 <= said['equivalent'][name]['ci95'][0]
         assert said['parameters'][name] == said['equivalent'][name]
     assert len(said['together']) == 1
-    assert said['together'][0].startswith('close_time_s - open_time_s = 0.0003')
+    sentence = said['together'][0]
+    assert sentence.startswith('close_time_s - open_time_s = ')
+    assert float(sentence.split()[4]) == pytest.approx(CLOSE_S - OPEN_S, abs=1e-5)
     assert f'the data determine only {said["together"][0]}' in result.reason
 
 

@@ -111,6 +111,7 @@ def test_the_next_experiment_is_run_on_the_rig_that_was_recorded(bag, tmp_path, 
 def test_a_recording_on_the_page_has_the_kind_of_all_its_stretches():
     records = [{'path': path, 'kind': kind, 'added_kg': 0.0} for path, kind in (
         ('a', 'valve'), ('a', 'valve'), ('b', 'valve'), ('b', 'muscle and load'))]
-    html = page(Identification(RIG, [], [], records, {}, False), [Run({}, path=p) for p in 'ab'])
+    result = Identification(RIG, [], [], records, {}, False, [])
+    html = page(result, [Run({}, path=p) for p in 'ab'])
     assert re.findall('<th[^>]*>(recording [^<]*)', html) == [
         'recording 1: valve', 'recording 2: valve, muscle and load']
