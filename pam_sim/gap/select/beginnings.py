@@ -23,6 +23,7 @@ rivals, as a beam search does.
 from collections.abc import Sequence
 
 from pam_sim.gap.select.backward import backward_elimination, is_missed, Selected
+from pam_sim.gap.select.comparison import gap
 from pam_sim.gap.select.context import SearchContext
 from pam_sim.gap.select.forward import forward_selection
 from pam_sim.gap.select.refit import fit_without
@@ -56,9 +57,15 @@ def begun_otherwise(context: SearchContext, selected: Selected, first: Sequence[
                          and r.share.get(s, 0.0) >= context.criteria.first_gain),
                         key=lambda r: -r.share[s])
         for rival in likely[:BEGINNINGS]:
-            if context.is_open(problem, selected.fit) and not context.out_of_time():
+            if _leaves_more(context, problem, selected) and not context.out_of_time():
                 selected = _better(context, problem, selected, best, rival)
     return selected
+
+
+def _leaves_more(context: SearchContext, problem: SubsystemProblem, selected: Selected) -> bool:
+    """Tell whether more is left to explain than an error of the noise floor would leave."""
+    return context.is_open(problem, selected.fit) and gap(
+        problem, selected.fit.errors[problem.subsystem]) > context.criteria.near_floor
 
 
 def _better(context: SearchContext, problem: SubsystemProblem, selected: Selected,
