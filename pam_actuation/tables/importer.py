@@ -94,10 +94,10 @@ class Recording:
 
     def between(self, begin_s: float, end_s: float) -> 'Recording':
         """
-        Return what lies between two times after the start; InputError if that is nothing.
+        Return what lies between two times after the start; InputError without any value.
 
         A signal without a value there is left out, and a doubt says so. So is one that makes no
-        message without it.
+        message without it. A joint needs its angle.
         """
         first = min(int(stamps[0]) for stamps, _ in self.signals.values())
         signals, found = {}, [*self.found]
@@ -115,6 +115,9 @@ class Recording:
                 del signals[name]
                 found.append(Doubt(f'{name} (column "{self.mapping.signals[name].column}") is '
                                    f'left out with {partner}; {_has_both(name)}'))
+        if 'angle' in self.signals and 'angle' not in signals:
+            raise InputError(f'no angle lies between {begin_s:g} and {end_s:g} s, and a joint '
+                             'needs one', '--from and --to')
         if not signals:
             raise InputError(f'no value lies between {begin_s:g} and {end_s:g} s; the recording '
                              f'has {self.duration_s:.6g} s', '--from and --to')

@@ -104,9 +104,10 @@ class Table:
         """Return where a row stands, for people: file and line, or file and row or message."""
         if self.lines is not None:
             return f'{self.source}:{self.lines[row]}'
+        number = 1 + (row if self.numbered is None else int(self.numbered[row]))
         if self.topic:
-            return f'{self.source}, {self.topic}, message {row + 1}'
-        return f'{self.source}, row {row + 1}'
+            return f'{self.source}, {self.topic}, message {number}'
+        return f'{self.source}, row {number}'
 
     def begins_with_text(self, name: str) -> bool:
         """Return whether the first value of a column is no number."""

@@ -343,6 +343,7 @@ def test_a_rate_is_that_of_the_rows_of_the_file(ending, tmp_path):
     clock = clock_of(table, TableMapping(rate_hz=100.0))
     assert (clock.stamp_ns - messages.START_NS).tolist() == [10**8 * k for k in range(5)]
     assert clock.told == '100 rows a second'
+    assert table.place(3).endswith(('row 31', '.csv:32'))
 
 
 def test_a_file_without_names_begins_with_its_time(tmp_path, monkeypatch, capsys):

@@ -22,6 +22,7 @@ from pam_actuation.tables.mapping import ColumnMap, TableMapping
 from pam_actuation.tables.repeats import without_repeats
 from pam_actuation.tables.signals import BY_NAME
 from pam_actuation.tables.units import Unit
+from pam_sim.errors import InputError
 import pytest
 
 ROWS = 2000
@@ -118,3 +119,13 @@ def test_what_makes_no_message_alone_is_left_out_with_its_partner(lost, left, tm
                                                  f'{BY_NAME[lost].topic} has both')
     assert [*write_bag(recording, tmp_path / 'bag').values()] == [601]
     assert set(whole.between(0.2, 1.8).signals) == {other, left, lost}
+
+
+def test_a_joint_keeps_its_angle():
+    stamps, values = 10**6 * NUMBERS, 1e5 + NUMBERS % 7
+    gone = np.where(NUMBERS < 1000, values, np.nan)
+    whole = Recording({'flexor/pressure': (stamps, values), 'angle': (stamps, gone)}, TableMapping(
+        signals={name: ColumnMap(f'a {name}', Unit('', 1.0)) for name in (
+            'flexor/pressure', 'angle')}))
+    with pytest.raises(InputError, match='no angle lies between 1.2 and 1.8 s'):
+        whole.between(1.2, 1.8)
