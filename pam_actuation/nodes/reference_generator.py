@@ -23,6 +23,7 @@ from typing import Any
 
 from pam_actuation.bags.ending import FINISHED
 from pam_actuation.bags.ending import PLAYING
+from pam_actuation.drivers.limits import SafetyLimits
 from pam_actuation.drivers.parameter import node_parameter
 from pam_actuation.nodes.diagnostics import OK, Values
 from pam_actuation.nodes.endpoints import PolledSubscription
@@ -38,7 +39,8 @@ MEASURED = {'contraction': 'contraction_m', 'force': 'force_n', 'pressure': 'pre
             'joint_state': 'angle_rad'}
 OF_DOMAIN = {'contraction': ('contraction',), 'force': ('force',),
              'joint_angle': ('joint_state',)}
-CLOCK_STEP_S = 0.3          # as the driver; a clock that is slewed stays far below it
+# As for the driver. A clock that is slewed takes the steady clock with it.
+CLOCK_STEP_S = SafetyLimits().pause_s
 UNTRACKED = 'pressure', 'contraction', 'force'      # of an experiment that tracks nothing
 
 

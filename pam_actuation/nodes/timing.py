@@ -67,8 +67,8 @@ class ClockSteps:
     Tells whether the clock of the stamps was set since ``begin``.
 
     Each method takes the time by that clock, read between two times of the clock that the loops
-    run on, so that a process that stood still between two of the readings proves nothing. All
-    times in ns.
+    run on. A process that stood still between two of the readings thus proves nothing. The
+    ``ClockMonitor`` of a driver judges one tick, this one all since ``begin``. All times in ns.
     """
 
     def __init__(self) -> None:
