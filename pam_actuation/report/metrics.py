@@ -35,7 +35,8 @@ from pam_actuation.report.errors import (
 from pam_actuation.report.learning import learned_worse, times_rolled_back
 from pam_sim.annotations import FloatArray
 from pam_sim.short_repr import short_repr
-from pam_sim.units import GAS_CONSTANT_AIR, P_ATM_PA, RHO_REFERENCE, TEMPERATURE_K
+from pam_sim.units import (
+    EMPTY_PA, GAS_CONSTANT_AIR, P_ATM_PA, RHO_REFERENCE, TEMPERATURE_K)
 
 if TYPE_CHECKING:
     from pam_actuation.control.delay_estimate import PathEstimate
@@ -44,7 +45,6 @@ if TYPE_CHECKING:
 
 STEP_MIN_M = 1.5e-3          # a reference jump this large within 30 ms counts as a step
 STEP_WITHIN_S = 0.03
-EMPTY_PA = 10e3              # gauge: an open vent of an emptier muscle limits nothing
 SETTLING_BAND = 0.05         # of the step, the usual 5 % band
 SETTLING_BAND_MIN_M = 0.3e-3  # below this a band would test the sensor, not the loop
 

@@ -30,7 +30,7 @@ from pam_actuation.tables.units import (
 from pam_actuation.tables.words import unit_in
 from pam_actuation.topics.table import topic_of
 from pam_sim.annotations import BoolArray, FloatArray, IntArray
-from pam_sim.units import P_ATM_PA
+from pam_sim.units import EMPTY_PA, P_ATM_PA
 
 LONGEST_STROKE = 0.5                 # of the length at rest: no muscle moves by more
 FAR = 20.0                           # times the range of the others: no value of the rig
@@ -45,8 +45,7 @@ HUGE = 1e30
 # Below, another unit is likely.
 LEAST_MOVE = {PRESSURE: 200.0, LENGTH: 5e-5, FORCE: 0.2, ANGLE: 2e-3}
 NEAR_ATMOSPHERE_PA = 5e3
-EMPTY_PA = 10e3                      # gauge, below which no muscle holds a load up
-FEWEST_EMPTY = 3                     # values there
+FEWEST_EMPTY = 3                     # values of an empty muscle
 MOST_DROPPED = 0.1                   # of the values; more zeros are no sensor that drops out
 DROP_STEPS = 1.5                     # times the largest other step: into a zero and out of it
 FEWEST_HELD = 100                    # values of a muscle that is held
