@@ -195,7 +195,7 @@ def saturation_share(run: 'Run', rig: 'Rig | None' = None) -> tuple[float | None
     Return (low, high): share of valve messages at the lower / upper limit, or None.
 
     PPR: the lowest and highest input of the regulator of ``rig``; without the rig they are not
-    known. HSV: high is either duty fully open, the vent while there is air to vent; low has no
+    known. HSV: high is either duty fully open, the vent while there is air to vent. Low has no
     meaning there (both shut is the wanted rest state) and is None.
     """
     duty = signals.series(run, 'valve_signal', 'fill_duty')
