@@ -41,13 +41,16 @@ from pam_actuation.experiments.separating_joint import InJoint, LOOPS
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.gap.criteria import CRITERIA
+from pam_sim.gap.data.noise import sensor_floor
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.split import SELECT
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
 from pam_sim.gap.select.comparison import gap, preference, share
+from pam_sim.gap.subsystems.parallel import parallel_map
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.gap.subsystems.problems import subsystem_problems
+from pam_sim.gap.subsystems.simulation import free_run
 from pam_sim.located_yaml import dump_yaml
 from pam_sim.rig import Rig
 from pam_sim.run import Run
@@ -65,6 +68,7 @@ SENSOR_NOISE = {'pressure': 'pressure_noise_pa', 'contraction': 'contraction_noi
 PREFIX = 'tell_apart'
 LEAST = 0.05                 # floors per sample; rivals that differ by less give the same signals
 CLEAR = 1.0                  # floors per sample between rivals that need no further sensor
+ALIKE = 1e-3                 # of normalised parameters: so near, two starts are one
 SURE_T = 4.0                 # of a test on simulated data; the rig's own forms take a part of it
 SURE_SHARE = 10.0 * CRITERIA.same_form_share
 
@@ -302,11 +306,11 @@ def separation(run: Run, rig: Rig, rivals: Sequence[Rival],
     topics = {k: v for k, v in run.topics.items() if with_force or k != 'force'}
     recording = Recording(type(run)(topics, run.metadata, run.namespace, run.path), rig.valve,
                           rig.is_driven)
+    apart = _apart(recording, [model for _, model, _, _ in rivals])
+    if apart < LEAST:           # a refit brings them nearer still
+        return apart, 0.0
     estimator = Estimator(rig, subsystem_problems(rig, [recording], certify_runs=0))
-    # Those with the same parameters begin alike: where a fit ends must not tell them apart.
-    first, *others = (min((estimator.fit(hypothesis, theta) for _, _, like, theta in rivals
-                           if _parameters(like) == _parameters(hypothesis)), key=estimator.cost)
-                      for _, _, hypothesis, _ in rivals)
+    first, *others = _fitted(estimator, rivals)
     for problem in estimator.problems:
         # As in the search: where the floor is careful, gaps would begin above what the truth left.
         s = problem.subsystem
@@ -321,6 +325,33 @@ def separation(run: Run, rig: Rig, rivals: Sequence[Rival],
         decided = min(decided, max(_decided(estimator, c, first, other)
                                    for c in estimator.problems))
     return float(nearest), float(decided)
+
+
+def _apart(recording: Recording, models: Sequence[Rig]) -> float:
+    """Return how far the model nearest to the first is off it, in floors of the sensors (rms)."""
+    first, *others = (free_run(model, recording) for model in models)
+    floors = {s: sensor_floor(recording.time_s[s], recording.measured[s], s) for s in first}
+    return min(math.sqrt(sum(float(np.mean(((other[s] - first[s]) / floor) ** 2))
+                             for s, floor in floors.items())) for other in others)
+
+
+def _fitted(estimator: Estimator, rivals: Sequence[Rival]) -> list[Fit]:
+    """
+    Return the best fit of every rival.
+
+    Those with the same parameters begin alike: where a fit ends must not tell them apart.
+    """
+    starts: dict[int, list[FloatArray]] = {}
+    for place, (_, _, hypothesis, _) in enumerate(rivals):
+        starts[place] = []
+        for _, _, like, theta in rivals:
+            if _parameters(like) == _parameters(hypothesis) and not any(
+                    np.allclose(theta, known, ALIKE, ALIKE) for known in starts[place]):
+                starts[place].append(theta)
+    jobs = [(place, theta) for place, several in starts.items() for theta in several]
+    fits = parallel_map(lambda job: estimator.fit(rivals[job[0]][2], job[1]), jobs)
+    return [min((f for (of, _), f in zip(jobs, fits) if of == place), key=estimator.cost)
+            for place in starts]
 
 
 def _parameters(hypothesis: Hypothesis) -> list[tuple[str, ...]]:

@@ -21,7 +21,7 @@ from types import SimpleNamespace
 from gap_rivals import Blocks, errors, Tied
 from gap_runs import nominal, recorded
 import numpy as np
-from pam_actuation.experiments.separating import separation
+from pam_actuation.experiments import separating
 from pam_sim.gap.criteria import CRITERIA
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.split import FIT, SELECT
@@ -127,7 +127,7 @@ def test_the_certify_run_confirms_what_is_real(real, share):
 def test_an_experiment_must_decide_in_many_places():
     names = ('valve_dead_time', 'tube_lag')
     by_name = {c.effect: c for c in candidates(nominal(), ('pressure', 'contraction'))}
-    rivals = [(n, None, Hypothesis((by_name[n],)), [1.0]) for n in names]
+    rivals = [rival(by_name[n], [1.0]) for n in names]
     truth = nominal().with_(effects=[by_name[names[0]].setting({'delay_s': 0.01})])
     levels = np.random.default_rng(4).uniform(3.2, 5.6, 40)
     many, few = np.repeat(levels, 400), np.repeat((3.2, 5.6, 3.2), (3000, 3000, 2000))
@@ -139,16 +139,31 @@ def test_an_experiment_decides_by_what_the_truth_leaves_not_by_a_floor_above_it(
     """Rivals of nearly one form: what both leave of many steps is below a careful floor."""
     names = ('valve_dead_time', 'tube_lag_two_stage')
     by_name = {c.effect: c for c in candidates(nominal(), ('pressure', 'contraction'))}
-    starts = {n: [f.coordinate(f.typical) for f in by_name[n].free] for n in names}
-    rivals = [(n, None, Hypothesis((by_name[n],)), starts[n]) for n in names]
+    rivals = [rival(by_name[n], by_name[n].typical_start()) for n in names]
     truth = nominal().with_(effects=[by_name[names[0]].setting({'delay_s': 0.0087})])
     steps = np.repeat(np.random.default_rng(4).uniform(3.2, 5.6, 24), 700)
     assert decided(truth, rivals, steps) > 0.2
 
 
+def test_models_that_give_the_same_signals_are_not_fitted(monkeypatch):
+    by_name = {c.effect: c for c in candidates(nominal(), ('pressure', 'contraction'))}
+    rivals = [rival(by_name[n], by_name[n].typical_start())
+              for n in ('coulomb_friction', 'guide_friction')]
+    monkeypatch.setattr(separating, 'Estimator', None)
+    run = recorded(rivals[0][1], np.repeat((3.2, 5.6, 3.2), 1000),
+                   topics=('pressure', 'contraction'))
+    sigma, sure = separating.separation(run, nominal(), rivals, False)
+    assert sigma < separating.LEAST and sure == 0.0
+
+
+def rival(candidate, theta):
+    setting = candidate.setting({f.name: f.value(t) for f, t in zip(candidate.free, theta)})
+    return candidate.name, nominal().with_(effects=[setting]), Hypothesis((candidate,)), theta
+
+
 def decided(truth, rivals, voltage):
     run = recorded(truth, voltage, topics=('pressure', 'contraction'))
-    return separation(run, nominal(), rivals, False)[1]
+    return separating.separation(run, nominal(), rivals, False)[1]
 
 
 def test_a_free_run_knows_how_uncertain_its_start_is():

@@ -171,6 +171,7 @@ def test_what_the_best_leaves_too_and_where_a_fit_began_is_no_difference(
     monkeypatch.setattr(separating, 'Recording', lambda *given: None)
     monkeypatch.setattr(separating, 'subsystem_problems', lambda *given, **more: [Blocks(60)])
     monkeypatch.setattr(separating, 'Estimator', Stops)
+    monkeypatch.setattr(separating, '_apart', lambda *given: np.inf)
     monkeypatch.setattr(Stops, 'noise', noise)
     rivals = [(name, nominal(), Hypothesis(tuple(
         c for c in candidates(nominal(), ('pressure', 'contraction')) if c.effect == name)),
