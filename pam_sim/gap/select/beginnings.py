@@ -81,10 +81,13 @@ def _better(context: SearchContext, problem: SubsystemProblem, selected: Selecte
     estimator.take_slopes(begun.settings(), begun.known_z)
     named = [*(w for w in selected.named if w.subsystem != s),
              NamedEffect(rival.name, s, best.rivals, (rival.name,), [rival])]
-    found = backward_elimination(context, *forward_selection(context, begun, named))
-    if (any(w.subsystem == s for w in found.named)
-            and not context.is_open(problem, found.fit)
-            and is_missed(context, problem, found.fit, selected.fit)):
-        return found
+    current, added = forward_selection(context, begun, named)
+    # Elimination adds nothing to explain with.
+    if len(added) > len(named) or not context.is_open(problem, current):
+        found = backward_elimination(context, current, added)
+        if (any(w.subsystem == s for w in found.named)
+                and not context.is_open(problem, found.fit)
+                and is_missed(context, problem, found.fit, selected.fit)):
+            return found
     back()
     return selected

@@ -50,8 +50,8 @@ def group_of(context: SearchContext, current: Fit, problem: SubsystemProblem
     """
     Return the declared group that explains a subsystem best, as (fit, list of NamedEffect).
 
-    Each member has its rivals beside the others. None where no group is in the pool, or where
-    the time ran out.
+    Each member has its rivals beside the others. None where no group is in the pool, where the
+    best explains too little for any name, or where the time ran out.
 
     Parameters
     ----------
@@ -73,7 +73,8 @@ def group_of(context: SearchContext, current: Fit, problem: SubsystemProblem
         Hypothesis((*h.effects, *s[0]), h.numbers), (*current.theta, *s[1]), current,
         whole=False), starts)
     found = estimator.polish(min(fits, key=estimator.cost))
-    if context.out_of_time():
+    explained = context.ranking.shares(found)[problem.subsystem]
+    if explained < context.criteria.greater_part or context.out_of_time():
         return None
     return found, [_named(context, found, place, problem)
                    for place in range(len(h.effects), len(found.hypothesis.effects))]
