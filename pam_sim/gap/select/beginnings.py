@@ -82,8 +82,8 @@ def _better(context: SearchContext, problem: SubsystemProblem, selected: Selecte
     named = [*(w for w in selected.named if w.subsystem != s),
              NamedEffect(rival.name, s, best.rivals, (rival.name,), [rival])]
     current, added = forward_selection(context, begun, named)
-    # Elimination adds nothing to explain with.
-    if len(added) > len(named) or not context.is_open(problem, current):
+    # Elimination takes away: it closes nothing.
+    if not context.is_open(problem, current):
         found = backward_elimination(context, current, added)
         if (any(w.subsystem == s for w in found.named)
                 and not context.is_open(problem, found.fit)
