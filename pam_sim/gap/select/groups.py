@@ -69,9 +69,10 @@ def group_of(context: SearchContext, current: Fit, problem: SubsystemProblem
         return None
     estimator = context.estimator
     h = current.hypothesis
+    # The best goes on; the others only show where it is.
     fits = parallel_map(lambda s: estimator.fit(
         Hypothesis((*h.effects, *s[0]), h.numbers), (*current.theta, *s[1]), current,
-        whole=False), starts)
+        whole=False, rounds=1), starts)
     found = estimator.polish(min(fits, key=estimator.cost))
     explained = context.ranking.shares(found)[problem.subsystem]
     if explained < context.criteria.greater_part or context.out_of_time():
