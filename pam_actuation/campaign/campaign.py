@@ -208,8 +208,8 @@ def work_and_keep(given: tuple[Settings, str, str], task: Task) -> tuple[float, 
         except Exception as error:      # noqa: B902, a failed case is a row and not an end
             if isinstance(error, InputError) and UNFINISHED in error.where:
                 raise           # its files cannot be written
-            reason = _told(error).replace(task.case.path, THE_RECORDING)
-            found = {'verdict': FAILED, 'reason': reason, **_LOST}
+            found = {'verdict': FAILED, 'reason': _told(error), **_LOST}
+        found['reason'] = found['reason'].replace(task.case.path, THE_RECORDING)
         write_json(folder / RESULT, found)
     return time.perf_counter() - began, time.process_time() - used
 

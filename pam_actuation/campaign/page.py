@@ -95,7 +95,8 @@ def _map(campaign: Campaign) -> Section:
     cells: dict[tuple[str, str], list[str]] = {}
     for row in campaign.rows:
         found = ''.join(dict.fromkeys(marks[size['name']] for size in row['sizes']))
-        mark = '!' if row['bad'] else found or {'no_gap': '·'}.get(row['verdict'], '?')
+        mark = f'{found}!' if row['bad'] else (
+            found or {'no_gap': '·'}.get(row['verdict'], '?'))
         cells.setdefault((row['case'].rig, row['case'].day), []).append(
             f'<a href="{_report(campaign, row)}" title="{text(row["case"].day)}: '
             f'{text(row["verdict"])}">{mark}</a>')
@@ -107,8 +108,8 @@ def _map(campaign: Campaign) -> Section:
     return Section('map', 'Rigs and days', (
         f'<div class="scroll"><table class="grid"><thead><tr><th>rig</th>{head}</tr></thead>'
         f'<tbody>{lines}</tbody></table></div>') + paragraph(
-            f'{key}{"; " if key else ""}· nothing beyond the model; ? no name; ! not usable.',
-            'note'))
+            f'{key}{"; " if key else ""}· nothing beyond the model; ? no name; ! stands out, '
+            'see above.', 'note'))
 
 
 def _series(findings: Findings) -> Section:

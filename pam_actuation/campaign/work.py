@@ -19,13 +19,14 @@ Each kind of work writes its files into a folder and returns what a table shows 
 recordings, models and settings give equal bytes: how long it took is kept elsewhere.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 import json
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
 from pam_actuation.campaign.cases import Case
+from pam_sim.errors import InputError
 from pam_sim.files import write_text
 
 if TYPE_CHECKING:
@@ -157,10 +158,8 @@ def report(run: 'RecordedRun', model: str, settings: Settings, folder: Path) -> 
     summary = (joint_report if MEASURED in run else bag_report)([run], folder / 'report.html')
     share_plotly(folder / 'report.html')
     write_text(folder / 'report.json', json.dumps(summary, indent=2, default=str) + '\n')
-    implausible = list(run.implausible)
-    return {'verdict': 'implausible' if implausible else 'reported',
-            'reason': ' '.join(implausible), 'sizes': [], 'ambiguous': [], 'least': {},
-            'bad': bool(implausible)}
+    return {'verdict': 'implausible' if run.implausible else 'reported', 'reason': '',
+            'sizes': [], 'ambiguous': [], 'least': {}, 'bad': False}
 
 
 WORKS: dict[str, Callable[['RecordedRun', str, Settings, Path], Found]] = {
@@ -175,14 +174,26 @@ def work_on(case: Case, settings: Settings, folder: Path) -> Found:
     Raises
     ------
     InputError
-        The recording or the model cannot be used.
+        The recording or the model cannot be used. ``identify`` takes no values that mean
+        something else than they say, such as a wrong unit.
 
     """
     from pam_actuation.bags.load import load_run
     from pam_actuation.bags.load_joint import load_recording
     load = load_run if settings.work in NEED_A_MODEL else load_recording
-    return WORKS[settings.work](
-        load(case.path, case.namespace), case.model or settings.model, settings, folder)
+    run = load(case.path, case.namespace)
+    if settings.work == 'identify' and run.unusable:
+        raise InputError(run.unusable[0].rstrip('.'), case.path)
+    found = WORKS[settings.work](run, case.model or settings.model, settings, folder)
+    return _with_what_is_wrong(found, (*run.left_out, *run.implausible))
+
+
+def _with_what_is_wrong(found: Found, sentences: Sequence[str]) -> Found:
+    """Return the row with what is wrong in the data as a part of its reason; it stands out."""
+    reason = found['reason']
+    new = [one for one in sentences if one.rstrip('.') not in reason]
+    return {**found, 'reason': ' '.join([reason, *new]).strip(),
+            'bad': found['bad'] or bool(sentences)}
 
 
 def share_plotly(page: Path) -> None:

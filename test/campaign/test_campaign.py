@@ -14,6 +14,7 @@
 
 """A campaign: worked on once, kept whole or not at all, the same bytes after a kill."""
 
+from dataclasses import replace
 import errno
 import json
 import os
@@ -24,6 +25,8 @@ import subprocess
 import sys
 
 import pam_actuation
+from pam_actuation.bags.load import load_run
+from pam_actuation.bags.plausibility import Implausible
 from pam_actuation.campaign import campaign, code, store
 from pam_actuation.campaign.campaign import Campaign, run_campaign, Task, work_and_keep
 from pam_actuation.campaign.cases import Case, find_cases
@@ -32,7 +35,7 @@ from pam_actuation.campaign.findings import find
 from pam_actuation.campaign.page import campaign_page
 from pam_actuation.campaign.results import NO_PARQUET, table_rows, write_table
 from pam_actuation.campaign.store import key_of, Store
-from pam_actuation.campaign.work import Settings, WORKS
+from pam_actuation.campaign.work import Settings, work_on, WORKS
 from pam_actuation.cli.main import main
 from pam_actuation.experiments import load_experiment
 from pam_actuation.experiments.offline import simulate_experiment
@@ -45,6 +48,9 @@ from pam_sim.files import cannot_write, UNFINISHED, write_json, write_text
 from pam_sim.identify.result import Identification
 from pam_sim.run import Run
 import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'bags'))
+from sample_bag import write_bag  # noqa: E402, I100
 
 MODEL = 'dmsp_5_300_hanging_mass'
 EXPERIMENT = """
@@ -162,6 +168,43 @@ def test_a_number_that_nothing_depends_on_is_not_determined(tmp_path, monkeypatc
     found = WORKS['identify'](Run({}), MODEL, Settings('identify'), tmp_path)
     assert (found['verdict'], found['reason']) == (
         'not determined', 'not determined: mass_kg, force_zero_n')
+
+
+def in_kpa(short, i, message):
+    """Return a pressure in kPa, any other message as it is."""
+    return replace(message, pressure_pa=1e-3 * message.pressure_pa) \
+        if short == 'pressure' else message
+
+
+@pytest.mark.parametrize('work, verdict', [
+    ('identify', 'failed'), ('gap', 'refused'), ('report', 'implausible')])
+def test_a_wrong_unit_gives_no_numbers(tmp_path, work, verdict):
+    write_bag(tmp_path / 'runs' / 'run', 400, change=in_kpa)
+    out = tmp_path / 'out'
+    assert main(['campaign', str(tmp_path / 'runs'), '--work', work, '--out', str(out),
+                 *([] if work == 'report' else ['--model', MODEL]),
+                 *(['--unknown', 'mass_kg'] if work == 'identify' else [])]) == (
+                     1 if verdict == 'failed' else 0)
+    [row] = json.loads((out / 'results.json').read_text())['cases']
+    assert (row['verdict'], row['sizes'], row['bad']) == (verdict, [], True)
+    assert 'likely kPa' in row['reason'] and str(tmp_path) not in (
+        out / row['report'] / 'case.json').read_text()
+
+
+@pytest.mark.parametrize('work', sorted(WORKS))
+def test_what_is_wrong_in_the_data_is_told(tmp_path, monkeypatch, work):
+    bag = write_bag(tmp_path / 'run', 20)
+    run = load_run(bag)
+    run = replace(run, left_out=('/muscle/pressure: 3 messages left out.',))
+    run.findings = (Implausible('/muscle/contraction: the encoder slips.'),)
+    monkeypatch.setattr('pam_actuation.bags.load.load_run', lambda *given: run)
+    monkeypatch.setattr('pam_actuation.bags.load_joint.load_recording', lambda *given: run)
+    monkeypatch.setitem(WORKS, work, lambda *given: {
+        'verdict': 'v', 'reason': 'Why.', 'sizes': [], 'ambiguous': [], 'least': {},
+        'bad': False})
+    found = work_on(Case(str(bag), 'rig', '1', 1.0), Settings(work), tmp_path)
+    assert found['bad'] and found['reason'] == (
+        'Why. /muscle/pressure: 3 messages left out. /muscle/contraction: the encoder slips.')
 
 
 def test_the_key_is_of_recording_model_settings_and_code(lab, tmp_path, monkeypatch):
