@@ -121,8 +121,8 @@ def run_campaign(cases: Sequence[Case], settings: Settings, out: StrPath, jobs: 
     Raises
     ------
     InputError
-        The model cannot be read, the folder cannot be written, is in use or is inside a
-        recording, or the cluster cannot be reached.
+        The model cannot be read, or has no number that ``identify`` would find. The folder
+        cannot be written, is in use or is inside a recording, or the cluster cannot be reached.
     ClusterLost
         The cluster was lost and did not come back. What is done is kept.
 
@@ -229,7 +229,8 @@ def _with_models(cases: Sequence[Case], settings: Settings) -> tuple[Settings, l
     Of the model of a joint, a case is given its own muscle.
     """
     from pam_sim import preset_names
-    from pam_sim.joint import joint_preset_names, JointRig, load_rig_or_joint
+    from pam_sim.joint import (
+        joint_preset_names, JointRig, load_rig_or_joint, load_rig_or_side)
     kept = replace(settings, model='')
     if settings.work not in NEED_A_MODEL:
         return kept, [''] * len(cases)
@@ -249,6 +250,10 @@ def _with_models(cases: Sequence[Case], settings: Settings) -> tuple[Settings, l
         else:
             texts.append(f'{name}/{side}' if name in joint_preset_names()
                          else rig.muscles[f'{side}/'].to_yaml())
+    if settings.work == 'identify':
+        from pam_sim.identify.numbers import with_unknown
+        for text in dict.fromkeys(texts):
+            with_unknown(load_rig_or_side(text), settings.unknown)
     return kept, texts
 
 

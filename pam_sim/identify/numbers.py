@@ -24,9 +24,10 @@ from pam_sim.errors import did_you_mean, InputError
 from pam_sim.gap.data.noise import SMALLEST
 from pam_sim.gap.subsystems.effects import acts_on
 from pam_sim.gap.subsystems.problem import SubsystemProblem
-from pam_sim.muscle.coefficients import PREFIX
+from pam_sim.muscle.coefficients import PREFIX, stated_names
 from pam_sim.rig import Rig
 from pam_sim.sensors.zeros import ZEROS
+from pam_sim.tolerance import UNKNOWN
 
 # A range over more than this factor is one of scales: its middle is that of the logarithms.
 SCALE_RATIO = 5.0
@@ -161,6 +162,34 @@ class Number:
                 signal == 'contraction' or signal in problem.signals)
         return any(k.name == self.name for k in problem.known) and (
             not self.subsystem or self.subsystem == problem.subsystem)
+
+
+def with_unknown(rig: Rig, names: Sequence[str] = ()) -> tuple[Rig, list[str], list[Number]]:
+    """
+    Return (rig in which they are unknown, names, unknown numbers): what is asked of a rig.
+
+    Parameters
+    ----------
+    rig : pam_sim.Rig
+        Its tolerances say what is unknown.
+    names : sequence of str
+        Further ones, as ``unknown_numbers`` takes them, or ``law`` for all on which the force
+        depends. Those returned are single coefficients.
+
+    Raises
+    ------
+    InputError
+        There is no such number, or none is unknown.
+
+    """
+    single = [n for name in names for n in stated_names(rig.muscle.law, name, 'unknown number')]
+    of_rig = {p.name for p in rig.number_list}
+    rig = rig.with_(tolerance={name: UNKNOWN for name in single if name in of_rig})
+    wanted = unknown_numbers(rig, single)
+    if not wanted:
+        raise InputError('no number is unknown: state `unknown` in `tolerance`, or name numbers',
+                         rig.name)
+    return rig, single, wanted
 
 
 def unknown_numbers(rig: Rig, names: Sequence[str] = ()) -> list[Number]:

@@ -30,8 +30,7 @@ from pam_sim.identify.advice import next_experiment, where_open
 from pam_sim.identify.fit import fit, NOWHERE, Weighted
 from pam_sim.identify.inputs import noise_beyond
 from pam_sim.identify.judgement import DETERMINED, is_at_edge, judge, UNDETERMINED
-from pam_sim.identify.numbers import (
-    known_numbers_of, Number, unknown_numbers, with_values)
+from pam_sim.identify.numbers import known_numbers_of, Number, with_unknown, with_values
 from pam_sim.identify.possible import (
     in_other_forms, is_incomplete, possible_effects, SEEN_FLOORS2)
 from pam_sim.identify.profile import Interval, profile
@@ -40,7 +39,6 @@ from pam_sim.identify.remarks import ANOTHER_LAW, of_one_scale, remarks_on, Squa
 from pam_sim.identify.result import Found, half_width, Identification
 from pam_sim.identify.secant import settle, solve_from
 from pam_sim.identify.settled import beside_settled_zero, with_settled_zero
-from pam_sim.muscle.coefficients import stated_names
 from pam_sim.rig import Rig
 from pam_sim.run import Run
 from pam_sim.tolerance import AbsoluteSd, UNKNOWN
@@ -103,13 +101,7 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
     if any(added_kg) and 'mass_kg' not in rig.parameters:
         raise InputError(f'{max(added_kg):g} kg hung on load `{rig.load}`, which has no mass; a '
                          'held muscle takes 0', 'added mass')
-    unknown = [n for name in unknown for n in stated_names(rig.muscle.law, name, 'unknown number')]
-    of_rig = {p.name for p in rig.number_list}
-    rig = rig.with_(tolerance={name: UNKNOWN for name in unknown if name in of_rig})
-    wanted = unknown_numbers(rig, unknown)
-    if not wanted:
-        raise InputError('no number is unknown: state `unknown` in `tolerance`, or name numbers',
-                         rig.name)
+    rig, unknown, wanted = with_unknown(rig, unknown)
     runs, of_commands = commanded(runs, rig)
     offers, of_offers = offers_of(runs, rig, added_kg or [0.0] * len(runs), spare_certify)
     problems = problems_of(rig, offers)

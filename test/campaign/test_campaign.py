@@ -416,6 +416,9 @@ def test_a_slow_worker_of_a_killed_campaign_keeps_no_half_case(tmp_path):
 def test_mistakes_are_told_before_any_work(lab, tmp_path, capsys):
     for arguments, says in ((['--work', 'gap'], 'no model'),
                             (['--model', 'dmsp_5_300_hangin_mass'], 'did you mean'),
+                            (['--work', 'identify', '--model', MODEL], 'no number is unknown'),
+                            (['--work', 'identify', '--model', MODEL, '--unknown', 'mas_kg'],
+                             'did you mean `mass_kg`'),
                             (['--model', MODEL, '--effects', 'leak'], 'leakage'),
                             (['--model', MODEL, '--cluster', 'somewhere'], 'no address')):
         assert main(['campaign', str(lab), '--out', str(tmp_path / 'out'), *arguments]) == 2
