@@ -21,7 +21,7 @@ from typing import Any, TYPE_CHECKING
 
 from pam_actuation.cli.common import (
     add_seed_option, effect_names, emit, EXIT_DONE, EXIT_FINDING, progress)
-from pam_actuation.cli.options import count, number, out_path, Parser, source
+from pam_actuation.cli.options import count, number, out_path, Parser, refuse_unused, source
 
 if TYPE_CHECKING:
     from pam_actuation.campaign.campaign import Campaign
@@ -31,6 +31,11 @@ if TYPE_CHECKING:
 HELP = ('Work on every recording of a folder or list, keep what each gave, and say what changed '
         'on which rig since which day.')
 EXAMPLE = 'pam campaign runs --model dmsp_5_300_hanging_mass --out campaign'
+# Options that would change nothing in this kind of work.
+UNUSED = {
+    'gap': ('unknown', 'seed'), 'identify': ('effects', 'seconds', 'materiality'),
+    **dict.fromkeys(('replay', 'report'), (
+        'model', 'effects', 'seconds', 'materiality', 'unknown', 'seed'))}
 
 
 def add_arguments(parser: Parser) -> None:
@@ -41,7 +46,7 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument('--out', type=out_path, required=True, metavar='DIR',
                         help='folder for the results; what is there already is not worked on '
                         'again')
-    parser.add_argument('--work', choices=('gap', 'identify', 'replay', 'report'), default='gap',
+    parser.add_argument('--work', choices=tuple(UNUSED), default='gap',
                         help='what is done with every recording (default: %(default)s)')
     parser.add_argument('--model', '--rig', dest='model', type=source, default=None,
                         metavar='NAME|FILE', help='model of gap and identify, where the list '
@@ -74,6 +79,7 @@ def run(args: argparse.Namespace) -> int:
     from pam_actuation.campaign.results import PAGE, seen_before, write_results
     from pam_actuation.campaign.work import NEED_A_MODEL
     from pam_actuation.workers import ClusterLost
+    refuse_unused(args, add_arguments, UNUSED[args.work], f'--work {args.work}')
     effects = tuple(effect_names(args))
     cases = find_cases(args.recordings, args.out, joints=args.work not in NEED_A_MODEL)
     settings = Settings(args.work, args.model or '', effects, args.seconds, args.materiality,

@@ -419,6 +419,14 @@ def test_mistakes_are_told_before_any_work(lab, tmp_path, capsys):
                             (['--work', 'identify', '--model', MODEL], 'no number is unknown'),
                             (['--work', 'identify', '--model', MODEL, '--unknown', 'mas_kg'],
                              'did you mean `mass_kg`'),
+                            (['--model', MODEL, '--unknown', 'mass_kg'],
+                             '--unknown: does not go with --work gap'),
+                            (['--work', 'identify', '--model', MODEL, '--effects', 'creep'],
+                             '--effects: does not go with --work identify'),
+                            (['--work', 'replay', '--model', MODEL],
+                             '--model: does not go with --work replay'),
+                            (['--work', 'report', '--seed', '1'],
+                             '--seed: does not go with --work report'),
                             (['--model', MODEL, '--effects', 'leak'], 'leakage'),
                             (['--model', MODEL, '--cluster', 'somewhere'], 'no address')):
         assert main(['campaign', str(lab), '--out', str(tmp_path / 'out'), *arguments]) == 2
