@@ -135,19 +135,25 @@ def _bags_below(folder: Path, without: StrPath | None) -> Iterator[Path]:
         passed.add(real)
         names[:] = sorted(name for name in names if not name.startswith('.')
                           and os.path.realpath(here / name) != left_out)
-        bags = sorted(name for name in files
-                      if name.endswith(BAG_FILES) and not name.startswith('.'))
-        if 'metadata.yaml' in files or bags and _is_split(real.name, bags):
+        bags = _bag_files(files)
+        if 'metadata.yaml' in files or _is_split(real.name, bags):
             names[:] = []
             yield here
         else:
             yield from (here / name for name in bags)
 
 
+def _bag_files(names: Sequence[str]) -> list[str]:
+    """Return those of the names of files that are recordings by their ending."""
+    return sorted(name for name in names
+                  if name.endswith(BAG_FILES) and not name.startswith('.'))
+
+
 def _is_split(name: str, files: Sequence[str]) -> bool:
     """Tell whether these are NAME_0, NAME_1, ... as in a bag whose metadata.yaml is missing."""
-    return any({f'{name}_{number}{ending}' for number in range(len(files))} == set(files)
-               for ending in BAG_FILES)
+    return bool(files) and any(
+        {f'{name}_{number}{ending}' for number in range(len(files))} == set(files)
+        for ending in BAG_FILES)
 
 
 def _listed(path: Path) -> list[dict[str, str]]:
@@ -211,8 +217,9 @@ def _cases_of(row: dict[str, str], folder: Path, without: StrPath | None,
 
 
 def _is_bag(folder: Path) -> bool:
-    return any(one.name == 'metadata.yaml' or one.name.endswith(BAG_FILES)
-               for one in folder.iterdir())
+    """Tell whether a folder is one recording; lone files in it are recordings of their own."""
+    names = [one.name for one in folder.iterdir()]
+    return 'metadata.yaml' in names or _is_split(folder.resolve().name, _bag_files(names))
 
 
 def _read(path: Path) -> Bag | None:

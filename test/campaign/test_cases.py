@@ -168,6 +168,22 @@ def test_a_split_recording_is_one_case(tmp_path):
     assert len(find_cases(tmp_path / 'lab')) == len(files)
 
 
+def test_lone_files_of_a_folder_in_a_list_are_recordings_of_their_own(tmp_path):
+    day = tmp_path / 'bench' / '2026-03-01'
+    for name in ('a', 'b'):
+        write_bag(tmp_path / name, 2)
+        day.mkdir(parents=True, exist_ok=True)
+        [file] = (tmp_path / name).glob('*.mcap')
+        file.rename(day / f'{name}.mcap')
+    table = tmp_path / 'list.txt'
+    table.write_text('bench/2026-03-01\n')
+    cases = find_cases(table)
+    assert [Path(case.path) for case in cases] == [day / 'a.mcap', day / 'b.mcap']
+    assert [case.path for case in find_cases(tmp_path / 'bench')] == [
+        case.path for case in cases]
+    assert [(case.rig, case.day) for case in cases] == [('bench', '1'), ('bench', '2')]
+
+
 def test_the_name_of_the_bag_itself_tells_its_day(tmp_path):
     write_bag(tmp_path / 'check_2026-03-01', 2)
     assert [case.day for case in find_cases(tmp_path / 'check_2026-03-01')] == ['2026-03-01']
