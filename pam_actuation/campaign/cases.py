@@ -26,6 +26,7 @@ from datetime import datetime, timedelta, timezone
 import os
 from pathlib import Path
 import re
+from typing import NamedTuple
 
 from pam_actuation.bags.load_joint import joints_of
 from pam_actuation.bags.rig_topics import namespaces
@@ -91,6 +92,8 @@ def find_cases(source: StrPath, without: StrPath | None = None,
         file with the columns ``path``, and if wanted ``rig``, ``day``, ``namespace``, ``model``.
         A path of a list may be a folder as well: its row stands for all bags below it that have
         the namespace.
+        Where several rows give a recording, the one that names it most closely counts: the
+        recording itself before its folder, then a namespace before none.
     without : path, optional
         A folder that is left out, that of the results.
     joints : bool
@@ -104,18 +107,62 @@ def find_cases(source: StrPath, without: StrPath | None = None,
     Raises
     ------
     InputError
-        Nothing there, no recording in it, or a mistake in the list, with its line.
+        Nothing there, no recording in it, or a mistake in the list, with its line: a recording
+        that two rows name alike, for instance.
 
     """
     root = Path(source)
     if root.is_dir():
-        folder, listed = root.resolve(), [{'path': '.'}]
+        folder, listed = root.resolve(), [(str(root), {'path': '.'})]
     elif root.is_file():
         folder, listed = root.resolve().parent, _listed(root)
     else:
         raise InputError('no such folder or list of recordings', root)
-    cases = [case for row in listed for case in _cases_of(row, folder, without, joints)]
+    cases = _each_once([_given(place, row, folder, case) for place, row in listed
+                        for case in _cases_of(row, folder, without, joints)])
     return sorted(_dated(cases), key=lambda case: (case.rig, case.time, *_in_order(case)))
+
+
+class _Given(NamedTuple):
+    """A case, where the row stands that gives it, and how closely that row names it."""
+
+    case: Case
+    place: str
+    closely: tuple[bool, int, int]
+
+
+def _given(place: str, row: dict[str, str], folder: Path, case: Case) -> _Given:
+    """Return a case of a row; the path tells more than the namespace how closely it is named."""
+    path = folder / row['path']
+    itself = os.path.realpath(path) == os.path.realpath(case.path)
+    depth = 0 if itself else len(Path(os.path.abspath(path)).parts)
+    names = [part for part in row.get('namespace', '').split('/') if part]
+    return _Given(case, place, (itself, depth, len(names)))
+
+
+def _each_once(given: Sequence[_Given]) -> list[Case]:
+    """
+    Return each case once: that of the row which names it most closely.
+
+    Raises
+    ------
+    InputError
+        Two rows name a case equally closely.
+
+    """
+    found: dict[str, list[_Given]] = {}
+    for one in sorted(given, key=lambda one: one.closely, reverse=True):
+        kept, case = found.setdefault(os.path.realpath(one.case.path), []), one.case
+        # Without a namespace it is the only muscle of its bag.
+        same = next((other for other in kept if None in (
+            case.namespace, other.case.namespace) or case.namespace == other.case.namespace), None)
+        if same is None:
+            kept.append(one)
+        elif same.closely == one.closely:
+            muscle = f'{case.namespace} in ' if case.namespace else ''
+            raise InputError(f'names {muscle}{case.path}, which {same.place} names already',
+                             one.place)
+    return [one.case for kept in found.values() for one in kept]
 
 
 def _bags_below(folder: Path, without: StrPath | None) -> Iterator[Path]:
@@ -156,8 +203,8 @@ def _is_split(name: str, files: Sequence[str]) -> bool:
         for ending in BAG_FILES)
 
 
-def _listed(path: Path) -> list[dict[str, str]]:
-    """Return the rows of a list."""
+def _listed(path: Path) -> list[tuple[str, dict[str, str]]]:
+    """Return the rows of a list, each with where it stands."""
     try:
         lines = path.read_text(encoding='utf-8-sig').splitlines()
     except (OSError, UnicodeDecodeError) as error:
@@ -168,7 +215,7 @@ def _listed(path: Path) -> list[dict[str, str]]:
         raise InputError('lists no recording', path)
     head = [word.strip() for word in next(csv.reader([kept[0][1]]))]
     if 'path' not in head:
-        return [{'path': line.strip()} for _, line in kept]
+        return [(f'{path}:{number}', {'path': line.strip()}) for number, line in kept]
     for name in head:
         if name not in COLUMNS:
             raise InputError(f'has no meaning for the column `{name}`{did_you_mean(name, COLUMNS)}'
@@ -185,7 +232,7 @@ def _listed(path: Path) -> list[dict[str, str]]:
         if row.get('day') and _date(row['day'], strictly=True) is None:
             raise InputError(f'day is {row["day"]!r}; write it as 2026-11-25 or '
                              '2026-11-25T09:30', f'{path}:{number}')
-        rows.append(row)
+        rows.append((f'{path}:{number}', row))
     if not rows:
         raise InputError('lists no recording', path)
     return rows

@@ -184,6 +184,28 @@ def test_lone_files_of_a_folder_in_a_list_are_recordings_of_their_own(tmp_path):
     assert [(case.rig, case.day) for case in cases] == [('bench', '1'), ('bench', '2')]
 
 
+def test_each_recording_is_one_case_of_the_row_that_names_it_most_closely(exo, tmp_path):
+    table = tmp_path / 'list.csv'
+    runs = exo / 'runs'
+    single, walk = runs / '2026-03-02' / 'run', runs / '2026-03-01' / 'walk'
+    table.write_text(f'path,namespace,model\n{walk},/left_knee/flexor,a\n{single},/muscle,b\n'
+                     f'{runs},,c\n{runs},right_knee,d\n')
+    assert {(case.path, case.namespace): case.model for case in find_cases(table)} == {
+        (str(single), '/muscle'): 'b', (str(walk), MUSCLES[0]): 'c', (str(walk), MUSCLES[1]): 'a',
+        (str(walk), MUSCLES[2]): 'd', (str(walk), MUSCLES[3]): 'd'}
+    # Also where it is named by another path.
+    (tmp_path / 'link').symlink_to(runs / '2026-03-02')
+    table.write_text(f'path,namespace\n{single},\nlink/run,/muscle\n')
+    assert [case.namespace for case in find_cases(table)] == ['/muscle']
+    for again in (single, 'link/run'):
+        table.write_text(f'path\n{single}\n{again}\n')
+        with pytest.raises(InputError, match='csv:3: names .*run, which .*csv:2 names already'):
+            find_cases(table)
+    table.write_text(f'path,namespace\n{walk},right_knee\n\n{walk},/right_knee/\n')
+    with pytest.raises(InputError, match='csv:4: names /right_knee/.* in .*walk, which .*csv:2'):
+        find_cases(table)
+
+
 def test_the_name_of_the_bag_itself_tells_its_day(tmp_path):
     write_bag(tmp_path / 'check_2026-03-01', 2)
     assert [case.day for case in find_cases(tmp_path / 'check_2026-03-01')] == ['2026-03-01']
