@@ -35,8 +35,10 @@ from pam_sim.files import StrPath, UNFINISHED, write_json
 from pam_sim.joint.parameters import SIDES
 
 FAILED = 'failed'
-WARM = {'gap': ('pam_actuation.report.gap',), 'identify': ('pam_actuation.report.identify',),
-        'replay': ('pam_actuation.replay.compare',), 'report': ('pam_actuation.report.pages',)}
+WARM = {
+    'gap': ('pam_actuation.report.gap',),
+    'identify': ('pam_actuation.report.gap', 'pam_actuation.report.identify'),
+    'replay': ('pam_actuation.replay.compare',), 'report': ('pam_actuation.report.pages',)}
 _ATTEMPTS = 4           # to find a cluster again that was lost
 # Kept in place of its path: recordings of equal bytes share what is kept.
 THE_RECORDING = '{recording}'
@@ -225,7 +227,7 @@ def _with_models(cases: Sequence[Case], settings: Settings) -> tuple[Settings, l
     """
     Return the settings, and for each case what workers are given of its model.
 
-    A preset stays a name, since it takes the valve of the recording; a file becomes its text.
+    A preset stays a name, since it takes the valve of its recording; a file becomes its text.
     Of the model of a joint, a case is given its own muscle.
     """
     from pam_sim import preset_names

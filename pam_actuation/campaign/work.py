@@ -115,10 +115,10 @@ def gap(run: 'RecordedRun', model: str, settings: Settings, folder: Path) -> Fou
 
 def identify(run: 'RecordedRun', model: str, settings: Settings, folder: Path) -> Found:
     """Determine the unknown numbers of a rig from one recording; files as of the verb."""
+    from pam_actuation.report.gap import model_for
     from pam_actuation.report.identify import save_identification
     from pam_sim.identify import identify as identified
-    from pam_sim.joint import load_rig_or_side
-    found = identified([run], load_rig_or_side(model), list(settings.unknown), [], settings.seed)
+    found = identified([run], model_for(run, model), list(settings.unknown), [], settings.seed)
     data = found.to_dict()
     save_identification(found, [run], folder)
     share_plotly(folder / 'report.html')

@@ -32,7 +32,7 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument('run', type=source, nargs='+', help='recorded bags')
     parser.add_argument('--rig', type=source, required=True, metavar='NAME|FILE',
                         help='rig with the numbers that are known; `tolerance` says which are '
-                        'unknown')
+                        'unknown; a preset gets the valve of the recordings')
     parser.add_argument('--unknown', type=source, nargs='+', default=[], metavar='NUMBER',
                         help='further unknown numbers: a parameter of the rig such as mass_kg, '
                         'spring_n_per_m or pressure_zero_pa, law.NAME of its force law, law '
@@ -55,13 +55,16 @@ def run(args: argparse.Namespace) -> int:
     from pam_actuation.bags.oddities import recording_remarks
     from pam_actuation.report.identify import FILES, save_identification
     from pam_actuation.report.next_run import before_it, command_on_rig
-    from pam_sim import load_rig
+    from pam_sim import load_rig, preset_names
     from pam_sim.files import check_folder
+    from pam_sim.gap.data.signals import recorded_valve
     from pam_sim.identify import identify
     if args.out is not None:
         check_folder(args.out, FILES, args.overwrite)
     rig = load_rig(args.rig)
     runs = [load_run(path, args.namespace, topics=args.renamed) for path in args.run]
+    if args.rig in preset_names():
+        rig = load_rig(rig, valve=next(filter(None, map(recorded_valve, runs)), None))
     note_implausible(args, runs, must_be_right=True)
     with progress(args, 1.0, '', 'identify') as bar:
         found = identify(runs, rig, args.unknown, args.added_kg, args.seed,

@@ -27,7 +27,7 @@ from pam_sim.gap.data.holes import stretches
 from pam_sim.gap.data.noise import noise_of
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.resting import Rest, rest_of, ZERO
-from pam_sim.gap.data.signals import FIELD, ordered, tells_of
+from pam_sim.gap.data.signals import FIELD, ordered, recorded_valve, tells_of
 from pam_sim.gap.subsystems.mechanics import MechanicsProblem
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.gap.subsystems.valve import ValveProblem
@@ -162,7 +162,7 @@ def offer_of(run: Run, rig: Rig, added_kg: float = 0.0) -> Offer:
     ------
     InputError
         There is no pressure, or neither a command nor a contraction or force. There is no
-        command, and the load was never lifted.
+        command, and the load was never lifted. The command is that of another valve.
 
     """
     where = run.path or 'recording'
@@ -170,6 +170,10 @@ def offer_of(run: Run, rig: Rig, added_kg: float = 0.0) -> Offer:
         raise InputError(
             f'has no `pressure` of at least {LEAST_SAMPLES} messages; every number is found '
             'from the pressure', where)
+    recorded = recorded_valve(run)
+    if recorded and recorded != rig.valve:
+        raise InputError(f'the recording is of a rig with valve {recorded}, the model has '
+                         f'{rig.valve}', where)
     command = tells_of(run, rig.valve)
     contraction, force = (
         name in run and len(run[name]) >= LEAST_SAMPLES for name in ('contraction', 'force'))

@@ -115,3 +115,25 @@ def test_a_recording_on_the_page_has_the_kind_of_all_its_stretches():
     html = page(result, [Run({}, path=p) for p in 'ab'])
     assert re.findall('<th[^>]*>(recording [^<]*)', html) == [
         'recording 1: valve', 'recording 2: valve, muscle and load']
+
+
+def test_a_preset_gets_the_valve_of_the_recording_and_a_file_must_state_it(
+        bag, tmp_path, capsys, monkeypatch):
+    valves = []
+
+    def identify(runs, rig, *_, **__):
+        valves.append(rig.valve)
+        return Identification(rig, [], [], [], {}, False, [])
+    rig = tmp_path / 'rig.yaml'
+    rig.write_text('rig: dmsp_5_300_hanging_mass\nvalve: ppr\ntolerance: {mass_kg: unknown}\n')
+    of_pair = str(tmp_path / 'of_pair')
+    assert main(['simulate', str(bag.parent / 'stairs.yaml'), '--rig',
+                 'dmsp_5_300_hanging_mass', '--valve', 'hsv', '--out', of_pair]) == 0
+    with monkeypatch.context() as patched:
+        patched.setattr('pam_sim.identify.identify', identify)
+        for path in (of_pair, str(bag)):
+            assert main(['identify', path, '--rig', 'dmsp_5_300_hanging_mass']) == 0
+    assert valves == ['hsv', 'ppr']
+    capsys.readouterr()
+    assert main(['identify', of_pair, '--rig', str(rig)]) == 2
+    assert 'of a rig with valve hsv, the model has ppr' in capsys.readouterr().err
