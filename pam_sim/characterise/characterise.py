@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from pam_sim.annotations import FloatArray
 from pam_sim.characterise.dimensions import Dimensions
-from pam_sim.characterise.fixed_load import fixed_load, FixedLoad
+from pam_sim.characterise.fixed_load import check_given, fixed_load, FixedLoad
 from pam_sim.characterise.force_map import surfaces_of_map
 from pam_sim.characterise.points import points_of, without_stuck
 from pam_sim.characterise.surfaces import build_surfaces, Surfaces
@@ -102,7 +102,7 @@ def characterise_runs(
     ------
     InputError
         A run without pressure, contraction or muscle, fewer than 3 loads or
-        pressures, runs of different muscles.
+        pressures, runs of different muscles, loads in another order than the load cell read.
 
     """
     if loads_n is not None and len(loads_n) != len(runs):
@@ -111,6 +111,7 @@ def characterise_runs(
     size = one_muscle(runs, rigs, dimensions)
     loads = [fixed_load(run, size.length_m, None if loads_n is None else loads_n[k], rigs[k])
              for k, run in enumerate(runs)]
+    remarks = check_given(loads)
     points, stuck = without_stuck(points_of(loads))
     surfaces = build_surfaces(points, size, load_step_n)
     loads = sorted(loads, key=lambda one: one.load_n)
@@ -123,7 +124,7 @@ def characterise_runs(
         for run, rig in zip(runs, rigs) if rig is not None})
     result = Characterisation(surfaces, size, 'recordings', loads,
                               [run.path for run in runs], provenance)
-    result.remarks += _stuck_words(stuck)
+    result.remarks += remarks + _stuck_words(stuck)
     _finish(result, float(points.load_n[0]))
     return result
 

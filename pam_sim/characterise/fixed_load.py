@@ -31,6 +31,10 @@ HANGING_STRAIN = 2e-3        # from this contraction on, the load certainly hang
 NEAR_PA = 3e3                # holds this close are of one level
 SAME_LOAD_N = 0.5            # closer loads are repetitions of one load
 SCATTER_N, SCATTER = 0.5, 0.02     # a load whose force varies more is not fixed
+# Of the difference of two given loads, by which the load cell contradicts their order.
+ORDER_SHARE = 0.5
+OFF_SHARE = 0.1              # of a given load: the load cell is told to be that far off
+GIVEN = 'given'
 
 
 @short_repr
@@ -129,13 +133,9 @@ def _load(
     if given is not None:
         if not 0.0 <= given <= 1e5:
             raise InputError(f'the load is {given:g} N; allowed is 0 to 100000 N', path)
-        return float(given), 0.0, 'given'
-    force = [hold.force_n for hold in holds if np.isfinite(hold.force_n)]
+        return float(given), 0.0, GIVEN
+    force = _hanging_n(holds, length_m)
     if force:
-        # Where the muscle is at rest, a support may carry a part of the load.
-        hanging = [hold.force_n for hold in holds if np.isfinite(hold.force_n)
-                   and hold.contraction_m > HANGING_STRAIN * length_m]
-        force = hanging if len(hanging) >= 3 else force
         mean, spread = float(np.mean(force)), float(np.std(force))
         if spread > max(SCATTER_N, SCATTER * abs(mean)):
             raise InputError(
@@ -149,6 +149,47 @@ def _load(
         raise InputError('has no force and no rig with a hanging mass; give the load with '
                          '--load-n', path)
     return mass * GRAVITY_M_PER_S2, rig.prior_sd('mass_kg') * GRAVITY_M_PER_S2, 'rig'
+
+
+def _hanging_n(holds: Sequence[Hold], length_m: float) -> list[float]:
+    """Return the measured force of holds; at rest, a support may carry a part of the load."""
+    measured = [hold for hold in holds if np.isfinite(hold.force_n)]
+    hanging = [hold.force_n for hold in measured
+               if hold.contraction_m > HANGING_STRAIN * length_m]
+    return hanging if len(hanging) >= 3 else [hold.force_n for hold in measured]
+
+
+def check_given(loads: Sequence[FixedLoad]) -> list[str]:
+    """
+    Return where a given load is far from what the load cell read, in sentences.
+
+    A shell sorts names as text: ``load_10`` comes before ``load_5``. Loads in another order than
+    the recordings make a wrong muscle. A load cell with a wrong zero or scale keeps the order.
+
+    Parameters
+    ----------
+    loads : list of FixedLoad
+        Those of the recordings, in any order.
+
+    Raises
+    ------
+    InputError
+        Under the smaller one of two given loads, the cell read clearly more.
+
+    """
+    read = [(one, float(np.mean(force_n))) for one in loads
+            if one.load_from == GIVEN and (force_n := _hanging_n(one.holds, one.length_m))]
+    for less, more_n in read:
+        for more, less_n in read:
+            step_n = more.load_n - less.load_n
+            if step_n > 0.0 and more_n - less_n > max(SCATTER_N, ORDER_SHARE * step_n):
+                raise InputError(
+                    f'--load-n gives it {less.load_n:g} N and {more.path} {more.load_n:g} N, and '
+                    f'the load cell read {more_n:.1f} N and {less_n:.1f} N; give the loads in the '
+                    'order of the recordings', less.path)
+    return [f'{one.path}: the load cell read {force_n:.1f} N under the given load of '
+            f'{one.load_n:g} N. The given one counts.' for one, force_n in read
+            if abs(force_n - one.load_n) > max(SCATTER_N, OFF_SHARE * one.load_n)]
 
 
 def by_load(loads: Sequence[FixedLoad]) -> list[FixedLoad]:

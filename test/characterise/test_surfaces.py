@@ -205,6 +205,23 @@ def test_repetitions_of_a_load_are_put_together():
         0.0, 15.0, 30.0, 45.0, 60.0]
 
 
+def test_given_loads_in_another_order_than_the_load_cell_read_are_refused():
+    hung = [10.0, 150.0, 20.0, 40.0, 5.0, 80.0]        # as a shell sorts load_10, load_150, ...
+    runs = series_of_runs(hung)
+    with pytest.raises(InputError, match='load 150: --load-n gives it 10 N and load 20 20 N, '
+                       'and the load cell read 150.0 N and 20.0 N; give the loads in the order'):
+        characterise_runs(runs, MUSCLE, sorted(hung))
+    assert not [line for line in characterise_runs(runs, MUSCLE, hung).remarks
+                if 'load cell' in line]
+    # A cell with a wrong scale and zero keeps the order; one that was not connected has none.
+    for weight_n, told in ((lambda load: 1.3 * load + 3.0, 6), (lambda load: 0.01 * load, 6)):
+        off = [stepped_run(load, seed=k, weight_n=weight_n(load), path=f'load {load:g}')
+               for k, load in enumerate(hung)]
+        found = characterise_runs(off, MUSCLE, hung)
+        assert [one.load_n for one in found.loads] == sorted(hung)
+        assert len([line for line in found.remarks if 'The given one counts' in line]) == told
+
+
 def test_the_load_of_repetitions_is_their_mean():
     hung = [10.0, 10.3, 10.4]
     found = by_load([FixedLoad(load, 0.1, 'given', LENGTH_M, [], path=f'{load:g}')
