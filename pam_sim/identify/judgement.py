@@ -32,7 +32,11 @@ NARROW_RATIO, NARROW_SHARE, NARROW_SHARE_OF_SMALL = 1.5, 0.02, 0.2
 # interval.
 NEAR_EDGE = 0.05
 KNOWN = 0.5                  # standard deviation of what is worth telling, in coordinates
+BETTER = 2.0                 # times as well known together as the better known one alone
+COUNTS = 0.1                 # of the largest weight; a number of less has no weight of 1
 GENTLE = 1e-12
+# Standard deviation of a sum of coordinates, places of its numbers, and their weights.
+Known = tuple[float, Sequence[int], FloatArray]
 
 
 def is_narrow(number: Number, low: float, high: float) -> bool:
@@ -110,37 +114,43 @@ def _combinations(numbers: Sequence[Number], x: FloatArray, information: FloatAr
     # What one unit of a coordinate is, in logarithms or in the number's own unit.
     units = np.array([n.slope(v) / (v if product else 1.0) for n, v in zip(numbers, values)])
     covariance = np.linalg.inv(information + GENTLE * np.eye(len(numbers)))
-    pairs = []
-    for i, j in combinations(range(len(numbers)), 2):
-        pairs.append(_best_known([i, j], covariance, units))
+    pairs = [_best_known([i, j], covariance) for i, j in combinations(range(len(numbers)), 2)]
     joined = [{k} for k in range(len(numbers))]
     found = []
-    for sd, places, axis in sorted(pairs, key=lambda pair: pair[0]):
-        groups = [next(g for g in joined if k in g) for k in places]
-        if sd > KNOWN or groups[0] is groups[1]:
+    for known in sorted(filter(None, pairs), key=lambda pair: pair[0]):
+        groups = [next(g for g in joined if k in g) for k in known[1]]
+        if groups[0] is groups[1]:
             continue
         groups[0] |= groups[1]
         joined.remove(groups[1])
-        found.append(_combination(numbers, values, places, axis, sd, product))
+        found.append(_combination(numbers, values, known, units, product))
     if not found and len(numbers) > 2:
-        sd, places, axis = _best_known(range(len(numbers)), covariance, units)
-        if sd < KNOWN:
-            found.append(_combination(numbers, values, places, axis, sd, product))
+        whole = _best_known(range(len(numbers)), covariance)
+        if whole is not None:
+            found.append(_combination(numbers, values, whole, units, product))
     return found
 
 
-def _best_known(places: Sequence[int], covariance: FloatArray, units: FloatArray
-                ) -> tuple[float, Sequence[int], FloatArray]:
-    """Return (standard deviation, places, weights) of the best known sum of coordinates."""
-    variance, axes = np.linalg.eigh(covariance[np.ix_(places, places)])
-    return math.sqrt(max(float(variance[0]), 0.0)), places, axes[:, 0] / units[list(places)]
+def _best_known(places: Sequence[int], covariance: FloatArray) -> Known | None:
+    """Return the best known sum of coordinates, None where it tells no more than one of them."""
+    chosen = covariance[np.ix_(places, places)]
+    variance, axes = np.linalg.eigh(chosen)
+    sd = math.sqrt(max(float(variance[0]), 0.0))
+    alone = math.sqrt(float(np.min(np.diag(chosen))))
+    return (sd, places, axes[:, 0]) if sd <= min(KNOWN, alone / BETTER) else None
 
 
-def _combination(numbers: Sequence[Number], values: FloatArray, places: Sequence[int],
-                 axis: FloatArray, sd: float, product: bool) -> Combination:
-    weights = {numbers[k].name: float(a / axis[0]) for k, a in zip(places, axis)}
-    half = abs(NORMAL_95 * sd / float(axis[0]))
-    chosen = [float(values[k]) for k in places]
+def _combination(numbers: Sequence[Number], values: FloatArray, known: Known,
+                 units: FloatArray, product: bool) -> Combination:
+    sd, places, axis = known
+    powers = axis / units[list(places)]
+    size = np.abs(powers if product else axis)
+    # The first weight becomes 1, so it must not be one that hardly counts.
+    first = 0 if size[0] >= COUNTS * np.max(size) else int(np.argmax(size))
+    order = [first, *(k for k in range(len(places)) if k != first)]
+    weights = {numbers[places[k]].name: float(powers[k] / powers[first]) for k in order}
+    half = abs(NORMAL_95 * sd / float(powers[first]))
+    chosen = [float(values[places[k]]) for k in order]
     if not product:
         return Combination(weights, sum(v * w for v, w in zip(chosen, weights.values())), half,
                            False)

@@ -18,7 +18,8 @@ from made_records import record, RIG
 import numpy as np
 from pam_sim import load_rig
 from pam_sim.identify.advice import next_experiment, proposals, where_open
-from pam_sim.identify.judgement import DETERMINED, is_at_edge, TOGETHER, UNDETERMINED
+from pam_sim.identify.judgement import (
+    _combinations, DETERMINED, is_at_edge, TOGETHER, UNDETERMINED)
 from pam_sim.identify.numbers import unknown_numbers
 from pam_sim.identify.profile import Interval
 from pam_sim.identify.records import offer_of
@@ -107,3 +108,25 @@ def test_an_interval_that_is_open_at_an_end_is_told_as_such(ends, said):
     (SPRING, 0.0, (0.0, 20.0, True, False), False)])    # there is no spring, and none below
 def test_a_value_at_an_end_of_its_range_is_seen(number, value, interval, there):
     assert is_at_edge(number, value, Interval(*interval, ())) is there
+
+
+def along(wide, narrow):
+    """Return the covariance of two numbers of which the difference is known well."""
+    return 0.5 * np.array([[wide ** 2 + narrow ** 2, wide ** 2 - narrow ** 2],
+                           [wide ** 2 - narrow ** 2, wide ** 2 + narrow ** 2]])
+
+
+def test_numbers_that_do_not_depend_on_each_other_are_not_combined():
+    numbers = unknown_numbers(RIG, ['mass_kg', 'force_map_gain', 'K_m', 'T_m'])
+    covariance = np.zeros((4, 4))
+    covariance[:2, :2], covariance[2:, 2:] = along(2.0, 0.05), along(0.4, 0.05)
+    found = _combinations(numbers, np.zeros(4), np.linalg.inv(covariance))
+    assert sorted(sorted(c.weights) for c in found) == [
+        ['K_m', 'T_m'], ['force_map_gain', 'mass_kg']]
+    # The first weight is 1, so it is not that of a number which hardly counts.
+    steep = np.array([[100.0, 2.0], [2.0, 0.0404]])
+    [one] = _combinations(numbers[2:], np.zeros(2), np.linalg.inv(steep))
+    assert list(one.weights) == ['T_m', 'K_m'] and one.product
+    assert one.weights == pytest.approx({'T_m': 1.0, 'K_m': -0.02}, rel=0.05)
+    assert one.value == pytest.approx(numbers[3].start * numbers[2].start ** -0.02, rel=0.05)
+    assert one.half_width == pytest.approx(1.96 * 0.02, rel=0.05)
