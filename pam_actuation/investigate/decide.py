@@ -25,14 +25,16 @@ from pam_sim.located_yaml import dump_yaml
 if TYPE_CHECKING:
     from pam_actuation.experiments.experiment import Experiment
 
-ANSWERED, NOT_NAMED, NOT_SEPARABLE, REFUSED = (
-    'answered', 'not_named', 'not_separable', 'refused')
+ANSWERED, NOT_NAMED, PARTLY_NAMED, NOT_SEPARABLE, REFUSED = (
+    'answered', 'not_named', 'partly_named', 'not_separable', 'refused')
 ROUNDS, MINUTES, DECLINED, FAILED, IMPOSSIBLE = (
     'rounds', 'minutes', 'declined', 'failed', 'impossible')
 # How an investigation may end, and what that means.
 ENDINGS = {
     ANSWERED: 'One answer holds for all recordings.',
     NOT_NAMED: 'No name in the library explains the gap, and no experiment is left that would.',
+    PARTLY_NAMED: 'What is named explains only a part of the gap, and no experiment is left that '
+                  'would explain more.',
     NOT_SEPARABLE: 'No experiment is left that would tell the names apart.',
     REFUSED: 'The recordings cannot be used.',
     ROUNDS: 'The rounds allowed are used up.',
@@ -91,4 +93,5 @@ def decide(rounds: Sequence[Round], wide: 'Experiment') -> Decision:
                         why=following['why'])
     if wide.name not in [name for one in rounds for name in one.experiments]:
         return Decision(experiment=wide, why=WIDE)
-    return Decision(NOT_SEPARABLE if last.verdict == 'ambiguous' else NOT_NAMED)
+    return Decision({'ambiguous': NOT_SEPARABLE, 'partial': PARTLY_NAMED}.get(
+        last.verdict, NOT_NAMED))

@@ -372,6 +372,7 @@ def test_what_follows_a_round():
     assert decide([told('partial', 'sine', NEXT)], wide).experiment.name == 'tell_apart_edges'
     for verdict, name, ended in (
             ('unknown', 'short_check', 'not_named'), ('ambiguous', 'short_check', 'not_separable'),
+            ('partial', 'short_check', 'partly_named'),
             ('refused', 'sine', 'refused'), ('no_gap', 'sine', 'answered'),
             ('parameter', 'sine', 'answered')):
         assert decide([told(verdict, name)], wide).ended == ended
