@@ -80,9 +80,11 @@ def write_results(campaign: Campaign, findings: Findings, folder: StrPath, page:
     write_text(folder / JSON, json.dumps(
         {'schema': 1, 'work': campaign.settings.work,
          'cases': [plain(row) for row in campaign.rows]}, indent=2) + '\n')
-    script = folder / PLOTLY
-    if not script.exists() and any((folder / CASES).glob('*/report.html')):
-        write_text(script, plotly_script())
+    if any((folder / CASES / row['key'] / 'report.html').is_file() for row in campaign.rows):
+        # That of another version of Plotly would not draw the pages of this one.
+        script, code = folder / PLOTLY, plotly_script()
+        if not script.is_file() or script.read_bytes() != code.encode():
+            write_text(script, code)
     write_text(folder / PAGE, page)
     write_text(folder / SEEN, json.dumps(
         {'schema': 1, 'changes': [{

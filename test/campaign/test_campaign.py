@@ -128,6 +128,10 @@ def test_nothing_is_worked_on_twice(done, lab, capsys):
     (out / 'findings.json').unlink()
     assert main([*argv, '--alert']) == 1
     assert content(out) == before
+    # The script of another version of Plotly would not draw the pages.
+    (out / 'plotly.js').write_text('of another version')
+    assert main(argv) == 1
+    assert content(out) == before
 
 
 def test_a_table_has_a_row_for_each_size(done, lab, tmp_path, monkeypatch):
