@@ -15,6 +15,7 @@
 """``pam models``: the laws, valves, loads, effects, sensors and rigs the simulator knows."""
 
 import argparse
+import os
 from typing import Any
 
 from pam_actuation.cli.common import (
@@ -46,7 +47,8 @@ def run(args: argparse.Namespace) -> int | None:
     if args.markdown is not None:
         check_file(args.markdown, args.overwrite, ours='by `pam models --markdown')
     check_outputs(args, args.html)
-    if args.html is not None and args.html == args.markdown:
+    if None not in (args.html, args.markdown) and (
+            os.path.realpath(args.html) == os.path.realpath(args.markdown)):
         raise InputError('two pages cannot go into one file', args.html)
     entries = catalogue()
     if args.name is not None:

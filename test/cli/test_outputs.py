@@ -126,7 +126,7 @@ def test_no_verb_replaces_what_is_there_and_says_so_at_once(verb, bags, tmp_path
     assert listed(tmp_path) == before
 
 
-def test_pages_of_the_documentation_are_made_again(tmp_path, capsys):
+def test_pages_of_the_documentation_are_made_again(tmp_path, monkeypatch, capsys):
     page = tmp_path / 'models.md'
     for _ in range(2):
         call(capsys, 'models', '--markdown', page)
@@ -134,6 +134,11 @@ def test_pages_of_the_documentation_are_made_again(tmp_path, capsys):
     assert 'exists already' in call(capsys, 'models', '--markdown', page, code=2)
     call(capsys, 'models', '--markdown', page, '--overwrite')
     assert page.read_text().startswith('# Models')
+    monkeypatch.chdir(tmp_path)
+    for first, second in (('m', './m'), (tmp_path / 'm', 'm')):
+        assert 'two pages cannot go into one file' in call(
+            capsys, 'models', '--html', first, '--markdown', second, code=2)
+    assert not (tmp_path / 'm').exists()
 
 
 @pytest.mark.parametrize('arguments', [
