@@ -20,7 +20,6 @@ from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 from pam_actuation.bags.oddities import recording_remarks
 from pam_actuation.replay.chain import ChainReplay, replay_chain
@@ -128,7 +127,7 @@ class Replay:
 
     def save(self, path: Path | str) -> None:
         """Write the replayed signals as .npz, the same bytes each time, whole or not at all."""
-        arrays: dict[str, npt.NDArray[Any]] = {}
+        arrays: dict[str, Any] = {}
         if self.controller is not None:
             arrays['command_stamp_ns'] = np.asarray(self.controller.stamp_ns)
             arrays['recorded_command_pa'] = np.asarray(self.controller.recorded_pa)
@@ -137,7 +136,7 @@ class Replay:
             if part is not None:
                 arrays.update(part.arrays())
         with whole_file(path, suffix='.npz', parents=False) as temporary:
-            np.savez(temporary, allow_pickle=True, **arrays)
+            np.savez(temporary, **arrays)
 
 
 def _of_commands(found: ReplayResult, start_ns: int) -> Difference:

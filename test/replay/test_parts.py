@@ -300,6 +300,16 @@ def test_a_folder_that_does_not_exist_is_refused(runs, tmp_path):
     shutil.rmtree(tmp_path)
 
 
+def test_what_is_saved_is_arrays_alone(runs, tmp_path, monkeypatch):
+    """An option of `numpy.savez` is an array of that name to a NumPy that does not know it."""
+    given, savez = [], np.savez
+    monkeypatch.setattr(np, 'savez', lambda file, **named: (
+        given.extend(named), savez(file, **named)))
+    replay_run(runs['pid_ppr'], only='driver').save(tmp_path / 'x.npz')
+    with np.load(tmp_path / 'x.npz') as found:
+        assert sorted(found.files) == sorted(given) and 'driver_stamp_ns' in given
+
+
 def test_a_difference_says_how_large_and_where():
     stamps = 1_000_000_000 + np.arange(4) * 100_000_000
     one = difference('a', 'Pa', stamps, [1.0, 2.0, np.nan, 4.0], [1.0, 2.5, np.nan, 4.0],
