@@ -36,6 +36,7 @@ resolution is added, so its fast part says nothing: only names of muscle and loa
 import argparse
 from dataclasses import replace
 from pathlib import Path
+import sys
 
 import numpy as np
 from pam_sim import load_rig
@@ -184,8 +185,17 @@ def command_line():
 
 
 def main():
+    """Do what is asked for; exit code 2 without the records."""
+    try:
+        look(command_line().parse_args())
+    except InputError as mistake:
+        print(f'real_records: {mistake}', file=sys.stderr)
+        return 2
+    return 0
+
+
+def look(args):
     """Look at the loop, at the steps, and for what was injected."""
-    args = command_line().parse_args()
     if args.csv:
         write_cycles(args)
         return
@@ -284,4 +294,4 @@ def show(args):
 
 
 if __name__ == '__main__':
-    main()
+    sys.exit(main())

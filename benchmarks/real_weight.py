@@ -27,6 +27,7 @@ import argparse
 import contextlib
 import io
 from pathlib import Path
+import sys
 import tempfile
 
 import black_boxes
@@ -214,13 +215,18 @@ def command_line():
 
 
 def main():
-    """Print the tables of the cases."""
+    """Print the tables of the cases; exit code 2 without the records."""
     args = command_line().parse_args()
-    with tempfile.TemporaryDirectory() as scratch:
-        for name in args.case:
-            with results_page.printed(args, __file__, name):
-                show(name, args.folder, args.seconds, Path(scratch))
+    try:
+        with tempfile.TemporaryDirectory() as scratch:
+            for name in args.case:
+                with results_page.printed(args, __file__, name):
+                    show(name, args.folder, args.seconds, Path(scratch))
+    except InputError as mistake:
+        print(f'real_weight: {mistake}', file=sys.stderr)
+        return 2
+    return 0
 
 
 if __name__ == '__main__':
-    main()
+    sys.exit(main())
