@@ -22,6 +22,7 @@ import shlex
 import subprocess
 import sys
 import time
+from types import SimpleNamespace
 
 from pam_sim import load_rig
 from pam_sim.errors import InputError
@@ -245,3 +246,16 @@ def test_a_benchmark_with_one_table_prints_writes_and_returns(
         assert capsys.readouterr().out == '| a table |\n'
         assert (page.read_text(encoding='utf-8') != before) == bool(words)
     assert '| a table |\n\n<!-- end: benchmarks/some.py -->' in page.read_text(encoding='utf-8')
+
+
+@pytest.mark.parametrize('late, share', [(70, 0.01), (0, 0.0)])
+def test_the_load_of_the_page_counts_late_ticks_of_the_driver(late, share):
+    """Behind a regulator it ticks with each command, so none is missed of its own period."""
+    view = importlib.import_module('view_load')
+    values = {'loop.ticks': '7000', 'loop.missed': '0', 'loop.overruns': str(late)}
+    told = {f'/muscle/{name}': (0, '', values) for name in view.LOOPS}
+    rig = SimpleNamespace(namespace='/muscle', group=SimpleNamespace(
+        started=SimpleNamespace(statuses=told)))
+    counts = view.Director._counts(SimpleNamespace(_rig=rig))
+    assert view.share('valve_driver', *counts['valve_driver']) == pytest.approx(share)
+    assert view.share('sofc_controller', *counts['sofc_controller']) == 0.0
