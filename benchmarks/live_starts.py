@@ -54,7 +54,8 @@ BEGIN_S = 1.5
 SINES = {0.25: (2, 1), 0.5: (4, 2), 1.0: (7, 4)}      # frequency [Hz] to cycles, and last of them
 LESSONS, SEEDS = 4, range(11, 17)
 HIDDEN_SEED = 831
-PERIODS_NS = {'controller_state': 5_000_000, 'valve_signal': 10_000_000, 'pressure': 4_000_000}
+PERIODS_NS = {'controller_state': 5_000_000, 'pressure': 4_000_000}
+DRIVER_NS = {'ppr': 5_000_000, 'hsv': 10_000_000}     # between two signals, at most
 
 
 def experiment():
@@ -79,10 +80,10 @@ def errors_mm(run):
     return errors
 
 
-def timing(run, bag):
+def timing(run, bag, valve):
     """Return what the loops did: late ticks [%], ages of the commands [ms], longest gap [ms]."""
     late, longest_ms, way_ns = {}, 0.0, transport_ns(bag)
-    for topic, period_ns in PERIODS_NS.items():
+    for topic, period_ns in {**PERIODS_NS, 'valve_signal': DRIVER_NS[valve]}.items():
         gaps = np.diff(run.topics[topic].stamp_ns)
         late[topic] = 100.0 * float(np.mean(gaps > 1.5 * period_ns))
         longest_ms = max(longest_ms, float(gaps.max()) * 1e-6)
@@ -121,11 +122,23 @@ def exactly(one, rig, name, rules, folder, way_ns, seeds=SEEDS):
     return {hz: float(np.median([row[hz] for row in errors])) for hz in SINES}
 
 
+def bag_name(args, start):
+    """Return the name of the bag of a start: runs of another kind have another one."""
+    kinds = '_hidden' * args.hidden + '_ordinary' * args.ordinary
+    return f'{args.controller}_{args.valve}{kinds}_{start}'
+
+
+def part_of(args):
+    """Return which part of the page holds the table of such runs."""
+    part = args.valve if args.controller == f'sofc_{args.valve}' else args.controller
+    return part + '_hidden' * args.hidden + '_ordinary' * args.ordinary
+
+
 def started(args, one, rig, rules, folder):
     """Run all starts; return (errors, timing) of each."""
     rows = []
     for start in range(args.starts):
-        bag = os.path.join(args.keep or folder, f'{args.controller}_{start}')
+        bag = os.path.join(args.keep or folder, bag_name(args, start))
         if not os.path.exists(bag):
             controller = load_controller(args.controller, rig, rules_file=rules)
             result = run_experiment(one, rig, controller, args.valve, bag, seed=start,
@@ -135,7 +148,7 @@ def started(args, one, rig, rules, folder):
             if result.failure or result.findings:
                 print(f'start {start}: {result.failure} {result.findings}', file=sys.stderr)
         run = load_run(bag)
-        rows.append((errors_mm(run), timing(run, bag)))
+        rows.append((errors_mm(run), timing(run, bag, args.valve)))
         print(f'start {start}: {json.dumps(rows[-1])}', file=sys.stderr, flush=True)
     return rows
 
@@ -203,10 +216,8 @@ def command_line():
 def main():
     """Run and compare."""
     args = command_line().parse_args()
-    usual = f'sofc_{args.valve}'
-    args.controller = args.controller or usual
-    part = args.valve if args.controller == usual else args.controller
-    with results_page.printed(args, __file__, f'{part}{"_hidden" * args.hidden}'):
+    args.controller = args.controller or f'sofc_{args.valve}'
+    with results_page.printed(args, __file__, part_of(args)):
         show(args)
 
 

@@ -24,6 +24,7 @@ import sys
 import time
 from types import SimpleNamespace
 
+import numpy as np
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 import pytest
@@ -259,3 +260,34 @@ def test_the_load_of_the_page_counts_late_ticks_of_the_driver(late, share):
     counts = view.Director._counts(SimpleNamespace(_rig=rig))
     assert view.share('valve_driver', *counts['valve_driver']) == pytest.approx(share)
     assert view.share('sofc_controller', *counts['sofc_controller']) == 0.0
+
+
+def test_kept_starts_of_another_kind_are_other_bags_and_parts_of_the_page():
+    """A start on a hidden rig, or without priority, was taken for one of the kind before."""
+    starts = importlib.import_module('live_starts')
+    kinds = [[], ['--hidden'], ['--ordinary'], ['--hidden', '--ordinary'], ['--valve', 'ppr'],
+             ['--controller', 'sofc_model_hsv']]
+    bags, parts = set(), set()
+    for words in kinds:
+        args = starts.command_line().parse_args(words)
+        args.controller = args.controller or f'sofc_{args.valve}'
+        bags.add(starts.bag_name(args, 0))
+        parts.add(starts.part_of(args))
+    assert len(bags) == len(parts) == len(kinds)
+    assert {'hsv', 'ppr', 'hsv_hidden', 'hsv_ordinary'} < parts
+
+
+@pytest.mark.parametrize('valve, late', [('ppr', 100.0), ('hsv', 0.0)])
+def test_a_driver_is_late_by_the_period_of_its_valve(valve, late, monkeypatch):
+    """Behind a regulator it sends every 5 ms: a gap of 10 ms is late there."""
+    starts = importlib.import_module('live_starts')
+    monkeypatch.setattr(starts, 'transport_ns', lambda bag: 0)
+    monkeypatch.setattr(starts.command_age, 'ages_ms', lambda run, way_ns: (
+        np.array([3.0]), np.array([2.0]), np.array([2.0])))
+    stamps = {'valve_signal': 10_000_000, 'controller_state': 5_000_000, 'pressure': 4_000_000,
+              'reference': 10_000_000}
+    run = SimpleNamespace(start_ns=0, topics={
+        name: SimpleNamespace(stamp_ns=np.arange(10) * period_ns)
+        for name, period_ns in stamps.items()})
+    found = starts.timing(run, 'bag', valve)['late']
+    assert found == {'valve_signal': late, 'controller_state': 0.0, 'pressure': 0.0}
