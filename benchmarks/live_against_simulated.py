@@ -125,12 +125,14 @@ def timing_ms(ticks, name):
 def compare(name, valve, seconds, folder, domain_id):
     """Run one experiment live and simulated; return (row, timing of its loops, transport)."""
     experiment = load_experiment(name)
+    length = ''
     if seconds and seconds < experiment.duration_s:
         experiment = load_experiment(
             dump_yaml({**experiment.to_dict(), 'stop_after_s': seconds}))
+        length = f'_{seconds:g}s'
     rig = load_rig('dmsp_5_300_realistic', valve=valve)
     contraction = experiment.domain == 'contraction'
-    path = os.path.join(folder, f'{experiment.name}_{valve}')
+    path = os.path.join(folder, f'{experiment.name}_{valve}{length}')     # of this length alone
     bag = f'{path}_live'
     if not os.path.exists(bag):
         result = run_experiment(experiment, rig, None, valve, bag, seed=1, domain_id=domain_id)
