@@ -119,7 +119,7 @@ def left_out(points):
 
 def print_bounds(records):
     """
-    Print between which bounds `pam characterise` expects the force at longer lengths.
+    Print the bounds of `pam characterise` for the force at longer lengths, and how many hold.
 
     Parameters
     ----------
@@ -129,6 +129,7 @@ def print_bounds(records):
     """
     print('\n| record | fitted from | judged at | bounds, N | measured, N |\n'
           '|---|---|---|---|---|')
+    held = []
     for points, own in records:
         strains = np.unique(points.strain)
         for count in range(1, len(strains) - LEAST_LENGTHS + 1):
@@ -139,9 +140,11 @@ def print_bounds(records):
                     continue
                 at = np.flatnonzero(points.strain == strain)
                 at = at[np.argmax(points.pressure_gauge_pa[at])]
+                held.append(there.low_n <= points.force_n[at] <= there.high_n)
                 print(f'| {points.name} | {100.0 * strains[count]:.1f} % '
                       f'| {100.0 * strain:.1f} % | {there.low_n:.0f} to {there.high_n:.0f} '
                       f'| {points.force_n[at]:.0f} |')
+    print(f'\n{sum(held)} of {len(held)} bounds hold the measured force.')
 
 
 def command_line():

@@ -14,11 +14,12 @@
 """What is said of the force at lengths that a force map does not hold."""
 
 from pathlib import Path
+import re
 
 import numpy as np
 import pam_sim
 from pam_sim.characterise import characterise_table
-from pam_sim.characterise.beyond import beyond
+from pam_sim.characterise.beyond import beyond, HELD, JUDGED
 from pam_sim.characterise.dimensions import Dimensions
 from pam_sim.characterise.tables import read_measured_table
 from pam_sim.muscle.force_maps import ForceMap, read_force_map
@@ -48,4 +49,14 @@ def test_characterise_says_that_the_full_length_was_not_measured(tmp_path):
     result = characterise_table(read_measured_table(path), Dimensions(0.3, 0.02))
     said = [one for one in result.remarks if 'longest measured length is 296.0 mm' in one]
     assert len(said) == 1 and '300.0 mm is not known' in said[0]
+    assert f'{JUDGED} such ranges that were tested, {HELD} held the measured force' in said[0]
     assert np.all(np.isfinite(result.surfaces.strain))
+
+
+def test_what_is_said_of_tested_bounds_is_what_the_results_pages_show():
+    pages = Path(__file__).resolve().parents[2] / 'docs' / 'results'
+    rows = [tuple(map(int, row)) for name in ('real_records.md', 'held_lengths.md')
+            for row in re.findall(r'^\| .+ \| [\d.]+ % \| [\d.]+ % \| (\d+) to (\d+) \| (\d+) \|$',
+                                  (pages / name).read_text(encoding='utf-8'), re.MULTILINE)]
+    assert len(rows) == JUDGED
+    assert sum(low <= force <= high for low, high, force in rows) == HELD
