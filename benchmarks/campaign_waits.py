@@ -21,6 +21,7 @@ points but those under way, in the order of asking, so the number of workers cha
 """
 
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+import math
 import statistics
 import sys
 import time
@@ -89,9 +90,10 @@ def show(args):
             print(f'| {words} | {size} | {" | ".join(f"{one:.2f}" for one in told)} |')
     print(f'\nThe same search, {MEMBERS * GENERATIONS * LOOPS} rollouts, from the middle of the '
           f'box, {args.seeds} seeds. The last column is the number of rollouts after which the '
-          f'overlapping search is as good, as a ratio; at most {LONGEST} were tried.\n')
+          'overlapping search is as good, as a ratio: median, of an even number the upper one, '
+          f'and each. At most {LONGEST} were tried: "> {LONGEST}" was not as good then.\n')
     print('| controller | cost in generations, median [mm] | overlapping | overlapping against '
-          'generations, median (each) | rollouts for the same cost, median |\n'
+          'generations, median (each) | rollouts for the same cost, median (each) |\n'
           '|---|---|---|---|---|')
     for name, valve in PROBLEMS:
         found = [quality(name, valve, seed) for seed in range(args.seeds)]
@@ -99,8 +101,14 @@ def show(args):
         ratios = [b / a for a, b in zip(usual, other)]
         print(f'| {name} | {statistics.median(usual):.4f} | {statistics.median(other):.4f} | '
               f'{statistics.median(ratios):.2f} ({", ".join(f"{r:.2f}" for r in ratios)}) | '
-              f'{statistics.median(needed):.2f} |')
+              f'{ratio_text(statistics.median_high(needed))} '
+              f'({", ".join(map(ratio_text, needed))}) |')
     return 0
+
+
+def ratio_text(ratio):
+    """Return a ratio of rollouts as text; infinite is one that was not reached."""
+    return f'> {LONGEST}' if math.isinf(ratio) else f'{ratio:.2f}'
 
 
 def lengths_of(loops, spread):
@@ -152,7 +160,7 @@ def overlapping(lengths, size):
 
 
 def quality(name, valve, seed):
-    """Return both costs [mm], and the ratio of rollouts after which they are equal."""
+    """Return both costs [mm], and the ratio of rollouts for the same cost (inf: not reached)."""
     rig = load_rig('dmsp_5_300_realistic', valve=valve)
     controller = load_controller(name, rig)
     loops, _ = loops_of([rig], [load_experiment(one) for one in EXPERIMENTS], 0, controller, rig)
@@ -170,7 +178,7 @@ def quality(name, valve, seed):
         told.append(cost(point))
         other.follow(told[-1])
         point = other.asked[0]
-    needed = next((k for k in range(1, len(told) + 1) if told[k - 1] <= usual), LONGEST * count)
-    print(f'{name} {seed}: {usual:.4f} {min(told[:count]):.4f} {needed / count:.2f}',
+    needed = next((k for k in range(1, len(told) + 1) if told[k - 1] <= usual), math.inf)
+    print(f'{name} {seed}: {usual:.4f} {min(told[:count]):.4f} {ratio_text(needed / count)}',
           file=sys.stderr, flush=True)
     return usual, min(told[:count]), needed / count

@@ -291,3 +291,19 @@ def test_a_driver_is_late_by_the_period_of_its_valve(valve, late, monkeypatch):
         for name, period_ns in stamps.items()})
     found = starts.timing(run, 'bag', valve)['late']
     assert found == {'valve_signal': late, 'controller_state': 0.0, 'pressure': 0.0}
+
+
+@pytest.mark.parametrize('best, told', [(0.5, '> 2'), (1.0, '0.00')])
+def test_a_cost_that_the_search_did_not_reach_is_told_as_more(best, told, monkeypatch):
+    """Where it was not reached, the table had the limit of the search as if it were measured."""
+    waits = importlib.import_module('campaign_waits')
+    for name in ('load_rig', 'load_controller', 'load_experiment'):
+        monkeypatch.setattr(waits, name, lambda *_, **__: None)
+    monkeypatch.setattr(waits, 'loops_of', lambda *_: ([], None))
+    monkeypatch.setattr(waits, 'default_axes', lambda _: [None, None])
+    monkeypatch.setattr(waits, 'from_unit', lambda axes, point: point)
+    monkeypatch.setattr(waits, 'Problem', lambda *_: SimpleNamespace(cost=lambda point: 1.0))
+    monkeypatch.setattr(waits.search, 'minimise', lambda *_: SimpleNamespace(cost=best))
+    usual, other, needed = waits.quality('pid', 'ppr', 0)
+    assert (usual, other) == (best, 1.0)
+    assert waits.ratio_text(needed) == told
