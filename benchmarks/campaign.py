@@ -47,6 +47,7 @@ import campaign_places  # noqa: E402
 import campaign_records as lab  # noqa: E402
 import campaign_waits  # noqa: E402
 from pam_actuation.campaign import find_cases, run_campaign, Settings  # noqa: E402
+from pam_actuation.campaign.changes import is_tested  # noqa: E402
 from pam_actuation.campaign.findings import began, find  # noqa: E402
 from pam_actuation.campaign.page import campaign_page  # noqa: E402
 from pam_actuation.campaign.results import write_results  # noqa: E402
@@ -117,18 +118,16 @@ def page(args):
     write_results(campaign, found, out, campaign_page(campaign, found))
     page_s = time.perf_counter() - began_s
     first = find_cases(args.work / 'lab')[0].time
-    told = {(group[0].series.rig, group[0].series.name): (
-        group[0].shape, began(group[0]) - first + 1.0) for group in found.changes}
+    rows, others = compared(found.changes, first)
+    right = not (others or found.odd or campaign.failed)
     print('| rig | put in | from day | the page says | from day |\n|---|---|---|---|---|')
-    right = len(told) == len(lab.TRUTH)
-    for rig, name, shape, day in lab.TRUTH:
-        said, on = told.get((rig, name), ('nothing', float('nan')))
+    for (rig, name, shape, day), (said, on) in zip(lab.TRUTH, rows):
         right &= said == shape and abs(on - day) <= NEAR_DAYS
         print(f'| {rig} | {name}, {shape} | {day} | {said} | {on:g} |')
-    others = [' '.join(one) for one in told if one not in [(r, n) for r, n, *_ in lab.TRUTH]]
     print(f'\nOther changes named: {", ".join(others) or "none"}. Recordings that stand out: '
           f'{len(found.odd)}. Failed: {len(campaign.failed)}. Series tested: '
-          f'{len(found.series)}.\n\nSentences of the page:\n')
+          f'{sum(map(is_tested, found.series))} of {len(found.series)}.\n\n'
+          'Sentences of the page:\n')
     print('\n'.join(f'- {one}' for one in found.sentences()))
     times = [tuple(map(float, line.split(',')[1:])) for line in
              (out / TIMES).read_text(encoding='utf-8').splitlines()]
@@ -140,6 +139,37 @@ def page(args):
           f'{wall_s / 60 / args.jobs:.1f} min with {args.jobs} processes. '
           f'Comparing them and writing the page took {page_s:.1f} s.')
     return int(not right)
+
+
+def compared(changes, first):
+    """
+    Compare the changes that the page names with those that were put in.
+
+    Parameters
+    ----------
+    changes : list of list of Change
+        Those told together stand together.
+    first : float
+        Time of the first day [days].
+
+    Returns
+    -------
+    rows : list of (str, float)
+        Shape and day of each change that was put in, as the page says; "nothing" if it is silent.
+    others : list of str
+        All other changes.
+
+    """
+    told = {}
+    for change in (one for group in changes for one in group):
+        told.setdefault((change.series.rig, change.series.name), []).append(change)
+    rows = []
+    for rig, name, *_ in lab.TRUTH:
+        found = told.get((rig, name))
+        rows.append((found[0].shape, began(found[0]) - first + 1.0) if found
+                    else ('nothing', float('nan')))
+        told[rig, name] = found[1:] if found else []
+    return rows, [' '.join(key) for key, found in told.items() for _ in found]
 
 
 def tune(args):

@@ -307,3 +307,22 @@ def test_a_cost_that_the_search_did_not_reach_is_told_as_more(best, told, monkey
     usual, other, needed = waits.quality('pid', 'ppr', 0)
     assert (usual, other) == (best, 1.0)
     assert waits.ratio_text(needed) == told
+
+
+def test_a_campaign_that_names_more_than_was_put_in_is_not_right():
+    """What stood beside a true name, or bore the same name, did not count."""
+    campaign = importlib.import_module('campaign')
+
+    def change(rig, name, shape, day):
+        return SimpleNamespace(series=SimpleNamespace(rig=rig, name=name, time=np.arange(30.0)),
+                               shape=shape, begin=day - 1)
+
+    put_in = [[change(*one)] for one in campaign.lab.TRUTH]
+    expected = [(shape, float(day)) for *_, shape, day in campaign.lab.TRUTH]
+    assert campaign.compared(put_in, 0.0) == (expected, [])
+    rig, name, shape, day = campaign.lab.TRUTH[0]
+    put_in[0] += [change(rig, 'creep', 'step', day), change(rig, name, 'line', day)]
+    rows, others = campaign.compared(put_in, 0.0)
+    assert rows == expected and sorted(others) == [f'{rig} creep', f'{rig} {name}']
+    rows, _ = campaign.compared(put_in[1:], 0.0)
+    assert rows[0][0] == 'nothing' and rows[1:] == expected[1:]
