@@ -326,3 +326,35 @@ def test_a_campaign_that_names_more_than_was_put_in_is_not_right():
     assert rows == expected and sorted(others) == [f'{rig} creep', f'{rig} {name}']
     rows, _ = campaign.compared(put_in[1:], 0.0)
     assert rows[0][0] == 'nothing' and rows[1:] == expected[1:]
+
+
+@pytest.fixture
+def recording(helper, monkeypatch, tmp_path):
+    """Return the benchmark of the recorder, its page in a folder of its own, and what it found."""
+    load = importlib.import_module('recording_load')
+    monkeypatch.setattr(helper, 'FOLDER', tmp_path)
+    page = tmp_path / 'recording.md'
+    page.write_text('<!-- begin: benchmarks/recording_load.py -->\n| former |\n'
+                    '<!-- end: benchmarks/recording_load.py -->\n', encoding='utf-8')
+    found = {'failure': '', 'duration_s': 60.0, 'messages': 9, 'messages_per_s': 1, 'missing': 0,
+             'lost': 0, 'dropped': 0, 'missed_at_start': 0, 'recorder_share_of_a_core': 0.1}
+    monkeypatch.setattr(load, 'measure', lambda *_: found)
+    monkeypatch.setattr(sys, 'argv', ['recording_load.py', '--write'])
+    return load, page, found
+
+
+def test_a_recording_that_fails_leaves_the_former_table(recording):
+    load, page, found = recording
+    found['failure'] = 'the plant ended early'
+    with pytest.raises(SystemExit, match='the plant ended early'):
+        load.main()
+    assert '| former |' in page.read_text(encoding='utf-8')
+
+
+@pytest.mark.parametrize('share, cell, code', [(0.1, '0.10', 0), (None, 'not known', 1)])
+def test_a_recording_is_written_also_without_the_cost_of_its_recorder(
+        recording, share, cell, code):
+    load, page, found = recording
+    found['recorder_share_of_a_core'] = share
+    assert load.main() == code
+    assert f'| 60.0 s | 9 | 1 | 0 | 0 | 0 | 0 | {cell} |' in page.read_text(encoding='utf-8')
