@@ -23,7 +23,8 @@ bag. The first twelfth of the run after the warm-up is compared with the last on
 mean memory, the period of each loop, and how many messages it sent per period. The period is the
 slope of the stamps over the number of periods: a message that was not sent does not count as a
 longer period. Exit code 1 if a process grew by more than 1 %, or the period of a loop changed by
-more than 0.001 %. The same if the experiment did not end with every message recorded.
+more than 0.001 %. The same if the experiment did not end with every message recorded. A run that
+fails leaves the page as it is.
 """
 
 import argparse
@@ -181,13 +182,13 @@ def run(args):
                 session.run_guarded(rig, result, samples.note)
         finally:
             plan.remove()
+        if result.failure:
+            raise SystemExit(result.failure)    # and the page keeps its former tables
         print(f'{result.duration_s:.0f} s, {sum(result.recorded.values())} messages recorded of '
               f'{sum(result.published.values())}\n')
-        problems = [*filter(None, (result.failure, *result.findings))]
-        print(''.join(f'{problem}\n' for problem in problems))
-        good = not problems and result.complete
-        if not result.failure:
-            good &= judge(samples, bag, LOOPS[args.valve])
+        print(''.join(f'{problem}\n' for problem in result.findings))
+        good = not result.findings and result.complete
+        good &= judge(samples, bag, LOOPS[args.valve])
     return 0 if good else 1
 
 
