@@ -32,10 +32,9 @@ from pam_actuation.tables.clock import clock_of
 from pam_actuation.tables.guess import is_exported, unit_of_column
 from pam_actuation.tables.lengths import size_of_mapping
 from pam_actuation.tables.mapping import TableMapping
-from pam_actuation.tables.plausible import Doubt, doubts, held_at_m, missing_values
+from pam_actuation.tables.plausible import against, Doubt, doubts, held_at_m, missing_values
 from pam_actuation.tables.signals import are_of_joint, BY_NAME, of_muscles
 from pam_actuation.tables.table import no_column_in, Table
-from pam_actuation.tables.units import of_output
 from pam_actuation.tables.words import unit_in
 from pam_actuation.topics.contents import Make
 from pam_actuation.topics.table import topic_of
@@ -170,7 +169,7 @@ def recording_of(tables: Sequence[Table], mapping: TableMapping, *, size: Size,
         result.told.append(f'{Path(table.source).name}: time from {clock.told}')
         result.found += [Doubt(f'{Path(table.source).name}: {text}')
                          for text in (*table.remarks, *clock.remarks)]
-        result.found += _without_gain(table, mapping, held)
+        result.found += _other_units(table, mapping, held)
         for name, column in held.items():
             values = mapping.signals[name].to_si(table.numbers(column, missing)[clock.rows])
             pieces.setdefault(name, []).append((*_said(
@@ -200,15 +199,15 @@ def _said(stamp_ns: IntArray, values: FloatArray, exported: bool) -> tuple[IntAr
     return (stamp_ns[there], values[there]) if exported and there.any() else (stamp_ns, values)
 
 
-def _without_gain(table: Table, mapping: TableMapping, held: Mapping[str, str]) -> list[Doubt]:
-    """Return a doubt on each output of a sensor that is taken for a unit, by signal to column."""
+def _other_units(table: Table, mapping: TableMapping, held: Mapping[str, str]) -> list[Doubt]:
+    """Return a doubt on each unit in the file that is not the stated one, by signal to column."""
     found = []
     for name, column in held.items():
         one, unit = mapping.signals[name], unit_of_column(table, column)
-        said = of_output(unit, BY_NAME[name].quantity) if one.gain == 1.0 else ''
+        said = against(unit, one, BY_NAME[name].quantity)
         if said and unit_in(one.column) != unit:            # `doubts` sees what is in the name
             found.append(Doubt(f'{name} (column "{column}" in {one.unit.name}): the file says '
-                               f'{unit}; {said}'))
+                               f'{said}'))
     return found
 
 

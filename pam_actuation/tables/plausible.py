@@ -24,10 +24,11 @@ from pam_actuation.bags.plausibility import (
 from pam_actuation.bags.sensor_faults import course_remarks
 from pam_actuation.tables.lengths import LEAST_KEPT
 from pam_actuation.tables.mapping import ColumnMap
+from pam_actuation.tables.parts import kind_of_pressure
 from pam_actuation.tables.signals import BY_NAME, of_muscles, Signal
 from pam_actuation.tables.units import (
     ABSOLUTE, ANGLE, FORCE, GAUGE, LENGTH, names_of, of_output, PRESSURE, unit_of_text)
-from pam_actuation.tables.words import unit_in
+from pam_actuation.tables.words import unit_in, words_of
 from pam_actuation.topics.table import topic_of
 from pam_sim.annotations import BoolArray, FloatArray, IntArray
 from pam_sim.units import EMPTY_PA, P_ATM_PA
@@ -295,13 +296,36 @@ def _gauge_or_absolute(signal: Signal, mapped: ColumnMap, finite: FloatArray, si
 
 def _other_unit(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Size
                 ) -> Doubt | None:
-    in_name = unit_in(mapped.column)
-    if mapped.gain == 1.0 and (output := of_output(in_name, signal.quantity)):
-        return Doubt(f'the name of the column says {in_name}; {output}')
-    said = unit_of_text(in_name, signal.quantity) if in_name else None
-    if said is None or said.factor == mapped.unit.factor or mapped.gain != 1.0:
-        return None
-    return Doubt(f'the name of the column says {said.name}')
+    said = against(unit_in(mapped.column), mapped, signal.quantity)
+    if not said and signal.quantity == PRESSURE:
+        kind = kind_of_pressure(words_of(mapped.column))            # `Absolutdruck [bar]`
+        said = '' if mapped.unit.name.endswith(kind) else kind
+    return Doubt(f'the name of the column says {said}') if said else None
+
+
+def against(text: str, mapped: ColumnMap, quantity: str) -> str:
+    """
+    Return what a unit in the file says against the one that was stated, '' where they agree.
+
+    Parameters
+    ----------
+    text : str
+        The unit as the file writes it; '' without one.
+    mapped : ColumnMap
+        With a gain it holds what a sensor puts out, of which the file need not say the unit.
+    quantity : str
+        Of the signal.
+
+    """
+    if not text or mapped.gain != 1.0:
+        return ''
+    if output := of_output(text, quantity):
+        return f'{text}; {output}'
+    said, unit = unit_of_text(text, quantity), mapped.unit
+    if said is None or said.factor == unit.factor and (
+            not said.is_complete or said.offset == unit.offset):
+        return ''
+    return said.name
 
 
 def _raw(mapped: ColumnMap, values: FloatArray) -> FloatArray:

@@ -312,6 +312,25 @@ def test_a_sensor_in_milliamperes_without_a_gain(text, is_told):
     assert ('mA is what a sensor puts out' in said) == is_told
 
 
+@pytest.mark.parametrize('name, unit, stated, said', [
+    ('Force', 'lbf', 'force=Force:N', 'the file says lbf'),
+    ('Force', 'N', 'force=Force:N', ''), ('Force [N]', 'kgf', 'force=#2:N', 'the file says kgf'),
+    ('Pressure', 'bar g', 'pressure=Pressure:bar_abs', 'the file says bar_gauge'),
+    ('Pressure', 'bar', 'pressure=Pressure:bar_abs', ''),
+    ('p_bar_abs', '-', 'pressure=p_bar_abs:bar_gauge', 'the name of the column says bar_abs'),
+    ('Absolutdruck [bar]', '-', 'pressure=Absolutdruck [bar]:bar_gauge', 'column says abs'),
+    ('p_bar_abs', '-', 'pressure=p_bar_abs:bar_abs', '')])
+def test_a_unit_against_that_of_the_file_is_told(name, unit, stated, said, tmp_path, monkeypatch,
+                                                 capsys):
+    monkeypatch.chdir(tmp_path)
+    rows = ''.join(f'{0.01 * k:.2f};{2 + k % 70 / 20:.2f}\n' for k in range(200))
+    units = '' if unit == '-' else f's;{unit}\n'
+    (tmp_path / 'a.csv').write_text(f'Time{"" if units else "_s"};{name}\n{units}{rows}')
+    assert main(['import', 'a.csv', '--out', 'bag', '--map', stated]) < 2
+    out = capsys.readouterr().out
+    assert said in out if said else ' says ' not in out
+
+
 def test_how_to_begin_with_names_that_nobody_knows():
     columns = {name: pd.Series(np.arange(9.0)) for name in (
         'T_(ms)', 'Sys_Volts_(V)', 'Piezo_P_(mA)', 'V_dist_(mA)')}
