@@ -23,6 +23,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 import math
+import os
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
@@ -377,9 +378,12 @@ def checked_law(choice: LawChoice, where: str = '', bore_m: float | None = None)
 def _read_law_table(stated: Located) -> LookupTable:
     given = stated['table']
     if isinstance(given, str):
-        path = Path(given)
-        here = Path(stated.name).parent
-        return read_table(path if path.is_absolute() or path.exists() else here / path)
+        # The name of a text without a file has no folder: the current one counts.
+        path = Path(stated.name).parent / given
+        if not os.path.exists(path):
+            raise stated.error(f'`table` is {given}, and {path.absolute()} is not there; a path '
+                               'counts from the folder of the model file', 'table')
+        return read_table(path)
     if not isinstance(given, Located):
         raise stated.error('`table` is the path of a CSV file or a mapping of '
                            + ', '.join(names_of(TABLE_KEYS)), 'table')

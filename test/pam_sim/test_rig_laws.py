@@ -178,6 +178,22 @@ def test_a_table_by_path_stands_beside_the_model(tmp_path):
     assert rig.muscle.law.table == table_of()
 
 
+def test_a_table_of_the_same_name_in_the_current_folder_is_another_one(tmp_path, monkeypatch):
+    here, there = tmp_path / 'b', tmp_path / 'a'
+    for folder, table in ((here, table_of(loads=8)), (there, table_of())):
+        folder.mkdir()
+        table.write_csv(folder / 'mine.csv')
+    text = f'rig: {RIG}\nlaw: {{name: lookup, table: mine.csv}}\n'
+    (there / 'model.yaml').write_text(text)
+    monkeypatch.chdir(here)
+    assert load_rig('../a/model.yaml').muscle.law.table == table_of()
+    # A text has no folder of its own.
+    assert load_rig(text).muscle.law.table == table_of(loads=8)
+    (there / 'mine.csv').unlink()
+    with pytest.raises(InputError, match='model.yaml:2: `table` is mine.csv, and .*a/mine.csv is'):
+        load_rig('../a/model.yaml')
+
+
 @pytest.mark.parametrize('text, line, words', [
     (f'rig: {RIG}\nlaw: saroshi\n', 2, ['did you mean `sarosi`']),
     (f'rig: {RIG}\nlaw:\n  name: sarosi\n  set: dmsp_7\n', 2, ['dmsp_7', 'dmsp_20_400n']),
