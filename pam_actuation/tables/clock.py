@@ -40,6 +40,7 @@ UNLIKELY_HZ = 1.0                           # below: the user has to say the uni
 FEWEST_RISING = 20                          # rows that tell a time from values that rise
 EPOCH_S = 9e8                               # seconds that can only count from 1970
 GAP_S, GAP_STEPS = 0.05, 5.0                # longer than both: rows are missing
+CLOCK_ROWS, CLOCK_SHARE = 3.0, 0.02         # further apart: two clocks, and not one that drifts
 JUMP_S = 10.0                               # longer than this and the rest: the clock was set
 
 
@@ -61,7 +62,7 @@ def time_column(table: Table, mapping: TableMapping) -> TimeMap | None:
 
 def _rank(table: Table, name: str) -> int:
     """Return how far behind others of its kind a column of the time stands."""
-    if is_output(table.units.get(name, '') or unit_in(name), TIME):
+    if is_output(table.units.get(name, '') or unit_in(table.title_of(name)), TIME):
         return 3                                            # such as `t_ticks`
     values = table.columns[name]
     if holds_dates(values):
@@ -126,7 +127,60 @@ def clock_of(table: Table, mapping: TableMapping, sort: bool = False, part: int 
         read = Times(table.stamp_ns, f'times of the messages on {table.topic}')
     else:
         read = _from_column(table, column)
-    return _with_gaps(table, in_order(table, read, sort, part))
+    clock = _with_gaps(table, in_order(table, read, sort, part))
+    other = '' if column is None else _other_clock(
+        table, table.require(column.column), read.stamp_ns, clock.rows)
+    if other and column is not None and mapping.time is None:
+        raise InputError(f'{other}, or say which of them is the time of every signal, with '
+                         f'--map time="{column.column}"', table.source)
+    return replace(clock, remarks=(*clock.remarks, other)) if other else clock
+
+
+def _other_clock(table: Table, name: str, stamp_ns: IntArray, rows: IntArray) -> str:
+    """
+    Return a sentence on a second time in the rows, as of another logger; '' without one.
+
+    Parameters
+    ----------
+    table : Table
+        The table.
+    name : str
+        The column that is the time.
+    stamp_ns : ndarray of int64
+        The times in it, of all rows.
+    rows : ndarray of int64
+        The rows that count.
+
+    """
+    pair = pair_of(table, name) or ()
+    for other in table.columns:
+        if other == name or other in pair or not is_called_time(table, other):
+            continue
+        values = table.columns[other]
+        # Without a unit it may count the rows.
+        if not (_unit_of_name(table, other) or _is_text_date(values)
+                or table.title_of(other) == table.title_of(name)):
+            continue
+        both = rows[values.notna().to_numpy()[rows]]
+        try:
+            stamps = _from_column(replace(
+                table, columns={other: values.iloc[both]}, lines=None, numbered=None),
+                TimeMap(other)).stamp_ns
+        except InputError:
+            continue
+        steps, own_steps = np.diff(stamps), np.diff(stamp_ns[both])
+        if not steps.any() or not own_steps.any() or min(steps.min(), own_steps.min()) < 0:
+            continue                                # it stands still, or begins anew
+        # A coarse clock, one that drifts and one that is read late go with the rows all the same.
+        usual_ns = max(float(np.median(one[one > 0])) for one in (steps, own_steps))
+        long_ns, own_ns = int(steps.sum()), int(own_steps.sum())
+        apart_ns = float(np.abs(np.cumsum(steps) - np.cumsum(own_steps)).max())
+        if apart_ns > max(CLOCK_ROWS * usual_ns, CLOCK_SHARE * max(long_ns, own_ns)):
+            return (f'columns "{name}" and "{other}" are both called a time, and go on by '
+                    f'{1e-9 * own_ns:.6g} s and {1e-9 * long_ns:.6g} s over the same '
+                    f'{len(both)} rows: two clocks? Give the columns of each logger their own '
+                    'file')
+    return ''
 
 
 def _hidden(table: Table, mapping: TableMapping) -> tuple[str, ...]:
@@ -172,9 +226,12 @@ def _from_column(table: Table, column: TimeMap) -> Times:
     numbers = table.numbers(name)
     missing = np.flatnonzero(~np.isfinite(numbers))
     if len(missing):
-        raise InputError(
-            f'column "{name}" has no time here ({len(missing)} such rows); delete the rows, or '
-            'give --rate HZ', table.place(int(missing[0])))
+        others = [one for one in table.columns if one != name and is_called_time(table, one)]
+        fix = (f'column "{others[0]}" is called a time too: if they are of two loggers, give the '
+               'columns of each their own file') if others else (
+               'delete the rows, or give --rate HZ')
+        raise InputError(f'column "{name}" has no time here ({len(missing)} such rows); {fix}',
+                         table.place(int(missing[0])))
     days = days_as_ns(numbers) if unit in ('', DATE) else None
     if days is not None:
         return Times(days, f'column "{name}" in days', _resolution_ns(days))
@@ -233,7 +290,7 @@ def _paired(table: Table, date: str, time: str) -> Times:
 
 def _unit_of_name(table: Table, name: str) -> str:
     """Return the unit that the row of units or the name of the column says, '' without one."""
-    for text in (table.units.get(name, ''), unit_in(name)):
+    for text in (table.units.get(name, ''), unit_in(table.title_of(name))):
         unit = unit_of_text(text, TIME) if text else None
         if unit is not None:
             return unit.name
@@ -242,7 +299,7 @@ def _unit_of_name(table: Table, name: str) -> str:
 
 def _unit_by_rate(table: Table, name: str, numbers: FloatArray) -> str:
     """Return the one unit in which the rows come at a rate that recorders have."""
-    said = unit_in(name) or table.units.get(name, '')
+    said = unit_in(table.title_of(name)) or table.units.get(name, '')
     if said and not any(unit_of_text(said, one) for one in FACTORS):
         raise InputError(f'column "{name}" has the unit {said!r}, which is none of a time; add '
                          f'--map time="{name}:s" (or ms, us, ns)', table.source)

@@ -34,7 +34,7 @@ _MOST_DAYS = 1000
 
 def is_called_time(table: Table, column: str) -> bool:
     """Return whether the name of a column says that it is a time or a date."""
-    words = words_of(column)
+    words = words_of(table.title_of(column))
     # Of several languages, and anything in others.
     dated = ' '.join('date' if word in ('data', 'dato') else word for word in words.split())
     return is_time(words) or is_time(dated) and (

@@ -100,6 +100,10 @@ class Table:
             raise InputError(no_column(wanted, self.columns), where or self.source)
         return name
 
+    def title_of(self, column: str) -> str:
+        """Return what stands above a column in the file, also where it stands there twice."""
+        return column.startswith('#') and self.called.get(column, '') or column
+
     def place(self, row: int) -> str:
         """Return where a row stands, for people: file and line, or file and row or message."""
         if self.lines is not None:

@@ -86,6 +86,42 @@ def test_a_rate_says_what_time_it_hides(call):
     assert code == 2 and 'give one of them' in said
 
 
+def two_loggers(names, first_s, second_s, rows=ROWS, lost=0):
+    """Write a file of two loggers side by side; the first has no values in the last rows."""
+    lines = [names]
+    for k in range(rows):
+        first = f'{first_s * k:.3f};{1 + k % 700 / 200:.3f}' if k < rows - lost else ';'
+        lines.append(f'{first};{second_s * k:.3f};{40 + k % 900 / 9:.2f}')
+    with open('two.csv', 'w', encoding='utf-8') as stream:
+        stream.write('\n'.join([*lines, '']))
+
+
+@pytest.mark.parametrize('names', [
+    'Time [s];Pressure [bar g];t [s];Force [N]', 'Time [s];Pressure [bar g];Time [s];Force [N]',
+    'Time;Pressure [bar g];Time;Force [N]'])
+def test_two_loggers_side_by_side_have_two_clocks(names, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    first, second = ('Time [s]', 't [s]') if 't [s]' in names else ('#1', '#3')
+    words = ['import', 'two.csv', '--out', 'bag', '--overwrite']
+    two_loggers(names, 0.01, 0.002)
+    assert main(words) == 2 and not (tmp_path / 'bag').exists()
+    said = capsys.readouterr().err
+    assert (f'"{first}" and "{second}" are both called a time, and go on by 19.99 s and 3.998 s '
+            'over the same 2000 rows: two clocks? Give the columns of each logger their own file'
+            in said)
+    assert said.rstrip().endswith(f'--map time="{first}"')
+    assert main([*words, '--map', f'time={second}:s']) == 1
+    assert 'two clocks?' in capsys.readouterr().out
+    # The one that ends first has no time in the last rows.
+    two_loggers(names, 0.01, 0.002, lost=1000)
+    assert main(words) == 2
+    assert f'column "{second}" is called a time too' in capsys.readouterr().err
+    # A clock that drifts is no other one.
+    two_loggers(names, 0.01, 0.01004)
+    assert main(words) == 0, capsys.readouterr().err
+    assert 'two clocks' not in capsys.readouterr().out
+
+
 def test_the_counts_are_of_what_is_in_the_bag(call, tmp_path):
     lost = np.where((NUMBERS >= 500) & (NUMBERS < 1500), np.nan, PRESSURE_BAR)
     code, said = call(NUMBERS, lost)
