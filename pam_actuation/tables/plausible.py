@@ -27,7 +27,7 @@ from pam_actuation.tables.mapping import ColumnMap
 from pam_actuation.tables.parts import kind_of_pressure
 from pam_actuation.tables.signals import BY_NAME, of_muscles, Signal
 from pam_actuation.tables.units import (
-    ABSOLUTE, ANGLE, FORCE, GAUGE, LENGTH, names_of, of_output, PRESSURE, unit_of_text)
+    ABSOLUTE, ANGLE, DUTY, FORCE, GAUGE, LENGTH, names_of, of_output, PRESSURE, unit_of_text)
 from pam_actuation.tables.words import unit_in, words_of
 from pam_actuation.topics.table import topic_of
 from pam_sim.annotations import BoolArray, FloatArray, IntArray
@@ -46,6 +46,7 @@ HUGE = 1e30
 # Below, another unit is likely.
 LEAST_MOVE = {PRESSURE: 200.0, LENGTH: 5e-5, FORCE: 0.2, ANGLE: 2e-3}
 NEAR_ATMOSPHERE_PA = 5e3
+MOST_SHARE = 1.0 + 1e-6              # of a column that holds 0 to 1
 FEWEST_EMPTY = 3                     # values of an empty muscle
 MOST_DROPPED = 0.1                   # of the values; more zeros are no sensor that drops out
 DROP_STEPS = 1.5                     # times the largest other step: into a zero and out of it
@@ -213,7 +214,7 @@ def _of_values(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Size
         return [*found, Doubt(f'the value never changes ({_shown(signal, float(finite.min()))}): '
                               'is the sensor connected?')]
     looks = (_hardly_moves, _pulls_much, _pushes, _moves_no_muscle, _gauge_or_absolute,
-             _other_unit)
+             _other_unit, _is_a_share)
     doubted = [look(signal, mapped, finite, size) for look in looks]
     return [*found, *(doubt for doubt in doubted if doubt is not None)]
 
@@ -301,6 +302,17 @@ def _other_unit(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Siz
         kind = kind_of_pressure(words_of(mapped.column))            # `Absolutdruck [bar]`
         said = '' if mapped.unit.name.endswith(kind) else kind
     return Doubt(f'the name of the column says {said}') if said else None
+
+
+def _is_a_share(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Size
+                ) -> Doubt | None:
+    """Ask about a duty in % that is never more than 1, with which no valve opens."""
+    share, raw = unit_of_text('1', DUTY), _raw(mapped, finite)
+    if signal.quantity != DUTY or share is None or mapped.unit.name == share.name or (
+            mapped.gain != 1.0 or mapped.zero != 0.0 or float(raw.max()) > MOST_SHARE):
+        return None
+    return Doubt(f'it reaches {float(raw.max()):.3g} % only, at which no valve opens: is it a '
+                 f'share of 1? Then write {replace(mapped, unit=share).option(signal.name)}')
 
 
 def against(text: str, mapped: ColumnMap, quantity: str) -> str:

@@ -200,6 +200,24 @@ def test_a_workbook_with_a_sheet_of_remarks_dates_and_units(tmp_path, capsys):
     assert 'lab.xlsx, sheet Run 3:80: column "p" holds \'OVL\'' in capsys.readouterr().err
 
 
+def test_cells_in_per_cent_hold_what_the_sheet_shows(tmp_path):
+    import openpyxl
+    book = openpyxl.Workbook()
+    sheet = book.active
+    sheet.append(['t_s', 'Fill valve [%]', 'Vent valve', 'x_mm'])
+    for k in range(60):
+        sheet.append([0.01 * k, k / 60, k / 60, 0.1 * k])
+        sheet.cell(k + 2, 2).number_format = '0%' if k else '0.0%'
+        sheet.cell(k + 2, 3).number_format = '0%'
+    book.save(tmp_path / 'lab.xlsx')
+    table, = read_tables(tmp_path / 'lab.xlsx')
+    shown = np.arange(60) / 60
+    np.testing.assert_allclose(table.numbers('Fill valve [%]'), 100.0 * shown)
+    # Where no unit is stated, the question is about what the file holds.
+    np.testing.assert_allclose(table.numbers('Vent valve'), shown)
+    assert table.numbers('x_mm')[-1] == 5.9
+
+
 def test_a_motion_of_opensim(tmp_path, capsys):
     rows = ''.join(f'      {0.01 * k:.8f}\t      {-30 - 0.1 * k:.8f}\t       1.5\r\n'
                    for k in range(1, 100))

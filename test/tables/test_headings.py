@@ -150,3 +150,19 @@ def test_duties_are_the_command_of_the_valve(tmp_path, monkeypatch, capsys):
     main(['import', 'm.csv', '--map', 'fill_duty=fill_duty:1', '--map', 'vent_duty=vent_duty:1',
           '--out', 'again'])
     assert 'no command of the valve' not in capsys.readouterr().out
+
+
+def test_a_duty_in_per_cent_that_never_exceeds_1_is_asked_about(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'm.csv').write_text('t_s;p_bar_gauge;fill_pct;vent_pct\n' + ''.join(
+        f'{0.01 * k:.2f};{p:.4f};{0.25 * p:.4f};{1.0 - 0.25 * p:.4f}\n'
+        for k, p in enumerate(WAVE)))
+    words = ['import', 'm.csv', '--out', 'bag', '--overwrite']
+    assert main(words) == 1
+    said = capsys.readouterr().out
+    assert 'is it a share of 1? Then write --map fill_duty="fill_pct:1"' in said
+    assert '--map vent_duty="vent_pct:1"' in said
+    main([*words, '--map', 'fill_duty=fill_pct:1', '--map', 'vent_duty=vent_pct:1'])
+    assert 'share of 1' not in capsys.readouterr().out
+    assert load_run('bag')['valve_signal']['vent_duty'].max() == pytest.approx(
+        1.0 - 0.25 * min(WAVE), abs=1e-3)

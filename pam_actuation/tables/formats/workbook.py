@@ -18,6 +18,7 @@ from datetime import date, datetime, time
 from functools import partial
 import io
 import math
+import re
 from typing import Any, TYPE_CHECKING
 import zipfile
 
@@ -27,6 +28,8 @@ from pam_sim.errors import InputError
 
 if TYPE_CHECKING:
     import pandas as pd
+
+_PERCENT = re.compile(r'%|\b(pct|percent|prozent)\b|_pct\b', re.IGNORECASE)
 
 
 def read(path: str, every: int, wanted: Collection[str] | None,
@@ -62,7 +65,19 @@ def read(path: str, every: int, wanted: Collection[str] | None,
 
 def _as_text(sheet: Any) -> bytes:
     """Return a sheet with tabs between its cells, a line for each row, without empty edges."""
-    rows = [[_cell(value) for value in row] for row in sheet.iter_rows(values_only=True)]
+    rows: list[list[str]] = []
+    in_percent: set[int] = set()        # columns above whose numbers stands a text with %
+    for cells in sheet.iter_rows():
+        row = []
+        for place, cell in enumerate(cells):
+            value = cell.value
+            if isinstance(value, str) and _PERCENT.search(value):
+                in_percent.add(place)
+            elif place in in_percent and isinstance(value, float | int) and '%' in (
+                    cell.number_format or ''):
+                value = float(f'{100.0 * value:.15g}')          # a sheet that shows 50 % has 0.5
+            row.append(_cell(value))
+        rows.append(row)
     used = [place for row in rows for place, text in enumerate(row) if text]
     if not used:
         return b''
