@@ -14,9 +14,13 @@
 
 """Numbers with marks between thousands: read where they are certain, told where they are not."""
 
+import io
+
 import numpy as np
 from pam_actuation.cli.main import main
 from pam_actuation.tables.formats import read_tables
+from pam_actuation.tables.formats.damage import WatchedText
+from pam_actuation.tables.formats.layout_of_text import layout_of
 from pam_actuation.tables.thousands import marks_of
 from pam_sim.errors import InputError
 import pandas as pd
@@ -96,3 +100,31 @@ def test_whole_numbers_in_a_file_with_spaces_stay_columns(tmp_path):
     (tmp_path / 'm.txt').write_text(''.join(f'{k} 200 {300 + k}\n' for k in range(1, 40)))
     table, = read_tables(tmp_path / 'm.txt')
     assert len(table.columns) == 3
+
+
+def read_in_pieces(text, size):
+    """Read a text as pandas does, in pieces."""
+    watched = WatchedText(io.StringIO(text, newline=''), 'm.csv', layout_of(text.encode(), 'm.csv'))
+    while watched.read(size):
+        pass
+
+
+@pytest.mark.parametrize('size', range(1, 40))
+def test_a_number_on_the_edge_of_a_piece_counts_as_a_whole(size):
+    rows = ''.join(f'2026-11-25 09:30:0{k}.125;1.016,10;{k},25\n' for k in range(9))
+    read_in_pieces(f't;p;x\n{rows}', size)
+    for wrong in ('41.200', '-41.200'):
+        for end in (f'{wrong};0,5\n{rows}', f'0,5;{wrong}\n{rows}', f'0,5;{wrong}'):
+            with pytest.raises(InputError, match=f"m.csv:11: '{wrong}' stands beside numbers"):
+                read_in_pieces(f't;p;x\n{rows}2026-11-25 09:30:09.125;{end}', size)
+
+
+def test_a_long_file_with_points_between_thousands_is_read(tmp_path):
+    k = np.arange(60_000)
+    (tmp_path / 'm.csv').write_text('time;p_mbar;x_mm\n' + ''.join(
+        f'2026-11-25 09:{row // 6000:02d}:{row // 100 % 60:02d}.{row % 100:02d}0;1.016,10;'
+        f'{row % 90},5\n' for row in k.tolist()))
+    assert (tmp_path / 'm.csv').stat().st_size > 2_000_000          # nine pieces
+    table, = read_tables(tmp_path / 'm.csv')
+    np.testing.assert_allclose(table.numbers('x_mm'), k % 90 + 0.5)
+    assert (table.numbers('p_mbar') == 1016.1).all()

@@ -27,6 +27,7 @@ from pam_sim.errors import InputError
 if TYPE_CHECKING:
     import pandas as pd
 
+LONGEST_FIELD = 1000             # characters of a field that is looked at as a whole
 NOT_CLOSED = ('a quotation mark is not closed here, so the rows below would be lost; delete it, '
               'or close the quotes in the same line')
 MOST_SHORT = 0.01                # share of rows that lack fields and may be left out
@@ -58,6 +59,11 @@ class WatchedText:
     def __init__(self, stream: TextIO, path: str, layout: TextLayout) -> None:
         self._stream, self._path, self._layout = stream, path, layout
         self.line, self.last = 1, ''
+        self._field = ''                # the last field of the text before, which may go on
+        separator = '' if layout.separator == r'\s+' else re.escape(layout.separator)
+        self._between = re.compile(rf'[{separator}\s"]')
+        self._marked = re.compile(
+            rf'(?<![^{separator}\s"])[+-]?\d{{1,3}}(\.\d{{3}})+(?![^{separator}\s"])')
 
     def read(self, size: int = -1) -> str:
         """Return the next characters; InputError where there are zero bytes."""
@@ -67,7 +73,7 @@ class WatchedText:
             raise InputError(
                 'holds zero bytes, as after a power cut; delete the damaged lines',
                 f'{self._path}:{self.line + _ends(text[:zero])}')
-        if self._layout.decimal == ',' and '.' in text:
+        if self._layout.decimal == ',':
             self._refuse_thousands(text)
         if text:
             self.line, self.last = self.line + _ends(text), text[-1]
@@ -75,13 +81,20 @@ class WatchedText:
 
     def _refuse_thousands(self, text: str) -> None:
         """Raise InputError at 41.200 beside decimal commas: pandas would read 41.2."""
-        between = '' if self._layout.separator == r'\s+' else re.escape(self._layout.separator)
-        found = re.search(
-            rf'(?<![^{between}\s"])[+-]?\d{{1,3}}(\.\d{{3}})+(?![^{between}\s"])', text)
-        if found and self.line + _ends(text[:found.start()]) >= self._layout.first_line:
-            raise InputError(
-                f'{found[0]!r} stands beside numbers with decimal commas: {SENTENCE}',
-                f'{self._path}:{self.line + _ends(text[:found.start()])}')
+        whole, self._field = self._field + text, ''
+        if text:                                    # the file goes on
+            more = len(whole) - LONGEST_FIELD
+            ends = [one.end() for one in self._between.finditer(whole, max(0, more))]
+            end = ends[-1] if ends else len(whole) if more > 0 else 0
+            whole, self._field = whole[:end], whole[end:]
+        if '.' not in whole:
+            return
+        for found in self._marked.finditer(whole):
+            line = self.line + _ends(whole[:found.start()])
+            if line >= self._layout.first_line:
+                raise InputError(
+                    f'{found[0]!r} stands beside numbers with decimal commas: {SENTENCE}',
+                    f'{self._path}:{line}')
 
     def __iter__(self) -> Iterator[str]:
         """Return the lines that are left."""
