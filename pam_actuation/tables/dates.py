@@ -30,6 +30,8 @@ _MATLAB, _MATLAB_DAYS = -719_529, (714_000.0, 774_000.0)
 _LEAST_STEP_DAYS, _MOST_STEP_DAYS = 1.0 / (86_400 * 50_000.0), 2.0 / 86_400
 _ORDERS = {'ymd': 'year, month, day', 'dmy': 'day, month, year', 'mdy': 'month, day, year'}
 _LATE_HOUR_NS = DAY_NS // 2         # back by more than this: midnight passed
+_HOUR_NS = 3600 * 10**9             # minutes and seconds begin anew
+_LATE_MINUTE_NS = 58 * 60 * 10**9
 # A date in any order, a time of day of two or three parts, and a half of the day.
 PATTERN = (
     r'^\s*(?:(?P<first>\d{1,4})(?P<mark>[-/.])(?P<second>\d{1,2})[-/.](?P<third>\d{1,4})[T\s,]+)?'
@@ -62,12 +64,12 @@ class Dates:
     remark: str = ''
 
 
-def dates_of(values: 'pd.Series') -> Dates | int:
+def dates_of(values: 'pd.Series', dated: bool = False) -> Dates | int:
     """
     Return the times in a column of texts, or the first row that holds none.
 
     ISO 8601; ``3.4.2026 9:30:00,125``, ``4/3/2026 9:30:00.125 AM`` and others; a time of day
-    alone; minutes and seconds such as ``01:23.456``.
+    alone; minutes and seconds such as ``01:23.456``. With ``dated`` their dates stand elsewhere.
     """
     import pandas as pd
     iso = pd.to_datetime(values, errors='coerce', utc=True, format='ISO8601')
@@ -77,18 +79,38 @@ def dates_of(values: 'pd.Series') -> Dates | int:
     wrong = np.flatnonzero(found['hour'].isna().to_numpy())
     if len(wrong):
         return int(wrong[0])
-    minutes = bool(found['second_of'].isna().all() and found['part'].notna().all())
+    minutes, remark = _are_minutes(found, dated)
     day_ns, is_wrong = _of_day(found, minutes)
     if is_wrong.any():
         return int(np.flatnonzero(is_wrong)[0])
     has_date = found['first'].notna().to_numpy()
     if not has_date.any():
-        back = np.diff(day_ns, prepend=day_ns[:1]) < -_LATE_HOUR_NS
-        return Dates(day_ns + DAY_NS * np.cumsum(back),
-                     'minutes and seconds' if minutes else 'times of day', True)
+        late_ns, whole_ns = (_LATE_MINUTE_NS, _HOUR_NS) if minutes else (_LATE_HOUR_NS, DAY_NS)
+        back = np.diff(day_ns, prepend=day_ns[:1]) < -late_ns
+        return Dates(day_ns + whole_ns * np.cumsum(back),
+                     'minutes and seconds' if minutes else 'times of day', True, remark)
     if not has_date.all():
         return int(np.flatnonzero(~has_date)[0])
     return _dated(found, day_ns)
+
+
+def _are_minutes(found: 'pd.DataFrame', dated: bool) -> tuple[bool, str]:
+    """
+    Return whether texts of two parts are minutes and seconds, with a remark if only rows say so.
+
+    Hours and minutes have no fraction, and no recording has its rows a minute apart.
+    """
+    of_day = dated or found[['first', 'half']].notna().any(axis=None)
+    if found['second_of'].notna().any() or of_day and not found['part'].notna().all():
+        return False, ''
+    if found['part'].notna().any():
+        return True, ''
+    hours, minutes = (found[name].astype('int64').to_numpy() for name in ('hour', 'minute'))
+    steps = np.diff(60 * hours + minutes)
+    if not len(steps) or float(np.median(steps)) < 1.0:
+        return bool((hours > 23).any()), ''
+    return True, (f'times such as {hours[1]:02d}:{minutes[1]:02d} were read as minutes and '
+                  'seconds; as hours and minutes the rows would be a minute apart')
 
 
 def _of_day(found: 'pd.DataFrame', minutes: bool) -> tuple[IntArray, BoolArray]:

@@ -86,7 +86,7 @@ def dates_of_pair(table: Table, date: str, time: str) -> Dates | int:
     if isinstance(found, int) or texts.nunique() > 1:
         return found
     # One date on all rows is that of the start: after midnight the times go on.
-    of_day = dates_of(times)
+    of_day = dates_of(times, dated=True)
     if isinstance(of_day, int):
         return of_day
     begin_ns = found.stamp_ns[0] - of_day.stamp_ns[0]

@@ -53,6 +53,29 @@ def test_minutes_and_seconds_are_told_from_hours_and_minutes():
     assert found.stamp_ns.tolist() == [59_990_000_000, 60_005_000_000]
 
 
+def test_two_parts_whose_rows_would_be_a_minute_apart_are_minutes_and_seconds():
+    at_s = np.arange(3540, 3700)
+    found = dates_of(pd.Series([f'{t // 60 % 60:02d}:{t % 60:02d}' for t in at_s]))
+    assert found.told == 'minutes and seconds' and 'such as 59:01' in found.remark
+    # After an hour they begin anew.
+    assert found.stamp_ns.tolist() == (10**9 * at_s).tolist()
+    part = dates_of(pd.Series(['59:59.9', '00:00', '00:00.1', '00:00.2']))
+    assert np.diff(part.stamp_ns).tolist() == [100_000_000] * 3 and not part.remark
+    # Several rows a minute, or a half of the day: hours and minutes.
+    several = dates_of(pd.Series([f'09:{row // 9:02d}' for row in range(60)]))
+    assert several.told == 'times of day' and several.stamp_ns[-1] == 32_760_000_000_000
+    assert dates_of(pd.Series(['09:30 AM', '09:31 AM'])).told == 'times of day'
+
+
+@pytest.mark.parametrize('text', ['2026-03-14 09:{:02d}:00', '09:{:02d}:00', '09:{:02d} AM'])
+def test_rows_that_are_a_minute_apart_are_no_recording(tmp_path, text):
+    (tmp_path / 'log.csv').write_text('time;p\n' + ''.join(
+        f'{text.format(row)};1.5\n' for row in range(30)))
+    table, = read_tables(tmp_path / 'log.csv')
+    with pytest.raises(InputError, match='means a row every 60 s, allowed are rows every 10 s'):
+        clock_of(table, TableMapping())
+
+
 def test_milliseconds_may_stand_behind_a_colon():
     found = dates_of(pd.Series(['14.03.2026 23:59:59:995', '15.03.2026 00:00:00:000']))
     assert np.diff(found.stamp_ns).tolist() == [5_000_000]

@@ -104,7 +104,8 @@ def test_whole_numbers_in_a_file_with_spaces_stay_columns(tmp_path):
 
 def read_in_pieces(text, size):
     """Read a text as pandas does, in pieces."""
-    watched = WatchedText(io.StringIO(text, newline=''), 'm.csv', layout_of(text.encode(), 'm.csv'))
+    layout = layout_of(text.encode(), 'm.csv')
+    watched = WatchedText(io.StringIO(text, newline=''), 'm.csv', layout)
     while watched.read(size):
         pass
 
