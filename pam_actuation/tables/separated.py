@@ -16,11 +16,15 @@
 
 import csv
 from pathlib import Path
+import re
 
 from pam_actuation.tables.formats.layout_of_text import encoding_of, layout_of, split
+from pam_actuation.tables.thousands import SENTENCE
 from pam_sim.errors import InputError
 from pam_sim.files import refuse_pipe, StrPath
 from pam_sim.muscle.lookup_table import lines_and_source
+
+_POINTS = re.compile(r'[+-]?\d{1,3}(\.\d{3})+')        # 1016, or 1.016: nobody knows
 
 
 def rows_of_text(path: StrPath) -> tuple[list[list[str]], str]:
@@ -33,7 +37,7 @@ def rows_of_text(path: StrPath) -> tuple[list[list[str]], str]:
     Raises
     ------
     InputError
-        The file cannot be read as text.
+        The file cannot be read as text, or a number such as 1.016 stands beside decimal commas.
 
     """
     refuse_pipe(path)
@@ -53,5 +57,10 @@ def rows_of_text(path: StrPath) -> tuple[list[list[str]], str]:
     else:
         rows = [split(line, layout.separator) for line in lines[layout.first_line - 2:]]
     if layout.decimal == ',':
+        for number, row in enumerate(rows[1:], 1):
+            wrong = next((cell for cell in row if _POINTS.fullmatch(cell.strip())), None)
+            if wrong is not None:
+                raise InputError(f'data row {number}: {wrong.strip()!r} stands beside numbers '
+                                 f'with decimal commas: {SENTENCE}', str(path))
         rows[1:] = [[cell.replace(',', '.') for cell in row] for row in rows[1:]]
     return rows, source

@@ -76,6 +76,15 @@ def test_a_wrong_cell_is_named_with_its_row(tmp_path, capsys):
     assert "data row 7, `force_n`: 'viel' is no number" in capsys.readouterr().err
 
 
+def test_a_point_beside_decimal_commas_is_refused(tmp_path, capsys):
+    path = tmp_path / 'map.csv'
+    path.write_text(COMMA.replace('100;0,19;65,000', '100;0,19;1.065'))
+    assert main(['characterise', str(path), '--length-m', '0.2', '--out',
+                 str(tmp_path / 'out')]) == 2
+    assert "data row 7: '1.065' stands beside numbers with decimal commas: are there points" in (
+        capsys.readouterr().err)
+
+
 def test_the_reader_of_commas_says_what_separates(tmp_path):
     path = tmp_path / 'map.csv'
     path.write_text(COMMA)
