@@ -154,6 +154,19 @@ def tolerances(known: tuple[Parameter, ...], given: Mapping[str, Any],
             for p in (*known, *(p for p in exact if p.name in given))}
 
 
+def relative_to_zero(parameter: Parameter, value: float, tolerance: Tolerance) -> str:
+    """
+    Return a sentence on a number that is 0 and known relatively, which makes it exact; '' else.
+
+    Parameters are those of ``prior_sd``.
+    """
+    if value != 0.0 or isinstance(tolerance, AbsoluteSd) or tolerance in (0.0, UNKNOWN):
+        return ''
+    return (f'`{parameter.name}` is 0, and a tolerance of {tolerance:g} is relative: '
+            f'{tolerance:g} of 0 is 0, so the number counts as exact; write '
+            f'{{sd: NUMBER}}, in {parameter.unit}')
+
+
 def _width(parameter: Parameter) -> float:
     return parameter.upper - parameter.lower
 

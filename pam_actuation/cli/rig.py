@@ -248,7 +248,16 @@ def _remarks(rig: 'Rig', path: str) -> list[str]:
     from pam_sim.idle import idle_remarks
     from pam_sim.muscle.table_remarks import table_remarks
     return [*table_remarks(rig.muscle), *left_remarks(rig), *idle_remarks(path, rig),
-            *unstated_valve_data(rig)]
+            *unstated_valve_data(rig), *_zeros_known_relatively(rig)]
+
+
+def _zeros_known_relatively(rig: 'Rig') -> list[str]:
+    """Return a sentence on each number that is 0 and known relatively, by the file."""
+    from pam_sim.tolerance import relative_to_zero
+    found = [relative_to_zero(p, rig.number(p.name), rig.tolerance[p.name])
+             for p in rig.number_list
+             if p.name in rig.tolerance and rig.tolerance[p.name] != p.tolerance]
+    return [f'{text}.' for text in found if text]
 
 
 def _check(args: argparse.Namespace) -> int:

@@ -61,7 +61,7 @@ def read_stated(text: str, parameter: Parameter, where: str) -> Stated:
     Raises
     ------
     InputError
-        Another form, or a number out of range.
+        Another form, a number out of range, or per cent of 0.
 
     """
     said = text.strip()
@@ -72,6 +72,9 @@ def read_stated(text: str, parameter: Parameter, where: str) -> Stated:
         return Stated(parameter.check(_number(said, parameter, where), where), 0.0)
     value = parameter.check(_number(about['value'], parameter, where), where)
     sd = _number(about['sd'], parameter, where)
+    if about['percent'] and value == 0.0 and sd > 0.0:
+        raise InputError(f'`{parameter.name}` is `{said}`, and {about["sd"]} % of 0 is 0; write '
+                         f'0+-NUMBER, in {parameter.unit}', where)
     known = sd / 100.0 if about['percent'] else AbsoluteSd(sd)
     return Stated(value, check_tolerance(known, parameter, where))
 

@@ -364,6 +364,7 @@ def test_a_remark_tells_what_0_v_leaves_in_the_muscle(
     (['--about', 'mass_kg=3±-1'], '{sd: 0 to 499.9 kg}'),
     (['--about', 'mass_kg=3±200%'], '0 to 1 (relative)'),
     (['--unknown', 'mass_kg=1±1'], 'nothing'),
+    (['--about', 'pressure_zero_pa=0±5%'], '5 % of 0 is 0; write 0+-NUMBER, in Pa'),
     (['--unknown', 'mas_kg'], 'did you mean `mass_kg`'),
     (['--unknown', 'pressure_noise_pa'], 'unknown parameter'),
     (['--unknown', 'mass_kg', '--known', 'mass_kg=1'], 'stated twice'),
@@ -435,6 +436,12 @@ def test_check_shows_what_is_exact_and_the_supply_as_gauge_too(folder, capsys):
     told = json.loads(capsys.readouterr().out)
     assert {'name': 'mass_kg', 'unit': 'kg', 'value': 4.0} in told['exact']
     assert told['muscle'] == {'bore_m': 0.01, 'length_m': 0.25}
+    (folder / 'zero.yaml').write_text(
+        'rig: dmsp_5_300_hanging_mass\ntolerance: {pressure_zero_pa: 0.05, mass_kg: 0.05}\n')
+    assert main(['rig', 'check', 'zero.yaml']) == 0
+    printed = capsys.readouterr().out
+    assert '`pressure_zero_pa` is 0, and a tolerance of 0.05 is relative' in printed
+    assert '`mass_kg`' not in printed
 
 
 def test_questions_come_again_until_the_answer_is_possible():
