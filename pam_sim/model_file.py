@@ -34,7 +34,7 @@ from pam_sim.plugins import pick
 from pam_sim.rig import Rig
 from pam_sim.rig_parameters import rig_parameters
 from pam_sim.sensors import SENSOR_PARAMETERS
-from pam_sim.tolerance import read_tolerance, Tolerance
+from pam_sim.tolerance import read_tolerance, refuse_texts, Tolerance
 from pam_sim.valve import hsv, VALVES
 from pam_sim.volume import VOLUMES
 
@@ -148,6 +148,8 @@ def _from_mapping(data: Located, name: str | None, seen: tuple[str, ...]) -> Rig
     muscle = with_volume_of(muscle, data)
     known = rig_parameters(base.load)
     given = data.get('parameters', dict) if data.get('parameters') is not None else {}
+    if isinstance(given, Located):
+        refuse_texts(given, known)
     check_parameters(known, given)
     tolerance = dict(base.tolerance)
     stated = data.get('tolerance', dict) if data.get('tolerance') is not None else Located({})

@@ -19,11 +19,13 @@ In a model file under ``tolerance``: a number is a relative standard deviation, 
 one in the unit of the parameter, and the word ``unknown`` leaves its whole range open.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 import math
+import re
 from typing import Any
 
+from pam_sim.declared import shown
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.keys import Key, names_of
 from pam_sim.located_yaml import Located
@@ -32,6 +34,9 @@ from pam_sim.units import behind_number
 
 UNKNOWN = math.inf           # as a tolerance; the word in a file is WORD
 WORD = 'unknown'
+_NUMBER = r'[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?'
+_ABOUT = re.compile(rf'({_NUMBER})\s*(?:±|\+-|\+/-)\s*({_NUMBER})\s*(%?)')
+_NUMBER_FIRST = re.compile(rf'{_NUMBER}(?=\s*[^\s\d.,])')
 SD_KEYS = (
     Key('sd', float, 'Standard deviation in the unit of the parameter; the only way to say it '
         'for a number that is 0.', required=True, otherwise='required', lower=0.0),
@@ -76,6 +81,42 @@ def read_tolerance(stated: Located, parameter: Parameter, key: str = '') -> Tole
     if isinstance(value, str):
         raise stated.error(f'`{name}` is `{value}`; allowed: {_allowed(parameter)}', name)
     return float(stated.require(name, float, lower=0.0, upper=1.0))
+
+
+def refuse_texts(given: Located, known: Iterable[Parameter]) -> None:
+    """
+    Refuse texts in place of the numbers of parameters, such as ``unknown`` and ``1.2±0.3``.
+
+    Parameters
+    ----------
+    given : Located
+        Name to number; other names, and other values than texts, are left alone.
+    known : iterable of Parameter
+        What can be given.
+
+    Raises
+    ------
+    InputError
+        A text. The sentence says where a tolerance is stated.
+
+    """
+    for parameter in known:
+        name = parameter.name
+        text = given[name] if name in given else None
+        if not isinstance(text, str):
+            continue
+        about, number = _ABOUT.fullmatch(text.strip()), _NUMBER_FIRST.match(text.strip())
+        if text.strip() == WORD:
+            fix = (f'write `{name}: {WORD}` under `tolerance`, and here the number to begin '
+                   'with, or nothing')
+        elif about:
+            sd = f'{float(about[2]) / 100.0:g}' if about[3] else f'{{sd: {about[2]}}}'
+            fix = f'write {about[1]} here, and `{name}: {sd}` under `tolerance`'
+        elif number and behind_number(parameter.unit):
+            fix = f'write the number alone, in {parameter.unit}'
+        else:
+            fix = f'allowed {parameter.allowed}'
+        raise given.error(f'`{name}` must be a number, not {shown(text)}; {fix}', name)
 
 
 def check_tolerance(value: Any, parameter: Parameter, where: str = 'tolerance') -> Tolerance:

@@ -410,7 +410,7 @@ def _below(finite: FloatArray, low: float, high: float, size_of: SizeOf) -> tupl
             'No muscle is evacuated so far. Is it gauge pressure? Add 101325 Pa then; or did the '
             'sensor drop out?' if low < 0.5 * P_ATM_PA else
             'If the muscle was vented then, the sensor has a zero: state '
-            '`pressure_zero_pa: unknown` in the rig file.' + GAUGE_HINT)
+            '`pressure_zero_pa: unknown` under `tolerance` in the rig file.' + GAUGE_HINT)
     return (f'{below} values below atmospheric pressure, down to {gauge_kpa(low):.1f} kPa '
             f'gauge. {hint}'), is_gauge
 

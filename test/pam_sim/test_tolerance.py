@@ -85,6 +85,19 @@ def test_a_mistake_is_told_with_file_line_and_key(tmp_path, stated, said):
     assert 'rig.yaml:5' in str(caught.value) and said in str(caught.value)
 
 
+@pytest.mark.parametrize('stated, fix', [
+    ('unknown', 'write `mass_kg: unknown` under `tolerance`, and here the number to begin with'),
+    ('1.2±0.3', 'write 1.2 here, and `mass_kg: {sd: 0.3}` under `tolerance`'),
+    ('1.2 +- 10%', 'write 1.2 here, and `mass_kg: 0.1` under `tolerance`'),
+    ('1.2 kg', 'write the number alone, in kg'), ('heavy', 'allowed 0.1 to 500 kg'),
+    ('1,2', 'allowed 0.1 to 500 kg')])
+def test_a_text_in_place_of_a_number_is_told_with_the_way_out(tmp_path, stated, fix):
+    with pytest.raises(InputError) as caught:
+        made(tmp_path, RIG.replace('mass_kg: 3.2', f'mass_kg: "{stated}"'))
+    assert str(caught.value).startswith(f'{tmp_path / "rig.yaml"}:4: `mass_kg` must be a number, ')
+    assert f'; {fix}' in str(caught.value) and stated in str(caught.value)
+
+
 @pytest.mark.parametrize('value', [-0.1, 1.1, math.nan, 'unknown', None, True, AbsoluteSd(-1.0),
                                    AbsoluteSd(math.nan), AbsoluteSd(math.inf)])
 def test_a_mistake_in_code_is_told_as_well(value):
