@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from pam_actuation.tables.thousands import are_marked, marks_of, SENTENCE
+from pam_actuation.tables.units import FACTORS, unit_of_text
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.errors import did_you_mean, InputError
 
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 MOST_ROWS = 5_000_000
+_WITH_UNIT = re.compile(r'[+-]?\d[\d.,]*(?:[eE][+-]?\d+)?\s*([^\s\d.,].*)')
 
 
 @dataclass
@@ -187,4 +189,8 @@ def _number_fix(text: str, decimal: str, name: str) -> str:
         return SENTENCE
     if decimal == '.' and re.fullmatch(r'\s*[+-]?[\d.]*,\d+\s*', text):
         return 'the file mixes decimal points and commas: write one of them everywhere'
+    with_unit = _WITH_UNIT.fullmatch(text.strip())
+    if with_unit and any(unit_of_text(with_unit[1], quantity) for quantity in FACTORS):
+        return (f'the cells hold their unit: write the numbers alone, and {with_unit[1]} in the '
+                'name of the column')
     return f'if it stands for a missing value, add --missing {_short(text.strip())}'

@@ -16,9 +16,11 @@
 
 import numpy as np
 from pam_actuation.tables.mapping import load_mapping, TableMapping
+from pam_actuation.tables.table import Table
 from pam_actuation.tables.units import checked_unit, PRESSURE, TIME, unit_of_text
 from pam_actuation.tables.words import unit_in, words_of
 from pam_sim.errors import InputError
+import pandas as pd
 import pytest
 
 
@@ -117,3 +119,15 @@ def test_a_wrong_mapping_file_is_told(tmp_path, text, said):
     (tmp_path / 'm.yaml').write_text(text, encoding='utf-8')
     with pytest.raises(InputError, match=said):
         load_mapping(tmp_path / 'm.yaml')
+
+
+@pytest.mark.parametrize('cell, unit', [
+    ('50%', '%'), ('12.3 N', 'N'), ('0,35 bar', 'bar'), ('-1.2e-3 mm', 'mm'), ('12.3 x', ''),
+    ('OVL', ''), ('1.2.3', '')])
+def test_cells_that_hold_their_unit_are_no_missing_values(cell, unit):
+    table = Table('m.csv', {'a': pd.Series(['1.5', cell, '2.5'])})
+    with pytest.raises(InputError) as caught:
+        table.numbers('a')
+    said = str(caught.value)
+    assert ('--missing' not in said) == bool(unit)
+    assert not unit or f'write the numbers alone, and {unit} in the name of the column' in said
