@@ -24,7 +24,7 @@ from pam_actuation.tables.lengths import length_column, LengthColumn
 from pam_actuation.tables.mapping import column_of_text, ColumnMap, TableMapping
 from pam_actuation.tables.parts import is_length_of_muscle, kind_of_pressure
 from pam_actuation.tables.questions import (
-    either_of, needs_gain, of_output_column, Question, which_of)
+    either_of, needs_gain, of_a_joint, of_output_column, Question, which_of)
 from pam_actuation.tables.signals import (
     ANGLES, are_of_joint, BY_NAME, of_words, Signal)
 from pam_actuation.tables.table import Table
@@ -33,6 +33,7 @@ from pam_actuation.tables.units import (
     unit_of_text, VOLTAGE)
 from pam_actuation.tables.words import Heading, heading, words_in, words_of
 from pam_sim.annotations import BoolArray, FloatArray
+from pam_sim.errors import InputError
 from pam_sim.units import P_ATM_PA
 
 BELOW_ATMOSPHERE = 0.9            # of it: no muscle on a rig is evacuated further
@@ -113,7 +114,12 @@ def guess(tables: Collection[Table], mapping: TableMapping,
                     name: _units_of(answer) for name, answer in meant.items()})
             else:
                 for name, answer in meant.items():
-                    seen.setdefault(name, {}).setdefault(column, answer)
+                    of_name = seen.setdefault(name, {})
+                    of_name.setdefault(column, answer)
+                    for other in _numbered_2(table, column):
+                        if other not in used and (second := _readable(
+                                table, other, BY_NAME[name], missing)) is not None:
+                            of_name.setdefault(other, second)
     found.questions += either.values()
     signals = dict(mapping.signals)
     joint = are_of_joint(signals) or are_of_joint(seen.keys() - {one.name for one in ANGLES})
@@ -122,7 +128,8 @@ def guess(tables: Collection[Table], mapping: TableMapping,
             continue
         chosen = _chosen(name, candidates)
         if isinstance(chosen, Question):
-            found.questions.append(chosen)
+            found.questions.append(chosen if not seen.keys() & {one.name for one in ANGLES}
+                                   else of_a_joint(chosen))
         else:
             signals[name], found.told[name] = chosen
     found.mapping = replace(mapping, signals=signals)
@@ -133,6 +140,24 @@ def guess(tables: Collection[Table], mapping: TableMapping,
         found.questions = [one for one in found.questions if one.signal != 'contraction']
         found.questions += lengths
     return found
+
+
+def _numbered_2(table: Table, column: str) -> list[str]:
+    """Return the columns called as one that ends in 1, but with a 2: nobody knows which is it."""
+    words = words_of(_name_of(table, column))
+    if not words.endswith('1'):
+        return []
+    return [other for other in table.columns if not _signals_of(table, other)
+            and words_of(_name_of(table, other)) == f'{words[:-1]}2']
+
+
+def _readable(table: Table, column: str, signal: Signal, missing: Collection[str]
+              ) -> tuple[ColumnMap, str] | Question | None:
+    """Return what ``_of_column`` does, None for a column that holds texts."""
+    try:
+        return _of_column(table, column, signal, missing)
+    except InputError:
+        return None
 
 
 def _of_lengths(tables: Collection[Table], mapping: TableMapping, missing: Collection[str],

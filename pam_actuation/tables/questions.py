@@ -15,7 +15,7 @@
 """What a file does not say of a column: the question, and which answers it admits."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import re
 
 from pam_actuation.tables.mapping import column_of_text
@@ -24,6 +24,7 @@ from pam_actuation.tables.units import (
     ABSOLUTE, bare, DUTY, example_of, filled_unit, form_of, GAIN, GAUGE, is_output, LENGTH,
     unit_of_text, ZERO)
 from pam_sim.errors import InputError
+from pam_sim.joint.parameters import SIDES
 
 _NUMBERS = re.compile(r'(?::\s*(?:zero|gain|missing)\s*=[^:]*)+$')
 _SHARES = {'%': '1/100 of that length', '1': 'that length'}
@@ -163,6 +164,19 @@ def which_of(signal: Signal, columns: Sequence[tuple[str, tuple[str, ...]]]) -> 
     return Question(signal.name, '', f'columns {names} could each be the {signal.meaning}: '
                     'which one?', tuple(f'{column}:{unit}' for column, units in columns
                                         for unit in units[:2]))
+
+
+def of_a_joint(question: Question) -> Question:
+    """Return the question which of two columns is a signal, with how both are of a joint."""
+    first: dict[str, str] = {}                  # answer of each column
+    for answer in question.answers:
+        first.setdefault(answer.partition(':')[0], answer)
+    if question.column or len(first) != len(SIDES) or any(
+            f'{side}/{question.signal}' not in BY_NAME for side in SIDES):
+        return question
+    maps = ' '.join(f'--map {side}/{question.signal}="{one}"'
+                    for side, one in zip(SIDES, first.values()))
+    return replace(question, text=f'{question.text} If they are the two of a joint, write {maps}')
 
 
 def either_of(column: str, signals: Mapping[str, tuple[str, ...]]) -> Question:

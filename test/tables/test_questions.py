@@ -125,6 +125,27 @@ def test_counts_are_imported_by_the_answer_at_a_terminal(tmp_path, monkeypatch, 
     assert load_run('right')['contraction']['contraction_m'].max() == pytest.approx(0.020)
 
 
+def test_of_two_numbered_columns_nobody_knows_which_is_the_muscle(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'a.csv').write_text('t_s,p1_bar_g,p2_bar_g,q_deg\n' + ''.join(
+        f'{0.01 * k:.2f},{6 - place / 90:.3f},{place / 3:.3f},{place}\n'
+        for k, place in enumerate(PLACES.tolist())))
+    words = ['import', 'a.csv', '--out', 'bag', '--overwrite']
+    assert main(words) == 2
+    said = capsys.readouterr().err
+    assert 'columns "p1_bar_g" and "p2_bar_g" could each be the pressure in the muscle' in said
+    assert ('If they are the two of a joint, write --map flexor/pressure="p1_bar_g:bar_gauge" '
+            '--map extensor/pressure="p2_bar_g:bar_gauge"') in said
+    assert main([*words, '--map', 'pressure=p2_bar_g:bar_gauge']) < 2
+    assert load_run('bag')['pressure']['pressure_pa'].max() < 4e5
+    assert main([*words, '--leave-out', 'p2_bar_g']) < 2
+    assert load_run('bag')['pressure']['pressure_pa'].max() > 6e5
+    capsys.readouterr()
+    assert main([*words, '--map', 'flexor/pressure=p1_bar_g:bar_gauge', '--map',
+                 'extensor/pressure=p2_bar_g:bar_gauge']) < 2
+    assert 'angle: column "q_deg" in deg' in capsys.readouterr().out
+
+
 def test_the_time_in_seconds_goes_before_that_in_ticks(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / 'a.csv').write_text('t_ticks,t_s,x_mm\n' + ''.join(
