@@ -176,7 +176,7 @@ def of_a_joint(question: Question) -> Question:
         return question
     maps = ' '.join(f'--map {side}/{question.signal}="{one}"'
                     for side, one in zip(SIDES, first.values()))
-    return replace(question, text=f'{question.text} If they are the two of a joint, write {maps}')
+    return replace(question, text=f'{question.text} If they are the two of a joint, write {maps}.')
 
 
 def either_of(column: str, signals: Mapping[str, tuple[str, ...]]) -> Question:
