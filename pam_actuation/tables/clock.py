@@ -14,6 +14,7 @@
 
 """The time of every row, in nanoseconds: from a column, a rate, or the file itself."""
 
+from collections.abc import Collection
 from dataclasses import replace
 import re
 from typing import TYPE_CHECKING
@@ -22,7 +23,7 @@ import numpy as np
 from pam_actuation.messages import START_NS
 from pam_actuation.tables.dates import Dates, dates_of, days_as_ns
 from pam_actuation.tables.day_and_time import (
-    dates_of_pair, holds_dates, holds_times_of_day, is_called_time, pair_of)
+    dates_of_pair, holds_dates, holds_times_of_day, is_called_time, leaf_of, pair_of)
 from pam_actuation.tables.mapping import TableMapping, TimeMap
 from pam_actuation.tables.order import Clock, in_order, Times
 from pam_actuation.tables.table import Table
@@ -58,6 +59,14 @@ def time_column(table: Table, mapping: TableMapping) -> TimeMap | None:
     if not found and _rises_without_name(table, mapping):
         found = [next(iter(table.columns))]
     return TimeMap((exact or found)[0]) if found else None
+
+
+def own_time(table: Table, tables: Collection[Table], mapping: TableMapping) -> TableMapping:
+    """Return the mapping for one of several tables: without a time that another of them holds."""
+    wanted = '' if mapping.time is None else mapping.time.column
+    is_elsewhere = bool(wanted) and table.name_of(wanted) is None and any(
+        other.name_of(wanted) is not None for other in tables)
+    return replace(mapping, time=None) if is_elsewhere else mapping
 
 
 def _rank(table: Table, name: str) -> int:
@@ -159,7 +168,7 @@ def _other_clock(table: Table, name: str, stamp_ns: IntArray, rows: IntArray) ->
         values = table.columns[other]
         # Without a unit it may count the rows.
         if not (_unit_of_name(table, other) or _is_text_date(values)
-                or table.title_of(other) == table.title_of(name)):
+                or leaf_of(table.title_of(other)) == leaf_of(table.title_of(name))):
             continue
         both = rows[values.notna().to_numpy()[rows]]
         try:

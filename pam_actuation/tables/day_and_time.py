@@ -34,11 +34,24 @@ _MOST_DAYS = 1000
 
 def is_called_time(table: Table, column: str) -> bool:
     """Return whether the name of a column says that it is a time or a date."""
-    words = words_of(table.title_of(column))
+    title = table.title_of(column)
+    if _says_time(title, table.columns[column]):
+        return True
+    # `fast.t` of a file with groups, which has no lines.
+    return table.lines is None and not table.topic and '.' in title and _says_time(
+        leaf_of(title), table.columns[column])
+
+
+def leaf_of(title: str) -> str:
+    """Return the last part of the name of a column in a group: ``t`` of ``fast.t``."""
+    return title.rpartition('.')[2]
+
+
+def _says_time(title: str, values: 'pd.Series') -> bool:
+    words = words_of(title)
     # Of several languages, and anything in others.
     dated = ' '.join('date' if word in ('data', 'dato') else word for word in words.split())
-    return is_time(words) or is_time(dated) and (
-        'time' in words or holds_dates(table.columns[column]))
+    return is_time(words) or is_time(dated) and ('time' in words or holds_dates(values))
 
 
 def holds_dates(values: 'pd.Series') -> bool:

@@ -28,7 +28,7 @@ from pam_actuation.bags.plausibility import Size
 from pam_actuation.bags.writer import BagWriter
 from pam_actuation.messages import VALVE_NAMES
 from pam_actuation.namespaces import JOINT, MUSCLE, namespace_of
-from pam_actuation.tables.clock import clock_of
+from pam_actuation.tables.clock import clock_of, own_time
 from pam_actuation.tables.guess import is_exported, unit_of_column
 from pam_actuation.tables.lengths import size_of_mapping
 from pam_actuation.tables.mapping import TableMapping
@@ -163,7 +163,7 @@ def recording_of(tables: Sequence[Table], mapping: TableMapping, *, size: Size,
                 if (column := table.name_of(one.column)) is not None}
         if not held:
             continue
-        clock = clock_of(table, mapping, sort, part)
+        clock = clock_of(table, own_time(table, tables, mapping), sort, part)
         if clock.jump and not accept:
             raise InputError(f'{clock.jump}. (--accept takes them as they are)')
         result.told.append(f'{Path(table.source).name}: time from {clock.told}')

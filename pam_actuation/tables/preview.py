@@ -19,7 +19,7 @@ import re
 from typing import Any
 
 import numpy as np
-from pam_actuation.tables.clock import clock_of, time_column
+from pam_actuation.tables.clock import clock_of, own_time, time_column
 from pam_actuation.tables.day_and_time import pair_of
 from pam_actuation.tables.guess import falls_below_atmosphere, Guess, unit_of_column
 from pam_actuation.tables.lengths import length_column
@@ -105,7 +105,7 @@ def time_problems(tables: Collection[Table], found: Guess, sort: bool = False,
     for table in tables:
         if any(table.name_of(one) is not None for one in columns) or len(tables) == 1:
             try:
-                clock_of(table, found.mapping, sort=sort, part=part)
+                clock_of(table, own_time(table, tables, found.mapping), sort=sort, part=part)
             except InputError as error:
                 problems.append(str(error))
     return problems

@@ -273,6 +273,21 @@ def object_of_matlab():
     return element(14, element(6, struct.pack('<II', 17, 0)) + names + place)
 
 
+def test_groups_of_two_rates_have_a_time_each(tmp_path, capsys):
+    fast_s, slow_s = np.arange(600) * 0.002, np.arange(120) * 0.01
+    savemat(tmp_path / 'run.mat', {'fast': {'t': fast_s, 'p': 2.0 + fast_s},
+                                   'slow': {'t': slow_s, 'F': 40.0 + slow_s}})
+    words = ['import', str(tmp_path / 'run.mat'), '--out', str(tmp_path / 'bag'), '--overwrite',
+             '--map', 'pressure=fast.p:bar_gauge', '--map', 'force=slow.F:N']
+    for more in ([], ['--map', 'time=fast.t:s']):
+        assert main([*words, *more]) == 0, capsys.readouterr()
+        run = load_run(tmp_path / 'bag')
+        assert set(np.diff(run['pressure'].stamp_ns)) == {2_000_000}
+        assert set(np.diff(run['force'].stamp_ns)) == {10_000_000}
+    assert main([*words, '--map', 'time=fast.time:s']) == 2
+    assert 'there is no column "fast.time"; did you mean' in capsys.readouterr().err
+
+
 def test_objects_of_matlab_are_told_and_arrays_beside_them_read(tmp_path, capsys):
     path, time_s = tmp_path / 'run.mat', np.arange(300) * 0.002
     savemat(path, {'t': time_s, 'p': 2.0 + time_s})
