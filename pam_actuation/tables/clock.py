@@ -167,7 +167,7 @@ def _other_clock(table: Table, name: str, stamp_ns: IntArray, rows: IntArray) ->
             continue
         values = table.columns[other]
         # Without a unit it may count the rows.
-        if not (_unit_of_name(table, other) or _is_text_date(values)
+        if not (_unit_of_name(table, other) or values.dtype.kind == 'M' or _is_text_date(values)
                 or leaf_of(table.title_of(other)) == leaf_of(table.title_of(name))):
             continue
         both = rows[values.notna().to_numpy()[rows]]
