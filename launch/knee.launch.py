@@ -20,7 +20,9 @@ A joint: limb with two muscles, simulated or real, a driver for each, a controll
     ros2 launch pam_actuation knee.launch.py hardware:=my_knee.yaml
 
 Ends by itself when the experiment is over, and when any of its nodes ends, whatever the reason.
-Without an experiment (experiment:=none) it waits for joint_reference or joint_trajectory.
+Without an experiment (experiment:=none) it waits for joint_reference or joint_trajectory. That is
+the default where the hardware is not simulated: a real joint moves only where the experiment is
+named.
 """
 
 from datetime import datetime
@@ -51,12 +53,13 @@ from pam_sim.joint import load_joint
 PACKAGE = 'pam_actuation'
 SIDES = ('flexor', 'extensor')
 RECORDER = 'experiment_recorder'
-# Noted from the arguments: the joint's name, valves and seed, the file of the hardware, and what
-# the recorder is, '' for none, and tells.
-(NAME, VALVE, SEED, HARDWARE_FILE, RECORDER_NAME, RECORDED_CONTROLLER, RECORDED_EXPERIMENT,
- RECORDED_SEED) = (
-    'joint_name', 'valve_of_joint', 'seed_of_sensors', 'hardware_file', 'recorder_name',
-    'recorded_controller', 'recorded_experiment', 'recorded_seed')
+OF_SIMULATION = 'joint_sine'
+# Noted from the arguments: the joint's name, valves and seed, the experiment, '' for none, the
+# file of the hardware, and what the recorder is, '' for none, and tells.
+(NAME, VALVE, SEED, EXPERIMENT, HARDWARE_FILE, RECORDER_NAME, RECORDED_CONTROLLER,
+ RECORDED_EXPERIMENT, RECORDED_SEED) = (
+    'joint_name', 'valve_of_joint', 'seed_of_sensors', 'experiment_of_joint', 'hardware_file',
+    'recorder_name', 'recorded_controller', 'recorded_experiment', 'recorded_seed')
 
 
 def _arguments():
@@ -92,8 +95,9 @@ def _arguments():
             'learning', default_value='true', choices=['true', 'false'],
             description='Whether the rules of the controller may change.'),
         DeclareLaunchArgument(
-            'experiment', default_value='joint_sine',
-            description='Experiment by name, or path of its file; none: wait for references.'),
+            'experiment', default_value='',
+            description='Experiment by name, or path of its file; none: wait for references; '
+                        f'empty: {OF_SIMULATION} with hardware:=sim, otherwise none.'),
         DeclareLaunchArgument(
             'seed', default_value='',
             description='Seed of the simulated sensors; empty: by the namespace.'),
@@ -174,10 +178,9 @@ def generate_launch_description():
             NotEqualsSubstitution(LaunchConfiguration('controller'), 'none')))
     reference = _node(
         'reference_generator', valve,
-        {'experiment': _text(LaunchConfiguration('experiment')), 'await_receiver': True,
+        {'experiment': _text(LaunchConfiguration(EXPERIMENT)), 'await_receiver': True,
          'await_measurement_s': AWAITED_S, 'start_delay_s': 3.0, 'exit_when_finished': True},
-        condition=IfCondition(AndSubstitution(*(
-            NotEqualsSubstitution(LaunchConfiguration('experiment'), no) for no in ('', 'none')))))
+        condition=IfCondition(NotEqualsSubstitution(LaunchConfiguration(EXPERIMENT), '')))
     recorder = _node(
         RECORDER, kind,
         {'seed': ParameterValue(LaunchConfiguration(RECORDED_SEED), value_type=int)},
@@ -208,15 +211,16 @@ def _note_names(context, end):
     namespace = launch_namespace(given('namespace'))
     valve = given('valve') or load_joint(given('joint')).valve
     place = full_namespace(context, namespace)
+    experiment = layouts.experiment_of(given('experiment'), given('hardware'), OF_SIMULATION)
     seed = given('seed') or str(layouts.seed_in(place))
     nodes = layouts.knee(
         place, given('joint'), valve,
         layouts.NO_CONTROLLER if given('controller') == 'none' else given('controller_file'),
-        '' if given('experiment') == 'none' else given('experiment'), int(seed),
-        given('accept_other_rig') == 'true', given('output') if given('record') == 'true' else '',
-        given('hardware'), given('angle'), name=given('name'))
+        experiment, int(seed), given('accept_other_rig') == 'true',
+        given('output') if given('record') == 'true' else '', given('hardware'), given('angle'),
+        name=given('name'))
     check_hardware(nodes)
-    noted = {'namespace': namespace, VALVE: valve, SEED: seed,
+    noted = {'namespace': namespace, VALVE: valve, SEED: seed, EXPERIMENT: experiment,
              NAME: given('name') or name_in(place),
              HARDWARE_FILE: hardware_file(given('hardware')),
              # Real sensors have no seed.
@@ -227,7 +231,6 @@ def _note_names(context, end):
         if given('controller') != 'none':
             noted[RECORDED_CONTROLLER] = given('controller_file') or joint_preset_for(
                 load_joint(given('joint')), valve)
-        if given('experiment') != 'none':
-            noted[RECORDED_EXPERIMENT] = given('experiment')
+        noted[RECORDED_EXPERIMENT] = experiment
     actions = [SetLaunchConfiguration(name, value) for name, value in noted.items()]
     return [*actions, *users_file(given, nodes)]

@@ -19,7 +19,8 @@ The whole rig: plant or real sensors, driver and watchdog, controller, reference
     ros2 launch pam_actuation rig.launch.py hardware:=my_rig.yaml
 
 Ends by itself when the experiment is over, and when any of its nodes ends, whatever the reason.
-Without an experiment (experiment:=none) it waits for references.
+Without an experiment (experiment:=none) it waits for references. That is the default where the
+hardware is not simulated: a real muscle moves only where the experiment is named.
 """
 
 from datetime import datetime
@@ -49,12 +50,14 @@ from pam_sim import load_rig
 from pam_sim.errors import InputError
 
 PACKAGE = 'pam_actuation'
-RECORDER, NO_EXPERIMENT = 'experiment_recorder', 'none'
+RECORDER = 'experiment_recorder'
+OF_SIMULATION = 'sine_quarter_hz'
 # Noted from the arguments; not in their place, since the next rig included would take it for its
 # own.
-(VALVE, SEED, EXPERIMENT, HARDWARE_FILE, CONTROLLER, CONTROLLER_NAME, RAW, RECORDED_SEED) = (
+(VALVE, SEED, EXPERIMENT, HARDWARE_FILE, CONTROLLER, CONTROLLER_NAME, RAW, RECORDED,
+ RECORDED_SEED) = (
     'valve_of_rig', 'seed_of_sensors', 'experiment_of_rig', 'hardware_file', 'controller_node',
-    'controller_name', 'raw_valve_signals', 'recorded_seed')
+    'controller_name', 'raw_valve_signals', 'rig_is_recorded', 'recorded_seed')
 
 
 def _arguments():
@@ -89,11 +92,13 @@ def _arguments():
             'learning', default_value='true', choices=['true', 'false'],
             description='Whether the controller learns.'),
         DeclareLaunchArgument(
-            'experiment', default_value='sine_quarter_hz',
-            description='Experiment by name, or path of its file; none: wait for references.'),
+            'experiment', default_value='',
+            description='Experiment by name, or path of its file; none: wait for references; '
+                        f'empty: {OF_SIMULATION} with hardware:=sim, otherwise none.'),
         DeclareLaunchArgument(
-            'record', default_value='true', choices=['true', 'false'],
-            description='Whether to record a bag.'),
+            'record', default_value='', choices=['', 'true', 'false'],
+            description='Whether to record a bag; empty: true with hardware:=sim, otherwise '
+                        'false.'),
         DeclareLaunchArgument(
             'output', default_value=f'bags/rig_{started}', description='Folder of the bag.'),
         DeclareLaunchArgument(
@@ -122,7 +127,7 @@ def _text(name):
 
 def _node(executable, *parameters, condition=None):
     """Return one managed node; it activates by itself."""
-    recorder = IfElseSubstitution(LaunchConfiguration('record'), RECORDER, '')
+    recorder = IfElseSubstitution(LaunchConfiguration(RECORDED), RECORDER, '')
     priority = LaunchConfiguration('realtime_priority')
     common = {
         'autostart': True, 'end_with_parent': True,
@@ -154,7 +159,7 @@ def generate_launch_description():
         {'seed': ParameterValue(LaunchConfiguration(RECORDED_SEED), value_type=int)},
         {'output': _text('output'), 'rig': _text('rig'), 'experiment': _text(EXPERIMENT),
          'controller': _text(CONTROLLER_NAME), 'notes_folder': end.notes_folder},
-        condition=IfCondition(LaunchConfiguration('record')))
+        condition=IfCondition(LaunchConfiguration(RECORDED)))
     hardware = LaunchConfiguration('hardware')
     simulated = EqualsSubstitution(hardware, SIMULATED)
     by_signal = OrSubstitution(simulated, EqualsSubstitution(hardware, TOPICS))
@@ -192,7 +197,9 @@ def _note_what_is_needed(context, end):
 
     end.shuts_launch_down = given('shutdown_at_end') == 'true'
     kind, file = given('controller'), given('controller_file')
-    experiment = '' if given('experiment') == NO_EXPERIMENT else given('experiment')
+    experiment = layouts.experiment_of(given('experiment'), given('hardware'), OF_SIMULATION)
+    is_simulated = given('hardware') == SIMULATED
+    recorded = given('record') or str(is_simulated).lower()
     if kind == NO_CONTROLLER:
         if file:
             raise InputError('is of no use with controller:=none', 'controller_file')
@@ -206,14 +213,14 @@ def _note_what_is_needed(context, end):
         PidNode.DEFAULT_CONTROLLERS if kind == 'pid' else None)
     nodes = layouts.rig(
         place, given('rig'), valve, given('hardware'), name or NO_CONTROLLER, experiment,
-        given('output') if given('record') == 'true' else '',
+        given('output') if recorded == 'true' else '',
         given('accept_other_rig') == 'true', name=given('name'), seed=int(seed))
     check_hardware(nodes)
     noted = {VALVE: valve, SEED: seed, EXPERIMENT: experiment,
              HARDWARE_FILE: hardware_file(given('hardware')),
              CONTROLLER: controller_node(name) if name else NO_CONTROLLER, CONTROLLER_NAME: name,
-             RAW: str(raw).lower(), 'namespace': namespace,
+             RAW: str(raw).lower(), RECORDED: recorded, 'namespace': namespace,
              # Real sensors have no seed.
-             RECORDED_SEED: seed if given('hardware') == SIMULATED else '-1'}
+             RECORDED_SEED: seed if is_simulated else '-1'}
     actions = [SetLaunchConfiguration(key, text) for key, text in noted.items()]
     return [*actions, *users_file(given, nodes)]

@@ -47,6 +47,17 @@ def test_the_end_of_any_node_ends_the_launch(name):
     assert sum(makes_nodes(statement) for statement in described.body) == len(started)
 
 
+@pytest.mark.parametrize('name', ['rig', 'knee'])
+def test_no_default_of_a_launch_file_is_a_motion(name):
+    tree = ast.parse((LAUNCH / f'{name}.launch.py').read_text(encoding='utf-8'))
+    defaults = {one.args[0].value: next(
+        word.value for word in one.keywords if word.arg == 'default_value')
+        for one in ast.walk(tree) if isinstance(one, ast.Call)
+        and getattr(one.func, 'id', '') == 'DeclareLaunchArgument'}
+    # What is played follows from the hardware.
+    assert defaults['experiment'].value == '' and defaults['record'].value in ('', 'false')
+
+
 def test_the_aggregator_has_every_node_in_one_group():
     file = LAUNCH.parent / 'config' / 'diagnostics' / 'aggregator.yaml'
     groups = yaml.safe_load(file.read_text(encoding='utf-8'))['analyzers']['ros__parameters']

@@ -32,6 +32,7 @@ from pam_sim.joint.parameters import SIDES
 from pam_sim.located_yaml import load_yaml
 
 NO_CONTROLLER = 'none'      # one of the user's own sends the pressure commands
+NO_EXPERIMENT = 'none'      # references come from elsewhere
 SIMULATED = 'sim'           # no hardware
 TOPICS = 'topics'           # sensors and valves are a program of the user's own
 BY_SIGNAL = (SIMULATED, TOPICS)     # what follows valve_signal, on which a watchdog can vent
@@ -46,6 +47,27 @@ def seed_in(namespace: str) -> int:
     if namespace in ('', MUSCLE, JOINT):
         return 0
     return 2 * (zlib.crc32(namespace.encode()) % _SEEDS)        # a joint takes two
+
+
+def experiment_of(named: str, hardware: str, of_simulation: str) -> str:
+    """
+    Return the experiment that a launch file plays, '' for none.
+
+    Where none is named, a simulated rig plays one of its own. Hardware waits for references:
+    nothing moves there that was not asked for.
+
+    Parameters
+    ----------
+    named : str
+        Name or file; 'none': none, '': nothing was said.
+    hardware : str
+        As of ``rig``.
+    of_simulation : str
+        What a simulated rig plays.
+
+    """
+    named = named or (of_simulation if hardware == SIMULATED else NO_EXPERIMENT)
+    return '' if named == NO_EXPERIMENT else named
 
 
 def rig(namespace: str = '/muscle', rig: str = 'dmsp_5_300_realistic', valve: str = 'ppr',

@@ -136,7 +136,8 @@ CASES = {
         'knee.launch.py', {'valve': 'hsv', 'record': 'true', 'output': 'bag'},
         lambda: layouts.knee(valve='hsv', experiment='joint_sine', record='bag')),
     'a joint on hardware, recorded': (
-        'knee.launch.py', {'hardware': 'dummy', 'record': 'true', 'output': 'bag'},
+        'knee.launch.py', {'hardware': 'dummy', 'experiment': 'joint_sine', 'record': 'true',
+                           'output': 'bag'},
         lambda: layouts.knee(hardware='dummy', experiment='joint_sine', record='bag')),
     'a joint with an angle from elsewhere': (
         'knee.launch.py', {'hardware': 'dummy', 'angle': 'topic', 'experiment': 'none'},
@@ -144,6 +145,20 @@ CASES = {
     'a joint that waits': (
         'knee.launch.py', {'experiment': 'none', 'controller': 'none'},
         lambda: layouts.knee(controller='none'))}
+
+
+@pytest.mark.parametrize('file', ['rig.launch.py', 'knee.launch.py'])
+@pytest.mark.parametrize('hardware', ['dummy', 'topics'])
+def test_hardware_moves_and_is_recorded_only_if_asked_for(file, hardware):
+    nodes = described(file, hardware=hardware)
+    assert not {'reference_generator', 'experiment_recorder'} & {
+        name.rpartition('/')[2] for name in nodes}
+    assert {one['await_subscriber'] for one in nodes.values()} == {''}
+    # Nor beside a simulated rig that plays: neither is in a group of its own.
+    context = launch.LaunchContext()
+    assert '/one/reference_generator' in described(file, context, namespace='one')
+    second = described(file, context, namespace='two', hardware=hardware)
+    assert second and not {name for name in second if 'reference' in name or 'recorder' in name}
 
 
 def effective(full_name, parameters):

@@ -43,6 +43,14 @@ def test_a_simulated_rig_has_a_watchdog_and_a_real_one_sensors():
             node.name in ('valve_driver', 'hardware_sensors'))
 
 
+@pytest.mark.parametrize('named, hardware, played', [
+    ('', 'sim', 'rest'), ('', 'dummy', ''), ('', 'topics', ''), ('', 'my_rig.yaml', ''),
+    ('none', 'sim', ''), ('none', 'dummy', ''), ('decay', 'sim', 'decay'),
+    ('decay', 'dummy', 'decay')])
+def test_hardware_plays_no_experiment_that_was_not_named(named, hardware, played):
+    assert layouts.experiment_of(named, hardware, 'rest') == played
+
+
 @pytest.mark.parametrize('experiment, valve, raw', [
     ('multisine', 'ppr', False), ('decay', 'hsv', True), ('voltage_steps', 'ppr', True)])
 def test_no_controller_speaks_beside_an_experiment_in_pressure_or_raw_signals(
