@@ -38,7 +38,7 @@ EXAMPLE = ('pam investigate --model dmsp_5_300_hanging_mass --rig dmsp_5_300_rea
            'investigation')
 MODEL = 'dmsp_5_300_hanging_mass'
 EXPERIMENT = 'pressure_identification'
-YES = ('y', 'yes')
+YES = 'yes'          # nothing shorter: a key pressed by mistake moves nothing
 
 
 def add_arguments(parser: Parser) -> None:
@@ -167,7 +167,7 @@ def _recorder(args: argparse.Namespace, truth: 'Rig | None', model: 'Rig',
         if args.yes:
             return True
         print('Start? Type yes; anything else ends here: ', end='', file=sys.stderr, flush=True)
-        return sys.stdin.readline().strip().lower() in YES
+        return sys.stdin.readline().strip() == YES
 
     return LiveRecorder(truth or model, ask, args.hardware or '', args.domain_id)
 

@@ -145,10 +145,12 @@ def test_the_limit_told_is_the_lower_one(tmp_path):
     assert told.limit_gauge_pa == 600e3 and 'a simulated muscle' in told.text()
 
 
-def test_no_at_the_terminal_ends_with_nothing_moved(tmp_path, capsys, monkeypatch):
+@pytest.mark.parametrize('answer', ['no\n', 'y\n', 'Y\n', 'YES\n', 'yes, but\n', '\n', ''])
+def test_anything_but_yes_at_the_terminal_ends_with_nothing_moved(
+        answer, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(
         'pam_actuation.rigging.node_template.prepare_template', lambda *_: None)
-    answers = SimpleNamespace(isatty=lambda: True, readline=lambda: 'no\n')
+    answers = SimpleNamespace(isatty=lambda: True, readline=lambda: answer)
     monkeypatch.setattr(sys, 'stdin', answers)
     monkeypatch.setattr(supervisors, 'Supervisor', Nodes)
     Nodes.made = []
@@ -156,3 +158,14 @@ def test_no_at_the_terminal_ends_with_nothing_moved(tmp_path, capsys, monkeypatc
     said = capsys.readouterr()
     assert 'Start? Type yes' in said.err and 'nothing moved' in said.out and not Nodes.made
     assert (tmp_path / 'out' / 'investigation.json').is_file()
+
+
+def test_yes_at_the_terminal_starts_the_nodes(tmp_path, monkeypatch):
+    monkeypatch.setattr(
+        'pam_actuation.rigging.node_template.prepare_template', lambda *_: None)
+    monkeypatch.setattr(sys, 'stdin', SimpleNamespace(
+        isatty=lambda: True, readline=lambda: 'yes\n'))
+    monkeypatch.setattr(supervisors, 'Supervisor', Nodes)
+    Nodes.script, Nodes.made = (SessionFailed('a node refused'),), []
+    assert main(['investigate', '--hardware', 'dummy', '--out', str(tmp_path / 'out')]) == 1
+    assert len(Nodes.made) == 1
