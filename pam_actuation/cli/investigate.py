@@ -55,8 +55,8 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument('--live', action='store_true',
                         help='record the simulated rig on live nodes (ROS 2)')
     parser.add_argument('--hardware', type=source, default=None, metavar='NAME|FILE',
-                        help='record a real rig: a name in config/hardware, or a file. Each '
-                        'motion is asked for first')
+                        help='record a real rig: a name in config/hardware, or a file; topics is '
+                        'a program of your own. Each motion is asked for first')
     parser.add_argument('--yes', action='store_true',
                         help='allow every motion of live nodes without a question, for scripts')
     parser.add_argument('--valve', default=None, metavar='ppr|hsv',
@@ -108,6 +108,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _rigs(args: argparse.Namespace) -> 'tuple[Rig | None, Rig]':
     """Return (rig that is simulated, None for a real one; model), both with the same valve."""
+    from pam_actuation.rigging.layouts import SIMULATED
     from pam_sim import load_rig, preset_names
     from pam_sim.errors import InputError
     if args.rig is None and args.hardware is None:
@@ -115,6 +116,9 @@ def _rigs(args: argparse.Namespace) -> 'tuple[Rig | None, Rig]':
                          'a real one', 'nothing to record')
     if args.rig is not None and args.hardware is not None:
         raise InputError('goes without --hardware: a rig is simulated or real', '--rig')
+    if args.hardware == SIMULATED:
+        raise InputError('is no real rig; a simulated one is --rig NAME|FILE --live',
+                         f'--hardware {SIMULATED}')
     if args.live and args.hardware is not None:
         raise InputError('goes without --hardware, which is live already', '--live')
     if args.domain_id is not None and not args.live and args.hardware is None:

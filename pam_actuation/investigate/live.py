@@ -27,6 +27,7 @@ from pam_actuation.investigate.recorder import Declined, Progress, Recorder, Rec
 from pam_actuation.investigate.simulated import controller_for
 from pam_actuation.messages import LEVEL_ERROR
 from pam_actuation.namespaces import MUSCLE
+from pam_actuation.rigging import layouts
 from pam_sim.errors import InputError
 from pam_sim.files import write_text
 from pam_sim.units import gauge_kpa, P_ATM_PA
@@ -50,7 +51,8 @@ class LiveRecorder(Recorder):
     ask : callable
         Takes a Motion; whether it is allowed.
     hardware : str
-        Name in config/hardware or a file of hardware; '' for a simulated rig.
+        Name in config/hardware or a file of hardware; 'topics' for a program of your own; ''
+        for a simulated rig.
     domain_id : int, optional
         ROS domain; by default a free one for a simulated rig, that of the environment for a
         real one.
@@ -68,6 +70,8 @@ class LiveRecorder(Recorder):
                  domain_id: int | None = None) -> None:
         self._rig, self._ask, self._domain_id = rig, ask, domain_id
         self._file = hardware_file(hardware) if hardware else ''
+        # That word starts a watchdog in place of sensors; its file does not.
+        self._hardware = hardware if hardware == layouts.TOPICS else self._file
         self.valve = rig.valve
 
     def check(self, experiment: 'Experiment') -> None:
@@ -123,14 +127,13 @@ class LiveRecorder(Recorder):
     def _on_hardware(self, experiment: 'Experiment', bag: Path, progress: Progress) -> None:
         """Bring the nodes of a real rig up, wait for the end of the experiment, vent."""
         from pam_actuation.interrupts import undisturbed
-        from pam_actuation.rigging import layouts
         from pam_actuation.rigging.supervisor import Supervisor
         from pam_actuation.rigging.transitions import SessionFailed, termination_as_interrupt
         with tempfile.TemporaryDirectory(prefix='pam_investigate_') as folder:
             model = write_text(Path(folder) / 'model.yaml', self._rig.to_yaml())
             played = write_text(Path(folder) / 'experiment.yaml', experiment.to_yaml())
             nodes = layouts.rig(
-                rig=str(model), valve=self.valve, hardware=self._file, experiment=str(played),
+                rig=str(model), valve=self.valve, hardware=self._hardware, experiment=str(played),
                 record=str(bag.absolute()))
             failure = ''
             with termination_as_interrupt(), Supervisor(nodes, self._domain_id) as supervisor:

@@ -158,6 +158,7 @@ def test_mistakes_are_told_before_anything_moves(lab, tmp_path, capsys, monkeypa
             ([*rig, '--hardware', 'dummy'], 'goes without --hardware'),
             (['--hardware', 'dummy', '--live'], 'is live already'),
             (['--hardware', 'dumy', '--yes'], '`dummy`'),
+            (['--hardware', 'sim', '--yes'], 'is no real rig; a simulated one is --rig'),
             (['--hardware', 'dummy'], 'nobody can be asked'),
             (['--hardware', str(lab / 'dac.yaml'), '--yes'], 'did you mean `backend`'),
             ([*rig, '--domain-id', '7'], 'goes with --live or --hardware'),

@@ -79,9 +79,9 @@ def record(monkeypatch, tmp_path):
     monkeypatch.setattr(supervisors, 'Supervisor', Nodes)
     experiment = load_experiment('random_steps')
 
-    def play(*script, ask=lambda motion: True):
+    def play(*script, ask=lambda motion: True, hardware='dummy'):
         Nodes.script, Nodes.made = script, []
-        recorder = LiveRecorder(load_rig(MODEL), ask, 'dummy')
+        recorder = LiveRecorder(load_rig(MODEL), ask, hardware)
         recorder.record(experiment, tmp_path / 'bag', 0, 'why', lambda share: None)
         [nodes] = Nodes.made
         return nodes
@@ -95,6 +95,14 @@ def test_an_experiment_is_played_to_its_end_and_vented(record, tmp_path):
     assert nodes.nodes['experiment_recorder'].parameters['output'] == str(tmp_path / 'bag')
     assert nodes.nodes['valve_driver'].parameter_file.endswith('dummy.yaml')
     assert 'sofc_controller' not in nodes.nodes      # pressure goes to the driver
+
+
+def test_a_program_of_the_users_own_is_heard_and_drives_the_valve(record):
+    nodes = record({REFERENCE: (0, 'finished')}, hardware='topics')
+    assert {*nodes.nodes} == {
+        'valve_driver', 'valve_watchdog', 'reference_generator', 'experiment_recorder'}
+    assert not any(node.parameter_file for node in nodes.nodes.values())
+    assert 'seed' not in nodes.nodes['experiment_recorder'].parameters
 
 
 @pytest.mark.parametrize('script, said', [
