@@ -243,12 +243,13 @@ def _one_of(option: str, value: str, allowed: Any) -> str:
 
 def _remarks(rig: 'Rig', path: str) -> list[str]:
     """Return what a person should know of a rig that a file holds."""
+    from pam_actuation.drivers.for_rig import driver_remarks
     from pam_actuation.drivers.vented import left_remarks
     from pam_actuation.rig_files.effects import unstated_valve_data
     from pam_sim.idle import idle_remarks
     from pam_sim.muscle.table_remarks import table_remarks
     return [*table_remarks(rig.muscle), *left_remarks(rig), *idle_remarks(path, rig),
-            *unstated_valve_data(rig), *_zeros_known_relatively(rig)]
+            *unstated_valve_data(rig), *driver_remarks(rig), *_zeros_known_relatively(rig)]
 
 
 def _zeros_known_relatively(rig: 'Rig') -> list[str]:

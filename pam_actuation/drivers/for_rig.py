@@ -30,16 +30,21 @@ import numpy as np
 from pam_actuation.drivers.config import DriverConfig
 from pam_actuation.drivers.hsv_config import HsvConfig
 from pam_actuation.drivers.loop import DriverLoop
+from pam_actuation.drivers.parameter import declared_numbers
 from pam_actuation.drivers.ppr import PprConfig
 from pam_sim.annotations import FloatArray
 from pam_sim.effects.setting import equivalent
-from pam_sim.units import P_ATM_PA
+from pam_sim.errors import InputError
+from pam_sim.units import behind_number, P_ATM_PA
 
 if TYPE_CHECKING:
     from pam_sim.joint.rig import JointRig
     from pam_sim.rig import Rig
 
 _UNKNOWN_SWING_HZ = 5.9
+# Numbers that a rig states in a wider range than the driver takes, by the name of the driver.
+_AS_STATED = {'hsv.period_s': 'pwm_period_s', 'hsv.critical_ratio': 'b'}
+_HSV = {one.name: one for one in declared_numbers(HsvConfig, 'hsv.')}
 _DEAD_TIME_MARGIN_S = 0.003      # the way of a reading to the signal
 _GAIN, _GAIN_AT_ONCE = HsvConfig.gain, 0.7
 _SLOPE_OVER_M = 1e-3
@@ -65,7 +70,8 @@ def driver_config(rig: 'Rig', changes: Mapping[str, object] | None = None,
     Raises
     ------
     InputError
-        For an unknown or impossible parameter in ``changes``.
+        For an unknown or impossible parameter in ``changes``, or a number of the rig that the
+        driver does not take.
 
     """
     values = rig.parameters
@@ -83,9 +89,36 @@ def driver_config(rig: 'Rig', changes: Mapping[str, object] | None = None,
     }
     # Without a dead time to wait for, the loop can remove more of the error per period.
     told['hsv.gain'] = _GAIN + (_GAIN_AT_ONCE - _GAIN) * max(0.0, 1.0 - dead_time_s / 0.02)
+    _check_told(rig, told)
     told.update(_load(rig))
     config = DriverConfig.from_parameters(told, where=f'rig {rig.name}')
     return DriverConfig.from_parameters(changes, config, where)
+
+
+def _check_told(rig: 'Rig', told: dict[str, float]) -> None:
+    """
+    Raise InputError where a number of the valves is beyond what the driver takes.
+
+    It names the number as the rig does. With a regulator it does not matter: it is not told.
+    """
+    for name, of_rig in _AS_STATED.items():
+        taken = _HSV[name]
+        if taken.lower <= told[name] <= taken.upper:
+            continue
+        if rig.valve == 'hsv':
+            unit = behind_number(taken.unit or '-')
+            raise InputError(f'`{of_rig}` is {told[name]:g}{unit}; the valve driver takes '
+                             f'{taken.allowed}', f'rig {rig.name}')
+        del told[name]
+
+
+def driver_remarks(rig: 'Rig') -> list[str]:
+    """Return a sentence where the driver refuses numbers of a rig, none where it takes all."""
+    try:
+        driver_config(rig)
+    except InputError as error:
+        return [f'{error}. So pam simulate, run, up and tune refuse this rig.']
+    return []
 
 
 def driver_loops(rig: 'Rig | JointRig',

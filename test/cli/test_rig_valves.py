@@ -66,3 +66,19 @@ def test_a_new_file_for_a_pair_of_valves_names_the_data_it_lacks(stated, capsys)
     wanted = ['valve_dead_zone', 'valve_dead_time', 'vent_asymmetry', 'supply_droop']
     assert load_rig('all.yaml').effects == rig.with_(
         effects=[*wanted, *rig.effects]).effects
+
+
+def test_a_period_of_pulses_that_the_driver_does_not_take_is_told(capsys):
+    rig = new('--valve', 'hsv', '--known', 'pwm_period_s=0.02')
+    told = '`pwm_period_s` is 0.02 s; the valve driver takes 0.002 to 0.01 s'
+    assert told in capsys.readouterr().out
+    assert main(['rig', 'check', 'made.yaml']) == 0
+    assert f'remark: rig made: {told}' in capsys.readouterr().out
+    # The same sentence, not a name that nobody wrote.
+    assert main(['simulate', 'short_sine', '--rig', 'made.yaml', '--out', 'bag']) == 2
+    said = capsys.readouterr().err
+    assert told in said and 'hsv.period_s' not in said
+    # Behind a regulator it does not matter.
+    assert driver_config(rig.with_(valve='ppr')).hsv.period_s == 0.01
+    new('--valve', 'hsv', '--known', 'pwm_period_s=0.004', '--overwrite')
+    assert 'the valve driver takes' not in capsys.readouterr().out
