@@ -24,6 +24,9 @@ is interpolated (cubic through positions and rates). Rules:
   a jump. The first point then holds until the time of the second, so the controller sees a jump
   and not a steep ramp. One that is newer than any ``reference`` is a whole movement, sent once: it
   counts to its end.
+* One that begins later counts from its first point on, in the preview as well. Until then what
+  counted before goes on: a former trajectory, else the reference. It is held for that long.
+* Beyond the ends of a trajectory, the allowed values bound what is wanted.
 * Otherwise the newest ``reference`` counts. Its rate is trusted for ``TRUST_S``, within the
   allowed values; after that the position stands still; the preview fades out until ``LOST_S``.
 * After ``LOST_S`` without either the reference is lost. The last position is held with zero rate
@@ -38,6 +41,7 @@ is interpolated (cubic through positions and rates). Rules:
   that lives goes on. Of one that does not, nothing is left that would move the muscle later.
 """
 
+from collections.abc import Sequence
 import math
 from typing import TYPE_CHECKING
 
@@ -108,9 +112,9 @@ class ReferenceBuffer:
         self._arrived: list[SetPoint] = []          # not judged yet
         self._followed: SetPoint | None = None      # the newest of the motion
         self._motion.forget()
-        self._course: Course | None = None
-        self._accepted_course: Course | None = None
+        self._courses: list[Course] = []            # that count now or later, the newest last
         self._arrived_courses: list[Course] = []
+        self._keeps_until_ns = 0    # what counted before a trajectory that begins later
         self._dropped = False       # since the last that counted
 
     def drop_stored(self, now_ns: int) -> None:
@@ -120,14 +124,23 @@ class ReferenceBuffer:
             self.reference = self._accepted = self._followed = None
             self._motion.forget()
             self._dropped = True
-        if self._course is not None and self._course.message.stamp_ns < oldest_ns:
-            self._course = self._accepted_course = None
-            self._dropped = True
+        kept = [course for course in self._courses if course.message.stamp_ns >= oldest_ns]
+        self._dropped = self._dropped or len(kept) < len(self._courses)
+        self._courses = kept
 
     @property
     def trajectory(self) -> 'Trajectory | None':
-        """Return the trajectory that is held."""
-        return None if self._course is None else self._course.message
+        """Return the newest trajectory that is held, which may begin later."""
+        courses = self._arrived_courses or self._courses
+        return courses[-1].message if courses else None
+
+    def counting(self, now_ns: int) -> 'Trajectory | None':
+        """Return the trajectory that counts, or was the last to; None where a reference does."""
+        course = self._begun(now_ns)
+        if course is None or (
+                self.reference is not None and now_ns > self._counts_until_ns(course)):
+            return None
+        return course.message
 
     def set_reference(self, message: 'SetPoint') -> bool:
         """Take a ``Reference``; one that is not usable is ignored and False returned."""
@@ -153,14 +166,15 @@ class ReferenceBuffer:
         why = self._values.why_not_trajectory(message)
         if why:
             return self._refuse(why)
-        self._course = self._values.course(message)
-        self._arrived_courses.append(self._course)
+        self._arrived_courses.append(self._values.course(message))
         return True
 
     def judge(self, now_ns: int) -> None:
         """Refuse what arrived with a stamp that is too far ahead of a time or too old."""
         self.refuse_ahead(now_ns)
         self._refuse_old(now_ns)
+        if self._waits(now_ns) and self.state(now_ns) in (FRESH, HELD):
+            self._keeps_until_ns = self._courses[-1].times_ns[0]
 
     def refuse_ahead(self, now_ns: int) -> None:
         """Forget what is stamped too far ahead of a time."""
@@ -182,10 +196,7 @@ class ReferenceBuffer:
                 self._refuse(f'a trajectory begins more than {TRAJECTORY_LIFE_S:g} s ahead')
             else:
                 self._arrived_courses.append(course)
-        if self._accepted_course is not None and self._accepted_course.times_ns[0] > begin_ns:
-            self._accepted_course = None
-        self._course = self._arrived_courses[-1] if self._arrived_courses else (
-            self._accepted_course)
+        self._courses = [one for one in self._courses if one.times_ns[0] <= begin_ns]
 
     def _refuse_old(self, now_ns: int) -> None:
         """Of what arrived let count what is not too old; what was held before stays else."""
@@ -202,50 +213,67 @@ class ReferenceBuffer:
                 self._refuse(why)
                 held = self._accepted
         self.reference = self._accepted = held
-        for course in reversed(self._arrived_courses):      # each replaces those before
+        usable: list[Course] = []
+        for course in reversed(self._arrived_courses):
             why = _course_too_old(course, now_ns)
-            if not why:
-                self._accepted_course = course
+            if why:
+                self._refuse(why)
+                continue
+            usable.append(course)
+            if course.times_ns[0] <= now_ns:        # it replaces those before
                 break
-            self._refuse(why)
-        self._course = self._accepted_course
+        self._courses = _needed((*self._courses, *reversed(usable)), now_ns)
         if self._arrived or self._arrived_courses:
-            self._dropped = self._dropped and self.reference is None and self._course is None
+            self._dropped = self._dropped and self.reference is None and not self._courses
         self._arrived, self._arrived_courses = [], []
 
     def uses_trajectory(self, now_ns: int) -> bool:
-        """Return whether the trajectory is the one that counts now."""
-        return self._course is not None and now_ns <= self._counts_until_ns(self._course)
+        """Return whether a trajectory is what counts now."""
+        return self._used(now_ns, now_ns) is not None
 
-    def _is_whole_movement(self) -> bool:
-        """Tell whether the trajectory was sent after the last reference."""
-        return self._course is not None and (
-            self.reference is None or self.reference.stamp_ns < self._course.message.stamp_ns)
+    def _used(self, now_ns: int, time_ns: int) -> Course | None:
+        """Return the trajectory that counts for a time, judged at ``now_ns``, None for none."""
+        course = self._begun(max(time_ns, now_ns))      # a reading is older than now
+        if course is None or now_ns > self._counts_until_ns(course):
+            return None
+        return course
+
+    def _begun(self, time_ns: int) -> Course | None:
+        """Return the newest trajectory that has begun at a time, None for none."""
+        for course in reversed((*self._courses, *self._arrived_courses)):
+            if course.times_ns[0] <= min(time_ns, self._counts_until_ns(course)):
+                return course
+        return None
+
+    def _waits(self, now_ns: int) -> bool:
+        """Return whether the newest trajectory begins later."""
+        return bool(self._courses) and self._courses[-1].times_ns[0] > now_ns
+
+    def _is_whole_movement(self, course: Course) -> bool:
+        """Tell whether a trajectory was sent after the last reference."""
+        return self.reference is None or self.reference.stamp_ns < course.message.stamp_ns
 
     def state(self, now_ns: int) -> int:
         """Return ``NONE``, ``FRESH``, ``HELD``, ``LOST`` or ``DROPPED`` for a time."""
-        if self.uses_trajectory(now_ns):
-            return FRESH
-        if self.reference is None and self._course is None:
+        # The latest times anything was known for.
+        times_ns = [] if self.reference is None else [self.reference.stamp_ns]
+        course = self._begun(now_ns)
+        if course is not None:
+            times_ns.append(self._counts_until_ns(course))
+            if now_ns <= times_ns[-1]:
+                return FRESH
+        if not times_ns:
             return DROPPED if self._dropped else NONE
-        age_s = (now_ns - self._last_ns()) * 1e-9
+        age_s = (now_ns - max(times_ns)) * 1e-9
         if age_s <= LOST_S:
             return FRESH
-        return HELD if age_s <= HOLD_S else LOST
-
-    def _last_ns(self) -> int:
-        """Return the latest time anything was known for [ns]."""
-        times: list[int] = []
-        if self.reference is not None:
-            times.append(self.reference.stamp_ns)
-        if self._course is not None:
-            times.append(self._counts_until_ns(self._course))
-        return max(times)
+        keeps = self._waits(now_ns) and now_ns <= self._keeps_until_ns
+        return HELD if age_s <= HOLD_S or keeps else LOST
 
     def _counts_until_ns(self, course: Course) -> int:
         """Return until when a trajectory counts [ns]: its end, or less with a reference."""
         end_ns = course.times_ns[-1]
-        if self._is_whole_movement():
+        if self._is_whole_movement(course):
             return end_ns
         return min(end_ns, course.message.stamp_ns + round(TRAJECTORY_LIFE_S * 1e9))
 
@@ -255,12 +283,13 @@ class ReferenceBuffer:
 
         Only valid unless ``state`` is ``NONE`` or ``DROPPED``.
         """
-        if self._course is not None and self.uses_trajectory(now_ns):
-            return self._course.at(time_ns, self._jump_per_s)
-        reference = self.reference
-        if reference is None or self._is_whole_movement():
-            assert self._course is not None     # else there is nothing to ask for
-            return self._course.values[-1], 0.0
+        course = self._used(now_ns, time_ns)
+        if course is not None:
+            return self._within(*course.at(time_ns, self._jump_per_s))
+        reference, course = self.reference, self._begun(now_ns)
+        if course is not None and self._is_whole_movement(course):
+            return course.values[-1], 0.0
+        assert reference is not None        # else there is nothing to ask for
         if reference is not self._followed:
             values = self._values
             self._motion.take(reference.stamp_ns, values.of(reference),
@@ -271,10 +300,27 @@ class ReferenceBuffer:
         trusted_s = min(age_s, TRUST_S)
         fade = min(max((LOST_S - age_s) / (LOST_S - TRUST_S), 0.0), 1.0)
         position, rate = self._motion.at(reference.stamp_ns + round(trusted_s * 1e9))
+        if self._within(position, rate) != (position, rate):
+            return self._within(position, rate)
+        return position + rate * ahead_s * fade, rate * fade
+
+    def _within(self, position: float, rate: float) -> tuple[float, float]:
+        """Return both, of a position beyond the allowed ones the nearest of them, at rest."""
         lower, upper = self._allowed
         if not lower <= position <= upper:      # nobody asked for that; its rate led there
             return min(max(position, lower), upper), 0.0
-        return position + rate * ahead_s * fade, rate * fade
+        return position, rate
+
+
+def _needed(courses: Sequence[Course], now_ns: int) -> list[Course]:
+    """Return those that count now or later: each replaces the former from its begin on."""
+    needed: list[Course] = []
+    for course in reversed(courses):
+        if not needed or course.times_ns[0] < needed[-1].times_ns[0]:
+            needed.append(course)
+        if needed[-1].times_ns[0] <= now_ns:
+            break
+    return needed[::-1]
 
 
 def _reference_too_old(message: 'SetPoint', now_ns: int) -> str:

@@ -104,9 +104,8 @@ class MuscleSetpoint:
 
     def stamps(self, now_ns: int) -> tuple[int, ...]:
         """Return the stamps of reference and trajectory, -1 for one that does not count."""
-        reference, trajectory = self.references.reference, self.references.trajectory
-        if trajectory is not None and (
-                reference is None or self.references.uses_trajectory(now_ns)):
+        reference, trajectory = self.references.reference, self.references.counting(now_ns)
+        if trajectory is not None:
             return -1, trajectory.stamp_ns
         return -1 if reference is None else reference.stamp_ns, -1
 

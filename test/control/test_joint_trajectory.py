@@ -66,7 +66,8 @@ def test_it_goes_to_the_first_point_from_where_the_joint_is():
     assert wanted(trajectory, 0) == pytest.approx((0.1, 2.0))
     assert wanted(trajectory, 100)[0] == pytest.approx(0.3)
     assert wanted(trajectory, 200)[0] == pytest.approx(0.5)
-    assert wanted(taken(points=later), 100)[0] == pytest.approx(0.4)    # no angle known: its rate
+    unknown = buffer_with(taken(points=later))      # no angle known: waited for
+    assert unknown.state(NOW_NS) == NONE and unknown.state(NOW_NS + 200 * MS) == FRESH
 
 
 def test_one_in_the_future_is_waited_for_and_one_that_began_is_joined():
