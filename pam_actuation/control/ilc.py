@@ -25,6 +25,9 @@ The length of a cycle is found from the reference, between two of its minima. Tw
 alike to 0.1 mm, and together no longer than what is remembered. Where the reference leaves its
 cycle, what was learned fades, and a PID is left. It suits one cycle and knows nothing of the
 muscle.
+
+An error counts as 0 while nothing may be learned, and where the pressure is not that of the
+commands. After a command at a limit, only what leads away from that limit counts.
 """
 
 from collections.abc import Callable, Mapping
@@ -71,6 +74,8 @@ MEMORY_SIZE = 5000                          # remembered
 _MINIMA_SIZE = 16                          # of the reference, remembered
 _SHORTEST_S = 0.2                     # of a cycle
 _ALIKE_M = 1e-4
+_ANSWER_S = 0.3                       # by then the pressure has come to a command
+_APART_PA = 4e4                       # beyond all these commands: it does not follow them
 STATE = record(
     'started',                        # 1 after the first tick
     'offset_m',                       # of the reference, from the bumpless start
@@ -86,6 +91,9 @@ STATE = record(
     'falls',                          # 1 = it moved downwards last
     'minima',                         # found since the start
     ('minimum_tick', _MINIMA_SIZE),
+    'lowered_s',                      # more than 0: a limit kept the command lower of late
+    'raised_s',                       # the same, higher
+    'apart_s',                        # the same, the pressure did not follow
 )
 # The names on topic ``controller_state``.
 OUTPUT = record(
@@ -176,6 +184,45 @@ def _learned_pa(par: np.record, errors: FloatArray, taught: FloatArray, st: np.r
     return min(max(total, -par.learning_limit_pa), par.learning_limit_pa)
 
 
+@compiled
+def _apart(par: np.record, commands: FloatArray, st: np.record, inp: np.record) -> bool:
+    """Tell whether the measured pressure is beyond all commands of late; NaN is not."""
+    tick = int(st.ticks)
+    lowest = commands[tick % MEMORY_SIZE]
+    highest = lowest
+    for ago in range(1, min(int(_ANSWER_S * par.rate_hz), tick) + 1):
+        command = commands[(tick - ago) % MEMORY_SIZE]
+        lowest = min(lowest, command)
+        highest = max(highest, command)
+    pressure = inp.pressure_pa
+    return bool(pressure < lowest - _APART_PA or pressure > highest + _APART_PA)
+
+
+@compiled
+def _counted(par: np.record, commands: FloatArray, st: np.record, inp: np.record,
+             out: np.record, error: float) -> float:
+    """Return what of an error [m] later cycles may learn; note how this command was limited."""
+    period = 1.0 / par.rate_hz
+    lasts: float = par.learning_lead_s + 0.5 * period      # so late is the error of a command
+    excess: float = out.unlimited_command_pa - out.command_pa
+    lowered: float = st.lowered_s
+    raised: float = st.raised_s
+    apart: float = st.apart_s
+    lowered = lasts if excess > 0.0 else max(lowered - period, 0.0)
+    raised = lasts if excess < 0.0 else max(raised - period, 0.0)
+    follows = inp.held_back == 0.0 and not _apart(par, commands, st, inp)
+    apart = max(apart - period, 0.0) if follows else lasts
+    st.lowered_s, st.raised_s, st.apart_s = lowered, raised, apart
+    if inp.learning < 0.5 or apart > 0.0:
+        return 0.0
+    counted = error
+    if lowered > 0.0:
+        counted = min(counted, 0.0)
+    if raised > 0.0:
+        counted = max(counted, 0.0)
+    return counted
+
+
 @inlined
 def _tick(par: np.record, inverse: FloatArray, memory: FloatArray, st: np.record,
           inp: np.record, out: np.record) -> float:
@@ -184,18 +231,20 @@ def _tick(par: np.record, inverse: FloatArray, memory: FloatArray, st: np.record
         _start(par, st, inp)
     error, offset = tracking_error(par, st, inp, st.ticks > 0.0)
     place = int(st.ticks) % MEMORY_SIZE
-    references, errors, taught = memory[0], memory[1], memory[2]
+    references, errors, taught, commands = memory[0], memory[1], memory[2], memory[3]
     references[place] = inp.reference_m
-    errors[place] = error if inp.held_back == 0.0 else 0.0
     _find_cycle(par, references, st)
     learned = _learned_pa(par, errors, taught, st, inp.learning > 0.5)
     taught[place] = learned
     st.learned_pa = learned
-    st.ticks += 1.0
     out.learned_pa = learned
     out.cycle_s = st.cycle_ticks * (1.0 / par.rate_hz)
     base = inverse_pressure_pa(inverse, inp.lead_reference_m - offset)
-    return command_of(par, st, inp, out, error, offset, error, base, learned)
+    command = command_of(par, st, inp, out, error, offset, error, base, learned)
+    commands[place] = command
+    errors[place] = _counted(par, commands, st, inp, out, error)
+    st.ticks += 1.0
+    return command
 
 
 @inlined
@@ -216,7 +265,8 @@ def _entry(key: int) -> Compiled[..., float]:
 
         ``par``, ``st``, ``inp`` and ``out`` are arrays of ``PARAMETERS``, ``STATE``,
         ``inputs.INPUT`` and ``OUTPUT``; ``memory`` has rows of ``MEMORY_SIZE`` for reference,
-        error and what was learned. All but ``par``, ``inp`` and the static inverse are written.
+        counted error, what was learned and command. All but ``par``, ``inp`` and the static
+        inverse are written.
         """
         if key < 0:       # never; makes the key part of what is stored
             return P_ATM_PA
@@ -258,7 +308,7 @@ class IlcController(FixedLawController):
                  rig_name: str = '', where: Callable[[str], str] | None = None) -> None:
         checked = checked_settings(SETTINGS, settings, where)
         self.static_inverse = np.ascontiguousarray(static_inverse, dtype=float)
-        self._memory = np.zeros((3, MEMORY_SIZE))
+        self._memory = np.zeros((4, MEMORY_SIZE))
         super().__init__(ilc_step, checked, self.static_inverse, PARAMETERS, STATE, rig_name,
                          self._memory)
 

@@ -28,6 +28,7 @@ from pam_actuation.tuning.closed_loop import ClosedLoop
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.records import fields
+from pam_sim.units import P_ATM_PA
 import pytest
 
 RATE_HZ = 200.0
@@ -72,13 +73,14 @@ class Muscle:
 
 def tracked(controller, muscle, wanted, ticks, learn=True):
     """Return the errors [mm]; ``wanted(t)`` returns contraction and rate."""
-    errors = np.empty(ticks)
+    errors, pressure_pa = np.empty(ticks), inverse_pressure_pa(INVERSE, 0.014)
     for k in range(ticks):
         t = k / RATE_HZ
         (now, rate), (lead, lead_rate) = wanted(t), wanted(t + controller.lead_s)
         errors[k] = 1e3 * (now - muscle.contraction_m)
-        muscle.step(controller.step(muscle.contraction_m, now, rate, lead, lead_rate, learn,
-                                    pressure_pa=inverse_pressure_pa(INVERSE, 0.014)))
+        pressure_pa = controller.step(muscle.contraction_m, now, rate, lead, lead_rate, learn,
+                                      pressure_pa=pressure_pa)
+        muscle.step(pressure_pa)
     return errors
 
 
@@ -137,6 +139,43 @@ def test_an_ilc_that_may_not_learn_keeps_what_it_knows_and_one_without_a_cycle_l
         learned.append(controller.state_values()[controller.state_names.index('learned_pa')])
     assert not np.any(learned)
     assert controller.learning_reason() == 'the reference does not repeat'
+
+
+def learned_pa(controller, muscle, ticks, begin=0, learn=True, measured=lambda command: command):
+    """Track a sine of 1 Hz; return what was learned in each tick [Pa]."""
+    learned, pressure_pa = np.empty(ticks), inverse_pressure_pa(INVERSE, 0.014)
+    of = controller.state_names.index('learned_pa')
+    for k in range(ticks):
+        wanted = sine(1.0)((begin + k) / RATE_HZ)
+        command = controller.step(
+            muscle.contraction_m, *wanted, *wanted, learn, pressure_pa=pressure_pa)
+        pressure_pa = measured(command)
+        muscle.step(command)
+        learned[k] = controller.state_values()[of]
+    return learned
+
+
+def test_an_ilc_learns_nothing_beyond_a_limit_of_its_command():
+    """The upper half asks for more than is allowed: what is learned there would only grow."""
+    limited = ilc(max_pressure_gauge_pa=inverse_pressure_pa(INVERSE, 0.0155) - P_ATM_PA,
+                  integral_pa_per_m_s=0.0, anti_windup_time_s=10.0, learning_limit_pa=6e5)
+    learned = learned_pa(limited, Muscle(model_of_lag_and_mass()), 4000)
+    assert 4e4 < learned[600:800].max() and learned.max() < 1.5e5      # it grew by 20 kPa a cycle
+
+
+def test_an_ilc_learns_nothing_where_the_pressure_does_not_follow():
+    for supplied, learns in ((lambda command: 3e5, False), (lambda command: command - 1e4, True),
+                             (lambda command: math.nan, True)):
+        learned = learned_pa(ilc(), Muscle(model_of_lag_and_mass()), 1000, measured=supplied)
+        assert learned.any() == learns
+
+
+def test_an_ilc_does_not_learn_later_what_it_saw_while_it_may_not_learn():
+    controller, muscle = ilc(learning_lead_s=0.0, learning_filter_s=0.0), Muscle(
+        model_of_lag_and_mass())
+    learned_pa(controller, muscle, 800, learn=False)
+    learned = learned_pa(controller, muscle, 400, 800)
+    assert not learned[:195].any() and learned[205:].any()
 
 
 def test_an_ilc_of_steps_finds_their_cycle_and_forgets_in_a_pause():
