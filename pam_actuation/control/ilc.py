@@ -26,8 +26,9 @@ alike to 0.1 mm, and together no longer than what is remembered. Where the refer
 cycle, what was learned fades, and a PID is left. It suits one cycle and knows nothing of the
 muscle.
 
-An error counts as 0 while nothing may be learned, and where the pressure is not that of the
-commands. After a command at a limit, only what leads away from that limit counts.
+While nothing may be learned, what was learned is repeated without the filter. An error then counts
+as 0. It also does where the pressure is not that of the commands. After a command at a limit, only
+what leads away from that limit counts.
 """
 
 from collections.abc import Callable, Mapping
@@ -172,16 +173,18 @@ def _learned_pa(par: np.record, errors: FloatArray, taught: FloatArray, st: np.r
     cycle: float = st.cycle_ticks
     if not cycle > 0.0:
         return st.learned_pa * (par.start_time_s / (par.start_time_s + 1.0 / par.rate_hz))
-    gain = par.learning_pa_per_m if learns else 0.0
+    limit = par.learning_limit_pa
+    if not learns:
+        return min(max(_at(taught, tick - cycle), -limit), limit)
     ahead = min(par.learning_lead_s * par.rate_hz, cycle - 2.0)
     half = int(min(par.learning_filter_s * par.rate_hz, cycle - 2.0 - ahead))
     total = 0.0
     for w in range(-half, half + 1):
         then = tick - cycle + w
-        value = _at(taught, then) + gain * _at(errors, then + ahead)
+        value = _at(taught, then) + par.learning_pa_per_m * _at(errors, then + ahead)
         total += (half + 1 - abs(w)) * value
     total /= (half + 1) * (half + 1)
-    return min(max(total, -par.learning_limit_pa), par.learning_limit_pa)
+    return min(max(total, -limit), limit)
 
 
 @compiled

@@ -119,7 +119,7 @@ def controller_outputs(controller):
     return record(*controller.state_names)
 
 
-def test_an_ilc_that_may_not_learn_keeps_what_it_knows_and_one_without_a_cycle_learns_nothing():
+def test_an_ilc_that_may_not_learn_or_has_no_cycle_learns_nothing():
     frozen = ilc()
     errors = tracked(frozen, Muscle(model_of_lag_and_mass()), sine(1.0), 1600, learn=False)
     assert rms(errors[-200:]) > 0.9 * rms(errors[200:400])
@@ -176,6 +176,14 @@ def test_an_ilc_does_not_learn_later_what_it_saw_while_it_may_not_learn():
     learned_pa(controller, muscle, 800, learn=False)
     learned = learned_pa(controller, muscle, 400, 800)
     assert not learned[:195].any() and learned[205:].any()
+
+
+def test_an_ilc_whose_learning_is_switched_off_keeps_what_it_learned():
+    controller, muscle = ilc(learning_filter_s=0.1), Muscle(model_of_lag_and_mass())
+    learned = learned_pa(controller, muscle, 1600)[-200:]
+    kept = learned_pa(controller, muscle, 4000, 1600, learn=False)
+    assert np.ptp(learned) > 1e4
+    assert kept[-200:] == pytest.approx(kept[:200], abs=10.0)
 
 
 def test_an_ilc_of_steps_finds_their_cycle_and_forgets_in_a_pause():
