@@ -35,7 +35,8 @@ both pressures changed by 300 kPa              while a torque is followed: the j
                                                be blocked then
 what is tracked is sent by two publishers      vents until one of them is silent for 1 s
 no reference yet                               vents
-reference (and trajectory) silent              rate trusted for 0.2 s, then standing still
+reference (and trajectory) silent              rate trusted for 0.2 s, then standing still;
+                                               learning frozen where it moved
 reference silent for more than 0.5 s           holds the last position, learning frozen
 reference silent for more than 2 s             vents
 torque that is followed silent for 0.1 s       vents
@@ -343,8 +344,9 @@ class ControllerLoop:
         elif reason == codes.OK:
             reason = self._reason(now_ns)
         effort = setpoint.effort
-        may_learn = bool(learning and reason == codes.OK and not effort.follows
-                         and not self.controller.freeze_learning)
+        may_learn = bool(
+            learning and reason == codes.OK and not effort.follows
+            and not self.controller.freeze_learning and not setpoint.references.guesses(now_ns))
         still = ''
         if may_learn:
             may_learn = self._on_time.judge(

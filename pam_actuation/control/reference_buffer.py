@@ -28,7 +28,9 @@ is interpolated (cubic through positions and rates). Rules:
   counted before goes on: a former trajectory, else the reference. It is held for that long.
 * Beyond the ends of a trajectory, the allowed values bound what is wanted.
 * Otherwise the newest ``reference`` counts. Its rate is trusted for ``TRUST_S``, within the
-  allowed values; after that the position stands still; the preview fades out until ``LOST_S``.
+  allowed values. After that the position stands still, with a rate of zero. The preview comes back
+  to it until ``LOST_S``, with the rate of that way. Nothing is known of a motion meanwhile
+  (``guesses``).
 * After ``LOST_S`` without either the reference is lost. The last position is held with zero rate
   until ``HOLD_S``. Then there is none and the muscle must be vented. A new message resumes at
   once.
@@ -290,19 +292,39 @@ class ReferenceBuffer:
         if course is not None and self._is_whole_movement(course):
             return course.values[-1], 0.0
         assert reference is not None        # else there is nothing to ask for
+        self._follow(reference)
+        age_s = (now_ns - reference.stamp_ns) * 1e-9
+        ahead_s = (time_ns - now_ns) * 1e-9
+        position, rate = self._within(*self._motion.at(
+            reference.stamp_ns + round(min(age_s, TRUST_S) * 1e9)))
+        if age_s <= TRUST_S:
+            return position + rate * ahead_s, rate
+        if ahead_s <= 0.0:      # from TRUST_S on it stands still
+            moves_s = min(ahead_s + age_s - TRUST_S, 0.0)
+            return position + rate * moves_s, rate if moves_s < 0.0 else 0.0
+        fades_s = LOST_S - TRUST_S
+        if age_s >= LOST_S:
+            return position, 0.0
+        return (position + rate * ahead_s * ((LOST_S - age_s) / fades_s),
+                -rate * ahead_s / fades_s)
+
+    def guesses(self, now_ns: int) -> bool:
+        """Return whether what counts now is a motion of which nothing is known any more."""
+        reference, course = self.reference, self._begun(now_ns)
+        if reference is None or (now_ns - reference.stamp_ns) * 1e-9 <= TRUST_S or (
+                course is not None and (
+                    self._is_whole_movement(course) or self.uses_trajectory(now_ns))):
+            return False
+        self._follow(reference)
+        return self._motion.at(reference.stamp_ns + round(TRUST_S * 1e9))[1] != 0.0
+
+    def _follow(self, reference: 'SetPoint') -> None:
+        """Let the motion go on to a reference, if that is a new one."""
         if reference is not self._followed:
             values = self._values
             self._motion.take(reference.stamp_ns, values.of(reference),
                               values.rate_of(reference, math.nan))
             self._followed = reference
-        age_s = (now_ns - reference.stamp_ns) * 1e-9
-        ahead_s = (time_ns - now_ns) * 1e-9
-        trusted_s = min(age_s, TRUST_S)
-        fade = min(max((LOST_S - age_s) / (LOST_S - TRUST_S), 0.0), 1.0)
-        position, rate = self._motion.at(reference.stamp_ns + round(trusted_s * 1e9))
-        if self._within(position, rate) != (position, rate):
-            return self._within(position, rate)
-        return position + rate * ahead_s * fade, rate * fade
 
     def _within(self, position: float, rate: float) -> tuple[float, float]:
         """Return both, of a position beyond the allowed ones the nearest of them, at rest."""

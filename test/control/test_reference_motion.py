@@ -142,6 +142,33 @@ def test_a_message_from_the_future_leaves_the_motion_as_it_was():
     assert buffer.at(995 * MS, 995 * MS) == expected and buffer.refused == 1
 
 
+def test_a_reference_that_is_silent_comes_to_rest():
+    """The rate is that of the position at each time, and of the preview."""
+    buffer = ReferenceBuffer()
+    buffer.set_reference(Reference(0, 0.01, 0.06))
+    buffer.judge(0)
+    for ahead_ms in (-4, 0, 100):
+        for now_ns in range(0, 600 * MS, 2 * MS):
+            (before, _), (wanted, rate), (after, _) = (
+                buffer.at(t, t + ahead_ms * MS) for t in (now_ns - MS, now_ns, now_ns + MS))
+            if now_ns not in (200 * MS, 204 * MS, 500 * MS):    # where it bends
+                assert rate == pytest.approx((after - before) / 2e-3, abs=1e-9)
+    assert buffer.at(300 * MS, 300 * MS) == (pytest.approx(0.022), 0.0)
+    assert buffer.at(500 * MS, 600 * MS) == (pytest.approx(0.022), 0.0)
+
+
+@pytest.mark.parametrize('rate, learns', [(0.06, False), (0.0, True)])
+def test_nothing_is_learned_where_a_motion_is_silent(rate, learns):
+    loop, learned = ControllerLoop(load_controller('pid', load_rig('dmsp_5_300_hanging_mass'))), []
+    loop.take('reference', Reference(0, 0.01, rate))
+    for k in range(90):
+        now_ns = k * 5 * MS
+        loop.take('contraction', Contraction(now_ns, 0.014 + 1e-9 * k))
+        _, state = loop.tick(now_ns)
+        learned.append(dict(zip(state.names, state.values))['learning'] == 1.0)
+    assert all(learned[:41]) and set(learned[41:]) == {learns}
+
+
 def test_a_controller_sees_positions_alone_as_those_with_a_rate():
     """The reference of ``controller_state`` at 200 Hz, from 50 Hz of positions."""
     loop = ControllerLoop(load_controller('pid', load_rig('dmsp_5_300_hanging_mass')))
