@@ -17,7 +17,8 @@
 from collections.abc import Sequence
 import sys
 
-ESTIMATES_M = -0.1, 0.2         # far beyond what a muscle does: no error of a model
+# Far beyond what a muscle does, of a long one beyond its stroke: no error of a model.
+_LOWEST_M, _HIGHEST_M, _BEYOND_STROKE_M = -0.1, 0.2, 0.1
 RESUME_NS = 2_000_000_000
 _ESTIMATE, _COMMAND = 'estimated_contraction_m', 'command_pa'
 _FINITE = -sys.float_info.max, sys.float_info.max
@@ -31,13 +32,16 @@ class LawCheck:
     ----------
     names : sequence of str
         Of the numbers of ``controller_state``.
+    stroke_m : float
+        Of the muscle, where it is known.
 
     """
 
-    def __init__(self, names: Sequence[str]) -> None:
+    def __init__(self, names: Sequence[str], stroke_m: float = 0.0) -> None:
+        estimates_m = _LOWEST_M, max(_HIGHEST_M, stroke_m + _BEYOND_STROKE_M)
         self._looks_at = [
             (names.index(name), limits) for name, limits in (
-                (_ESTIMATE, ESTIMATES_M), (_COMMAND, _FINITE)) if name in names]
+                (_ESTIMATE, estimates_m), (_COMMAND, _FINITE)) if name in names]
         self.forget()
 
     def forget(self) -> None:

@@ -152,7 +152,8 @@ class ControllerLoop:
         law, self.measurement, self.setpoint = (
             self._of_joint(rig, name) if isinstance(rig, JointRig) else self._of_muscle(rig))
         self._core = TickCore(law, nearly_pa=nearly_pa)
-        self._law_check = LawCheck(self._core.names)
+        stroke_m = 0.0 if rig is None or isinstance(rig, JointRig) else rig.muscle.stroke_m
+        self._law_check = LawCheck(self._core.names, stroke_m)
         self.muscles = tuple(
             MuscleChannel(place, rise) for place, rise in zip(law.places, self._core.rises))
         self.command_topics = tuple(f'{place}pressure_command' for place in law.places)

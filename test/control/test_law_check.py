@@ -21,6 +21,7 @@ from pam_actuation.control.law_check import LawCheck
 from pam_actuation.control.loop import ControllerLoop
 from pam_actuation.control.static_inverse import inverse_pressure_pa
 from pam_actuation.messages import Contraction, Pressure, Reference, START_NS
+from pam_sim import load_rig
 from pam_sim.units import P_ATM_PA
 import pytest
 from straight_rig import sofc
@@ -81,6 +82,21 @@ def test_a_command_that_is_not_finite_is_never_sent(monkeypatch):
     commands, said = ticks(loop, muscle, 3, 50)
     assert commands.tolist() == [P_ATM_PA] * 3
     assert said.tolist() == ['ok', SAYS, SAYS]
+
+
+def test_the_bound_of_the_estimate_lies_beyond_the_stroke_of_a_long_muscle():
+    rig = load_rig('muscle: {like: dmsp_20_300, length_m: 1.0}\nload: hanging_mass\nvalve: ppr\n')
+    stroke_m = rig.muscle.stroke_m
+    assert stroke_m > 0.2
+    check = ControllerLoop(mpc(), rig)._law_check
+    at = ControllerLoop(mpc())._core.names.index('estimated_contraction_m')
+
+    def failed(estimate_m):
+        check.forget()
+        return check.failed(0, (0.0,) * at + (estimate_m,) + (0.0,) * 99)
+
+    assert not failed(stroke_m) and not failed(stroke_m + 0.099)
+    assert failed(stroke_m + 0.101) and failed(-0.101) and failed(math.nan)
 
 
 def test_a_forgotten_failure_is_over():
