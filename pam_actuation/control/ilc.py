@@ -115,6 +115,16 @@ def _start(par: np.record, st: np.record, inp: np.record) -> None:
 
 
 @compiled
+def _reference_now_m(par: np.record, inp: np.record) -> float:
+    """Return the reference at the tick: readings of another rate are not as old in each cycle."""
+    age_s = inp.age_s
+    ahead_s = par.lead_s + age_s
+    change = inp.lead_rate_m_per_s - inp.reference_rate_m_per_s
+    bend = change / ahead_s if ahead_s > 0.0 else 0.0
+    return inp.reference_m + age_s * (inp.reference_rate_m_per_s + 0.5 * age_s * bend)
+
+
+@compiled
 def _at(row: FloatArray, tick: float) -> float:
     """Return a remembered value at a time in ticks, linear in between."""
     whole = int(math.floor(tick))
@@ -235,7 +245,7 @@ def _tick(par: np.record, inverse: FloatArray, memory: FloatArray, st: np.record
     error, offset = tracking_error(par, st, inp, st.ticks > 0.0)
     place = int(st.ticks) % MEMORY_SIZE
     references, errors, taught, commands = memory[0], memory[1], memory[2], memory[3]
-    references[place] = inp.reference_m
+    references[place] = _reference_now_m(par, inp)
     _find_cycle(par, references, st)
     learned = _learned_pa(par, errors, taught, st, inp.learning > 0.5)
     taught[place] = learned

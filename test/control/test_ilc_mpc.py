@@ -186,6 +186,17 @@ def test_an_ilc_whose_learning_is_switched_off_keeps_what_it_learned():
     assert kept[-200:] == pytest.approx(kept[:200], abs=10.0)
 
 
+def test_an_ilc_finds_a_cycle_whatever_the_age_of_the_readings():
+    """A sine of up to 63 mm/s, readings of 0 to 5 ms of age at random."""
+    controller, ages_s = ilc(lead_s=0.1), np.random.default_rng(5).uniform(0.0, 0.005, 1000)
+    cycle, found_s = controller.state_names.index('cycle_s'), []
+    for k, age_s in enumerate(ages_s):
+        (now, rate), lead = (sine(1.0, 0.01)(k / RATE_HZ + one) for one in (-age_s, 0.1))
+        controller.step(0.014, now, rate, *lead, age_s=age_s)
+        found_s.append(controller.state_values()[cycle])
+    assert found_s[560:] == pytest.approx([1.0] * 440, abs=2e-3)     # two cycles after a minimum
+
+
 def test_an_ilc_of_steps_finds_their_cycle_and_forgets_in_a_pause():
     controller = ilc()
     tracked(controller, Muscle(model_of_lag_and_mass()),
