@@ -52,13 +52,14 @@ class ForceLoop(MuscleLoop):
         Contraction [m], possibly as a function of time [s] (driven load only); by default
         what an isometric rig states, 0 for a driven one.
     **others
-        ``seed``, ``rate_hz``, ``latency_s``, ``driver``, ``slow_start`` of ``ClosedLoop``.
+        ``seed``, ``rate_hz``, ``latency_s``, ``driver``, ``preview_s``, ``slow_start`` of
+        ``ClosedLoop``; its supply and force would act on nothing here.
 
     Raises
     ------
     InputError
         As of ``ClosedLoop``; a load that moves freely; a moving isometric load; a contraction
-        beyond the stroke.
+        beyond the stroke; a course of the supply or of an external force.
 
     """
 
@@ -70,6 +71,10 @@ class ForceLoop(MuscleLoop):
             raise InputError(
                 f'load `{rig.load}` of {rig.name} moves freely; a force can be tracked on a load '
                 'whose contraction is prescribed', 'rig')
+        for name in ('supply_pa', 'external_force_n'):
+            if others.get(name) is not None:
+                raise InputError(
+                    'acts on nothing in a loop that tracks a force; leave it out', name)
         self._made_of = (rig, experiment, contraction_m, others)
         super().__init__(rig, experiment, **others)
         if contraction_m is None:

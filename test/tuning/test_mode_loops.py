@@ -183,6 +183,10 @@ def test_what_cannot_be_tracked_is_refused():
         ForceLoop(rig, sine, contraction_m=lambda t: 0.0)
     with pytest.raises(InputError, match='stroke'):
         ForceLoop(rig.with_(load='driven'), sine, contraction_m=0.2)
+    for name in ('supply_pa', 'external_force_n'):
+        with pytest.raises(InputError, match='acts on nothing') as caught:
+            ForceLoop(rig, sine, **{name: lambda t: 5e5})
+        assert caught.value.where == name
     with pytest.raises(InputError, match='this loop tracks force'):
         ForceLoop(rig, load_experiment('joint_sine'))
     joint = load_joint('joint_dmsp_5_300')
