@@ -341,17 +341,16 @@ def _fitted(estimator: Estimator, rivals: Sequence[Rival]) -> list[Fit]:
 
     Those with the same parameters begin alike: where a fit ends must not tell them apart.
     """
-    starts: dict[int, list[FloatArray]] = {}
-    for place, (_, _, hypothesis, _) in enumerate(rivals):
-        starts[place] = []
+    def best(rival: Rival) -> Fit:
+        hypothesis, starts = rival[2], list[FloatArray]()
         for _, _, like, theta in rivals:
             if _parameters(like) == _parameters(hypothesis) and not any(
-                    np.allclose(theta, known, ALIKE, ALIKE) for known in starts[place]):
-                starts[place].append(theta)
-    jobs = [(place, theta) for place, several in starts.items() for theta in several]
-    fits = parallel_map(lambda job: estimator.fit(rivals[job[0]][2], job[1]), jobs)
-    return [min((f for (of, _), f in zip(jobs, fits) if of == place), key=estimator.cost)
-            for place in starts]
+                    np.allclose(theta, known, ALIKE, ALIKE) for known in starts):
+                starts.append(theta)
+        return min(parallel_map(lambda theta: estimator.fit(hypothesis, theta), starts),
+                   key=estimator.cost)
+
+    return parallel_map(best, rivals)
 
 
 def _parameters(hypothesis: Hypothesis) -> list[tuple[str, ...]]:
