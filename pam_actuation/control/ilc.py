@@ -218,13 +218,10 @@ def _counted(par: np.record, commands: FloatArray, st: np.record, inp: np.record
     period = 1.0 / par.rate_hz
     lasts: float = par.learning_lead_s + 0.5 * period      # so late is the error of a command
     excess: float = out.unlimited_command_pa - out.command_pa
-    lowered: float = st.lowered_s
-    raised: float = st.raised_s
-    apart: float = st.apart_s
-    lowered = lasts if excess > 0.0 else max(lowered - period, 0.0)
-    raised = lasts if excess < 0.0 else max(raised - period, 0.0)
+    lowered: float = lasts if excess > 0.0 else max(st.lowered_s - period, 0.0)
+    raised: float = lasts if excess < 0.0 else max(st.raised_s - period, 0.0)
     follows = inp.held_back == 0.0 and not _apart(par, commands, st, inp)
-    apart = max(apart - period, 0.0) if follows else lasts
+    apart: float = max(st.apart_s - period, 0.0) if follows else lasts
     st.lowered_s, st.raised_s, st.apart_s = lowered, raised, apart
     if inp.learning < 0.5 or apart > 0.0:
         return 0.0
