@@ -19,12 +19,10 @@ from pathlib import Path
 import re
 
 from pam_actuation.tables.formats.layout_of_text import encoding_of, layout_of, split
-from pam_actuation.tables.thousands import SENTENCE
+from pam_actuation.tables.thousands import POINTS, SENTENCE
 from pam_sim.errors import InputError
 from pam_sim.files import refuse_pipe, StrPath
 from pam_sim.muscle.lookup_table import lines_and_source
-
-_POINTS = re.compile(r'[+-]?\d{1,3}(\.\d{3})+')        # 1016, or 1.016: nobody knows
 
 
 def rows_of_text(path: StrPath) -> tuple[list[list[str]], str]:
@@ -58,7 +56,7 @@ def rows_of_text(path: StrPath) -> tuple[list[list[str]], str]:
         rows = [split(line, layout.separator) for line in lines[layout.first_line - 2:]]
     if layout.decimal == ',':
         for number, row in enumerate(rows[1:], 1):
-            wrong = next((cell for cell in row if _POINTS.fullmatch(cell.strip())), None)
+            wrong = next((cell for cell in row if re.fullmatch(POINTS, cell.strip())), None)
             if wrong is not None:
                 raise InputError(f'data row {number}: {wrong.strip()!r} stands beside numbers '
                                  f'with decimal commas: {SENTENCE}', str(path))

@@ -22,6 +22,8 @@ _OTHER = {',': '.', '.': ','}
 # No number has these but between thousands.
 _SPACES = " \u00a0\u202f'’"
 _LIKE_A_NUMBER = re.compile(rf'\s*[+-]?\d[\d.,{_SPACES}]*\s*')
+# Beside decimal commas nobody knows whether 1.016 is 1016 or has three decimals.
+POINTS = r'[+-]?\d{1,3}(\.\d{3})+'
 SENTENCE = 'are there points between thousands? Write numbers without them'
 
 

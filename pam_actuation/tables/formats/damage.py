@@ -20,7 +20,7 @@ from typing import NamedTuple, TextIO, TYPE_CHECKING
 
 import numpy as np
 from pam_actuation.tables.formats.layout_of_text import COMMENTS, split, TextLayout
-from pam_actuation.tables.thousands import SENTENCE
+from pam_actuation.tables.thousands import POINTS, SENTENCE
 from pam_sim.annotations import BoolArray, IntArray
 from pam_sim.errors import InputError
 
@@ -63,7 +63,7 @@ class WatchedText:
         separator = '' if layout.separator == r'\s+' else re.escape(layout.separator)
         self._between = re.compile(rf'[{separator}\s"]')
         self._marked = re.compile(
-            rf'(?<![^{separator}\s"])[+-]?\d{{1,3}}(\.\d{{3}})+(?![^{separator}\s"])')
+            rf'(?<![^{separator}\s"]){POINTS}(?![^{separator}\s"])')
 
     def read(self, size: int = -1) -> str:
         """Return the next characters; InputError where there are zero bytes."""
