@@ -280,10 +280,7 @@ def _dates(table: Table, name: str) -> Times:
         raise InputError(
             f'column "{name}" holds {str(values.iloc[found])!r}, which is no date and time as in '
             '2026-11-25T09:30:00.125', table.place(found))
-    _refuse_slow(table, f'column "{name}", {found.told},', found.stamp_ns)
-    stamps = found.stamp_ns + (START_NS if found.is_of_day else 0)
-    return Times(stamps, f'column "{name}", {found.told}', _resolution_ns(found.stamp_ns),
-                 found.remark)
+    return _times_of(table, f'column "{name}", {found.told}', found)
 
 
 def _paired(table: Table, date: str, time: str) -> Times:
@@ -293,20 +290,20 @@ def _paired(table: Table, date: str, time: str) -> Times:
         texts = ' '.join(str(table.columns[name].iloc[found]) for name in (date, time))
         raise InputError(f'columns "{date}" and "{time}" hold {texts!r}, which is no date and '
                          'time as in 2026-11-25 09:30:00.125', table.place(found))
-    _refuse_slow(table, f'columns "{date}" and "{time}", {found.told},', found.stamp_ns)
-    return Times(found.stamp_ns + (START_NS if found.is_of_day else 0),
-                 f'columns "{date}" and "{time}", {found.told}',
-                 _resolution_ns(found.stamp_ns), found.remark)
+    return _times_of(table, f'columns "{date}" and "{time}", {found.told}', found)
 
 
-def _refuse_slow(table: Table, said: str, stamp_ns: IntArray) -> None:
-    """Raise InputError for dates so far apart that they are of no recording."""
+def _times_of(table: Table, told: str, found: Dates) -> Times:
+    """Return dates as times; InputError where they are so far apart as in no recording."""
+    stamp_ns = found.stamp_ns
     step_s = 1e-9 * float(np.median(np.diff(stamp_ns))) if len(stamp_ns) > 1 else 0.0
     if step_s * SLOWEST_HZ > 1.0:
         raise InputError(
-            f'{said} means a row every {step_s:.6g} s, allowed are rows every '
+            f'{told}, means a row every {step_s:.6g} s, allowed are rows every '
             f'{1.0 / SLOWEST_HZ:g} s and more often; is this the time? If not, add --map '
             'time="COLUMN:s", or --rate HZ for rows at equal distances', table.source)
+    return Times(stamp_ns + (START_NS if found.is_of_day else 0), told, _resolution_ns(stamp_ns),
+                 found.remark)
 
 
 def _unit_of_name(table: Table, name: str) -> str:
