@@ -18,15 +18,15 @@ What the live page costs a rig: ticks late or missed, processor, frames per seco
     python benchmarks/view_load.py --seconds 20 --rounds 3
 
 Plant at 1 kHz, controller at 500 Hz, all nodes and the recorder live, all in one run. Phases take
-turns, so that each has its share of what else the machine does. The phases are: no viewer, one
-page in a real browser, 20 pages, 20 pages beside one that never reads, and a viewer that is killed
-(SIGKILL) and started again. With ``--alone`` viewer and pages have a nice value of -15, as on a
-machine that has nothing else to do. They get no real-time priority: Linux stops all such processes
-of a core for 50 ms a second if they use it up. Behind a regulator the driver ticks with each
-command, more often than once in its own period, so none of its ticks counts as missed. Counted are
-its ticks that come more than 1.5 periods after the one before. Exit code 1 if, in a phase with the
-viewer, the share of late ticks of the driver or of missed ones of the controller is over 0.1 %
-beyond the worst round without.
+turns, so that each has its share of what else the machine does. Four phases are: no viewer, one
+page in a real browser, 20 pages, and 20 pages beside one that never reads. In the last one a
+viewer is killed (SIGKILL) and started again. With ``--alone`` viewer and pages have a nice value
+of -15, as on a machine that has nothing else to do. They get no real-time priority: Linux stops
+all such processes of a core for 50 ms a second if they use it up. Behind a regulator the driver
+ticks with each command, more often than once in its own period, so none of its ticks counts as
+missed. Counted are its ticks that come more than 1.5 periods after the one before. Late ticks of
+the driver and missed ones of the controller are judged. Exit code 1 if a share of theirs, in a
+phase with the viewer, is over 0.1 % beyond the worst round without.
 """
 
 import argparse
