@@ -40,7 +40,8 @@ from pam_sim.gap.fit.candidate import Setting
 from pam_sim.gap.fit.distance import distance_to_none
 from pam_sim.gap.fit.hypothesis import Fit, Hypothesis, Precision, within_reach
 from pam_sim.gap.fit.profile import profile_ends
-from pam_sim.gap.fit.solver import is_refused, ROUNDS, simulated_errors, Solver
+from pam_sim.gap.fit.solver import (
+    always, is_refused, IsWorth, ROUNDS, simulated_errors, Solver)
 from pam_sim.gap.subsystems.effects import shows
 from pam_sim.gap.subsystems.parallel import parallel_map
 from pam_sim.gap.subsystems.problem import SubsystemProblem
@@ -113,8 +114,8 @@ class Estimator:
         return self.rig.with_(effects=[*self.rig.effects, *effects])
 
     def fit(self, hypothesis: Hypothesis, theta: ArrayLike = (), near: Fit | None = None,
-            hold: bool = False, whole: bool = True, rounds: int = ROUNDS, steady: int = 0
-            ) -> Fit:
+            hold: bool = False, whole: bool = True, rounds: int = ROUNDS, steady: int = 0,
+            is_worth: IsWorth = always) -> Fit:
         """
         Fit a hypothesis.
 
@@ -134,6 +135,8 @@ class Estimator:
             At most so many times weights are set after the errors.
         steady : int
             How many of the first effects are as ``near`` has them, see ``Solver``.
+        is_worth : callable, optional
+            Ends the fit after a round with these errors where it returns False.
 
         Returns
         -------
@@ -154,7 +157,7 @@ class Estimator:
         # Numbers of the baseline are bent by what is missing; a better model starts unbent.
         x, errors = search.settle(search.join(theta[free], {
             s: np.where((near is self.base) & (np.abs(z) > FAR_START), 0.0, z)
-            for s, z in near.known_z.items()}), rounds)
+            for s, z in near.known_z.items()}), rounds, is_worth)
         theta[free], numbers = search.split(x)
         known_z, temper = dict(numbers), search.temper
         for problem in self.problems:
@@ -216,9 +219,8 @@ class Estimator:
 
         Its shapes are held: a size that is known only together with a shape is none the less
         there. The numbers that could stand in for it stay within their ranges: a latency is no
-        longer than the longest. An effect with shape parameters only has no value that means zero.
-        Its certainty is that of its best-known shape, relative to the value. A reservoir that
-        might be twice as large is not one that empties.
+        longer than the longest. An effect with shape parameters only, as a reservoir, has no value
+        that means zero. Its certainty is that of its best-known shape, relative to the value.
         """
         own = self._own()
         own._slopes_at(found)
@@ -266,8 +268,7 @@ class Estimator:
         """
         Return the covariance by likelihood, and that by blocks.
 
-        Of the fit's own parameters and the numbers of ``problems``; ``held`` are places that do
-        not move.
+        Of the fit's parameters and the numbers of ``problems``; places ``held`` do not move.
         """
         search = Solver(self, found.hypothesis, problems, dict(found.temper))
         x = search.join(found.theta, found.known_z)
@@ -283,8 +284,7 @@ class Estimator:
 
     def fit_base(self) -> Fit:
         """Return the baseline: known numbers fitted to the parts that are used now."""
-        known: dict[str, FloatArray] = {
-            c.subsystem: np.zeros(len(c.known)) for c in self.problems}
+        known: dict[str, FloatArray] = {c.subsystem: np.zeros(len(c.known)) for c in self.problems}
         temper: dict[str, FloatArray] = {
             c.subsystem: np.ones(len(c.signals)) for c in self.problems}
         for _ in range(BASE_PASSES):

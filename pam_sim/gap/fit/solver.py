@@ -19,7 +19,7 @@ Bounded, with a Gaussian prior on every known number and a wide one on every sha
 are lowered by misfit and memory until they agree with the errors.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -48,7 +48,15 @@ KEPT = 4                     # errors at the last points; the best one may be as
 REFUSED = 1e3                # error of a model that cannot be simulated, in floors
 
 
+# Whether a fit with these errors by subsystem is worth more rounds.
+IsWorth = Callable[[Mapping[str, FloatArray]], bool]
+
 _Moved = tuple[float, dict[str, FloatArray]]     # step of a parameter, change of the errors
+
+
+def always(errors: Mapping[str, FloatArray]) -> bool:
+    """Return that a fit is worth more rounds, whatever its errors."""
+    return True
 
 
 class SolverSettings(Protocol):
@@ -213,13 +221,17 @@ class Solver:
         return minimised(
             self.residuals, self.slopes, start, low, high, FTOL, XTOL, EVALUATIONS)
 
-    def settle(self, x: FloatArray, rounds: int = ROUNDS
+    def settle(self, x: FloatArray, rounds: int = ROUNDS, is_worth: IsWorth = always
                ) -> tuple[FloatArray, dict[str, FloatArray]]:
-        """Return (solution, errors by subsystem) once weights and errors agree."""
+        """
+        Return (solution, errors by subsystem) once weights and errors agree.
+
+        ``is_worth`` is given the errors after every round. It ends the rounds where it says no.
+        """
         for _ in range(rounds):
             x = self.run(x)
             errors = dict(self.errors(x))
-            if self.retemper(errors):
+            if self.retemper(errors) or not is_worth(errors):
                 break
         return x, errors
 

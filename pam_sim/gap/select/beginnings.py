@@ -22,12 +22,15 @@ rivals, as a beam search does.
 
 from collections.abc import Sequence
 
+from pam_sim.gap.fit.hypothesis import Fit
 from pam_sim.gap.select.backward import backward_elimination, is_missed, Selected
+from pam_sim.gap.select.candidates import split_refinements
 from pam_sim.gap.select.comparison import gap
 from pam_sim.gap.select.context import SearchContext
 from pam_sim.gap.select.forward import forward_selection
 from pam_sim.gap.select.refit import fit_without
 from pam_sim.gap.select.rival import NamedEffect, Rival
+from pam_sim.gap.select.screening import flat_spaces_of, spaces_of
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 
 BEGINNINGS = 2               # effort: so many other first effects of a subsystem
@@ -79,6 +82,9 @@ def _better(context: SearchContext, problem: SubsystemProblem, selected: Selecte
             without = fit_without(estimator, without, w.name)
     begun = fit_without(estimator, without, best.name, rival)
     estimator.take_slopes(begun.settings(), begun.known_z)
+    if _promise(context, begun, problem) < context.criteria.first_gain:
+        back()
+        return selected
     named = [*(w for w in selected.named if w.subsystem != s),
              NamedEffect(rival.name, s, best.rivals, (rival.name,), [rival])]
     current, added = forward_selection(context, begun, named)
@@ -91,3 +97,15 @@ def _better(context: SearchContext, problem: SubsystemProblem, selected: Selecte
             return found
     back()
     return selected
+
+
+def _promise(context: SearchContext, begun: Fit, problem: SubsystemProblem) -> float:
+    """Return the most that one effect or free number promises to explain of what is left."""
+    s, estimator = problem.subsystem, context.estimator
+    plain, _ = split_refinements([
+        c for c in context.pool if c.name not in begun.hypothesis.names])
+    found = [one.promise.get(s, 0.0) for screened in context.screened_at(begun, plain)
+             for one in (screened, screened.flat) if one]
+    for spaces in (spaces_of(estimator, begun), flat_spaces_of(estimator, begun)):
+        found += list(spaces[s].promise_of_numbers())
+    return max(found)

@@ -15,7 +15,7 @@
 """What a search stands on: fits, candidates, and which subsystem has a gap to explain."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from pam_sim.gap.criteria import Criteria
 from pam_sim.gap.data.split import FIT, SELECT
@@ -78,6 +78,7 @@ class SearchContext:
     out_of_time: Callable[[], bool]
     matters: Callable[[Fit, Fit], bool]
     left_out: tuple[str, ...] = ()
+    _last: list[tuple[Fit, tuple[Candidate, ...], list[Screened]]] = field(default_factory=list)
 
     @property
     def criteria(self) -> Criteria:
@@ -100,6 +101,14 @@ class SearchContext:
         if not current.hypothesis.touches(problem):
             return first > self.least_gap
         return left > max(self.seen_gap, self.criteria.done_share * first)
+
+    def screened_at(self, current: Fit, found: Sequence[Candidate]) -> Sequence[Screened]:
+        """Return candidates as screened at a fit; those of the last fit are kept."""
+        if current is self.base:
+            return self.screened
+        if not self._last or self._last[0][0] is not current or self._last[0][1] != tuple(found):
+            self._last[:] = [(current, tuple(found), screen(self.estimator, current, found))]
+        return self._last[0][2]
 
     def explained(self, current: Fit) -> dict[str, float]:
         """Return the share of the gap that a fit explains, by subsystem with a gap."""

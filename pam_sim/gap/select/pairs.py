@@ -35,6 +35,7 @@ from pam_sim.gap.select.candidates import same_as
 from pam_sim.gap.select.comparison import share
 from pam_sim.gap.select.context import SearchContext
 from pam_sim.gap.select.groups import last_of
+from pam_sim.gap.select.racing import may_explain_all
 from pam_sim.gap.select.rival import NamedEffect, Rival
 from pam_sim.gap.select.screening import AMPLITUDE_RANGE, flat_spaces_of, free_signature, Screened
 from pam_sim.gap.subsystems.effects import acts_on
@@ -157,9 +158,10 @@ def pair_of(context: SearchContext, problem: SubsystemProblem
     def fitted(pair: Pair) -> Rival | None:
         if context.out_of_time():
             return None
-        found = context.estimator.fit(Hypothesis(pair[0]), pair[1])
+        found = context.estimator.fit(Hypothesis(pair[0]), pair[1], is_worth=is_worth)
         return Rival(' + '.join(c.name for c in pair[0]), found, context.ranking.shares(found))
 
+    is_worth = may_explain_all(context, context.base)
     fits = parallel_map(fitted, promising_pairs(
         context.estimator, context.base, context.screened, problem))
     return _best_pair(context, fits, context.base, problem)
@@ -196,9 +198,11 @@ def pair_beside(context: SearchContext, current: Fit, problem: SubsystemProblem,
             else:
                 effects = (*effects, r.found.hypothesis.effects[-1])
                 theta += list(r.found.theta_of(len(r.found.hypothesis.effects) - 1))
-        found = context.estimator.fit(Hypothesis(effects, numbers), theta, current, whole=False)
+        found = context.estimator.fit(
+            Hypothesis(effects, numbers), theta, current, whole=False, is_worth=is_worth)
         return Rival(' + '.join(r.name for r in pair), found, context.ranking.shares(found))
 
+    is_worth = may_explain_all(context, current)
     s, base = problem.subsystem, context.base.errors[problem.subsystem]
     before = share(problem, base, current.errors[s])
     least = before + context.criteria.first_gain * (1.0 - before)
@@ -215,8 +219,9 @@ def pair_beside(context: SearchContext, current: Fit, problem: SubsystemProblem,
 def _best_pair(context: SearchContext, fits: Sequence[Rival | None], current: Fit,
                problem: SubsystemProblem) -> tuple[Fit, list[NamedEffect]] | None:
     """Return (fit, the two it adds) of the best pair, if it has one in common with its equals."""
+    is_worth = may_explain_all(context, current)
     found = [r for r in fits if r is not None]
-    if len(found) < len(fits):
+    if len(found) < len(fits) or not any(is_worth(r.found.errors) for r in found):
         return None
     rivals = [r for r in found if not any(
         Rival(name, r.found).at_edge for name in _added(r, current))]

@@ -20,13 +20,15 @@ from pam_sim.gap.criteria import Criteria
 from pam_sim.gap.data.split import SELECT
 from pam_sim.gap.fit.candidate import Candidate
 from pam_sim.gap.fit.hypothesis import Fit, Hypothesis
+from pam_sim.gap.fit.solver import IsWorth
 from pam_sim.gap.select.candidates import is_limit, split_refinements
 from pam_sim.gap.select.comparison import gap
 from pam_sim.gap.select.context import SearchContext
 from pam_sim.gap.select.order import numbers_of_rig
+from pam_sim.gap.select.racing import may_win
 from pam_sim.gap.select.ranking import least_gain
 from pam_sim.gap.select.rival import Rival
-from pam_sim.gap.select.screening import screen, Screened
+from pam_sim.gap.select.screening import Screened
 from pam_sim.gap.subsystems.effects import acts_on
 from pam_sim.gap.subsystems.parallel import parallel_map
 from pam_sim.gap.subsystems.problem import SubsystemProblem
@@ -61,8 +63,7 @@ def rivals_of(context: SearchContext, current: Fit, problems: Sequence[Subsystem
     criteria, names = context.criteria, set(current.hypothesis.names)
     pool = context.pool if pool is None else pool
     plain, refinements = split_refinements([c for c in pool if c.name not in names])
-    screened = list(context.screened) if current is context.base else screen(
-        context.estimator, current, plain)
+    screened = context.screened_at(current, plain)
     chosen = _promising(screened, problems, criteria)
     chosen += [s for s in containing(screened, names) if s not in chosen]
     rivals = _fits(context, current, chosen)
@@ -109,9 +110,10 @@ def numbers_before_sensors(context: SearchContext, current: Fit,
 def _with_free(context: SearchContext, current: Fit, names: Sequence[str]) -> list[Rival]:
     """Return a fit for every name of a number, with it free."""
     h = current.hypothesis
+    is_worth = may_win(context, current)
     return parallel_map(lambda name: _rival(context, context.estimator.fit(
-        Hypothesis(h.effects, (*h.numbers, name)), current.theta, current, whole=False), name),
-        names)
+        Hypothesis(h.effects, (*h.numbers, name)), current.theta, current, whole=False,
+        is_worth=is_worth), name), names)
 
 
 def other_starts(rivals: Sequence[Rival], contending: Iterable[Screened],
@@ -215,19 +217,20 @@ def _ranked(screened: Iterable[Screened], subsystem: str) -> list[Screened]:
 
 def _fits(context: SearchContext, current: Fit, screened: Iterable[Screened]) -> list[Rival]:
     """Return the rivals of screened candidates; the simulations hold no lock."""
-    return [r for r in parallel_map(lambda s: _fit(context, current, s), screened)
+    is_worth = may_win(context, current)
+    return [r for r in parallel_map(lambda s: _fit(context, current, s, is_worth), screened)
             if r is not None]
 
 
-def _fit(context: SearchContext, current: Fit, screened: Screened) -> Rival | None:
+def _fit(context: SearchContext, current: Fit, screened: Screened, is_worth: IsWorth
+         ) -> Rival | None:
     if context.out_of_time():
         return None
     hypothesis = Hypothesis((*current.hypothesis.effects, screened.candidate),
                             current.hypothesis.numbers)
     return _rival(context, context.estimator.fit(
         hypothesis, (*current.theta, *screened.start), current, whole=False,
-        steady=len(current.hypothesis.effects)),
-        screened.candidate.name)
+        steady=len(current.hypothesis.effects), is_worth=is_worth), screened.candidate.name)
 
 
 def _rival(context: SearchContext, found: Fit, name: str) -> Rival:

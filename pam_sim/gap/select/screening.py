@@ -34,6 +34,7 @@ from pam_sim.gap.subsystems.parallel import parallel_map
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 
 AMPLITUDE_RANGE = (0.05, 30.0)      # of the screening size, for the start of a fit
+_NEAR_NONE = 1e-9                    # numerics: room of a number on which the data say nothing
 _NEAR_END = 0.01                    # numerics: of a number to the end, in deviations
 
 # Parameters that were tried, and what they change by subsystem.
@@ -78,6 +79,15 @@ class ErrorSpace:
         tail = np.zeros(self.basis.shape[1]) if known_z is None else known_z
         y = np.concatenate([errors[self.mask] * self.weight, tail])
         return y - self.basis @ (self.basis.T @ y)
+
+    def promise_of_numbers(self) -> FloatArray:
+        """Return the share of ``left`` that each number of load or valve explains if free."""
+        first = self.weight.size
+        # Without its prior, a number has the error of that row for nothing.
+        room = 1.0 - np.sum(self.basis[first:] ** 2, axis=1)
+        gain = self.left[first:] ** 2 / np.maximum(room, _NEAR_NONE)
+        of_rig = np.array([k.of_rig for k in self.problem.known], bool)
+        return gain * of_rig / float(self.left @ self.left)
 
     def rms(self, change: FloatArray) -> float:
         """Return the rms of a weighted change in floors, of the signal where it is largest."""
