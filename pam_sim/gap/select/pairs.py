@@ -158,10 +158,9 @@ def pair_of(context: SearchContext, problem: SubsystemProblem
     def fitted(pair: Pair) -> Rival | None:
         if context.out_of_time():
             return None
-        found = context.estimator.fit(Hypothesis(pair[0]), pair[1], is_worth=is_worth)
+        found = context.estimator.fit(Hypothesis(pair[0]), pair[1], rounds=1)
         return Rival(' + '.join(c.name for c in pair[0]), found, context.ranking.shares(found))
 
-    is_worth = may_explain_all(context, context.base)
     fits = parallel_map(fitted, promising_pairs(
         context.estimator, context.base, context.screened, problem))
     return _best_pair(context, fits, context.base, problem)
@@ -199,10 +198,9 @@ def pair_beside(context: SearchContext, current: Fit, problem: SubsystemProblem,
                 effects = (*effects, r.found.hypothesis.effects[-1])
                 theta += list(r.found.theta_of(len(r.found.hypothesis.effects) - 1))
         found = context.estimator.fit(
-            Hypothesis(effects, numbers), theta, current, whole=False, is_worth=is_worth)
+            Hypothesis(effects, numbers), theta, current, whole=False, rounds=1)
         return Rival(' + '.join(r.name for r in pair), found, context.ranking.shares(found))
 
-    is_worth = may_explain_all(context, current)
     s, base = problem.subsystem, context.base.errors[problem.subsystem]
     before = share(problem, base, current.errors[s])
     least = before + context.criteria.first_gain * (1.0 - before)
