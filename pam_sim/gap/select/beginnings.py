@@ -82,24 +82,23 @@ def _better(context: SearchContext, problem: SubsystemProblem, selected: Selecte
             without = fit_without(estimator, without, w.name)
     begun = fit_without(estimator, without, best.name, rival)
     estimator.take_slopes(begun.settings(), begun.known_z)
-    if _promise(context, begun, problem) < context.criteria.first_gain:
-        back()
-        return selected
     named = [*(w for w in selected.named if w.subsystem != s),
              NamedEffect(rival.name, s, best.rivals, (rival.name,), [rival])]
-    current, added = forward_selection(context, begun, named)
-    # Elimination takes away: it closes nothing.
-    if not context.is_open(problem, current):
-        found = backward_elimination(context, current, added)
-        if (any(w.subsystem == s for w in found.named)
-                and not context.is_open(problem, found.fit)
-                and is_missed(context, problem, found.fit, selected.fit)):
-            return found
+    if promise_of_more(context, begun, problem) >= context.criteria.first_gain:
+        current, added = forward_selection(context, begun, named)
+        # Elimination takes away: it closes nothing.
+        if not context.is_open(problem, current):
+            found = backward_elimination(context, current, added)
+            if (any(w.subsystem == s for w in found.named)
+                    and not context.is_open(problem, found.fit)
+                    and is_missed(context, problem, found.fit, selected.fit)):
+                return found
     back()
     return selected
 
 
-def _promise(context: SearchContext, begun: Fit, problem: SubsystemProblem) -> float:
+def promise_of_more(context: SearchContext, begun: Fit, problem: SubsystemProblem
+                    ) -> float:
     """Return the most that one effect or free number promises to explain of what is left."""
     s, estimator = problem.subsystem, context.estimator
     plain, _ = split_refinements([
@@ -108,4 +107,4 @@ def _promise(context: SearchContext, begun: Fit, problem: SubsystemProblem) -> f
              for one in (screened, screened.flat) if one]
     for spaces in (spaces_of(estimator, begun), flat_spaces_of(estimator, begun)):
         found += list(spaces[s].promise_of_numbers())
-    return max(found)
+    return max(found, default=0.0)

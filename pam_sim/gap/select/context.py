@@ -78,7 +78,8 @@ class SearchContext:
     out_of_time: Callable[[], bool]
     matters: Callable[[Fit, Fit], bool]
     left_out: tuple[str, ...] = ()
-    _last: list[tuple[Fit, tuple[Candidate, ...], list[Screened]]] = field(default_factory=list)
+    _last: list[tuple[Fit, tuple[Candidate, ...], list[Screened]]] = field(
+        default_factory=list, repr=False, compare=False)
 
     @property
     def criteria(self) -> Criteria:
@@ -103,11 +104,13 @@ class SearchContext:
         return left > max(self.seen_gap, self.criteria.done_share * first)
 
     def screened_at(self, current: Fit, found: Sequence[Candidate]) -> Sequence[Screened]:
-        """Return candidates as screened at a fit; those of the last fit are kept."""
+        """Return candidates as screened at a fit; those of the last one are kept."""
         if current is self.base:
             return self.screened
-        if not self._last or self._last[0][0] is not current or self._last[0][1] != tuple(found):
-            self._last[:] = [(current, tuple(found), screen(self.estimator, current, found))]
+        for fit, candidates_there, screened in self._last:
+            if fit is current and candidates_there == tuple(found):
+                return screened
+        self._last[:] = [(current, tuple(found), screen(self.estimator, current, found))]
         return self._last[0][2]
 
     def explained(self, current: Fit) -> dict[str, float]:

@@ -110,10 +110,10 @@ def numbers_before_sensors(context: SearchContext, current: Fit,
 def _with_free(context: SearchContext, current: Fit, names: Sequence[str]) -> list[Rival]:
     """Return a fit for every name of a number, with it free."""
     h = current.hypothesis
-    is_worth = may_win(context, current)
+    # All rounds: the first one moves a number that is far off by a part of the way only.
     return parallel_map(lambda name: _rival(context, context.estimator.fit(
-        Hypothesis(h.effects, (*h.numbers, name)), current.theta, current, whole=False,
-        is_worth=is_worth), name), names)
+        Hypothesis(h.effects, (*h.numbers, name)), current.theta, current, whole=False), name),
+        names)
 
 
 def other_starts(rivals: Sequence[Rival], contending: Iterable[Screened],
