@@ -26,6 +26,7 @@ import zstandard
 
 _TEXT = struct.Struct('<I')
 _LENGTH = struct.Struct('<Q')
+_FOOTER = struct.Struct('<QQI')
 _MESSAGE_HEAD = struct.Struct('<HIQQ')
 # No recorder makes chunks near this size; a damaged length must not fill the memory.
 LARGEST_CHUNK_BYTES = 2**30
@@ -53,6 +54,7 @@ class Walk:
         self._data = data
         self._channels: set[int] = set()
         self._schemas = {0}
+        self._summary_taken = False
         self.bytes = 0
         self.inside = False
         self.finished = False
@@ -94,8 +96,19 @@ class Walk:
         if records is None or not self._known(records):
             self.bytes += len(content)
             self.inside = self.inside or not is_last
+            yield from self._defined_at_end()
             return
         yield Opcode.CHUNK, content, records
+
+    def _defined_at_end(self) -> Iterator[Found]:
+        """Yield, once, the definitions that the summary has and that are not known so far."""
+        if not self._summary_taken:
+            self._summary_taken = True
+            for opcode, content in summary_definitions(self._data):
+                known = self._schemas if opcode == Opcode.SCHEMA else self._channels
+                if _number_of(content) not in known and _fits(
+                        opcode, content, 0, self._channels, self._schemas):
+                    yield opcode, content, None
 
     def _known(self, records: bytes) -> bool:
         """Tell whether all records of a chunk fit together with what came before."""
@@ -132,11 +145,43 @@ def _fits(opcode: int, data: bytes, begin: int, channels: set[int], schemas: set
     if opcode == Opcode.MESSAGE:
         return _MESSAGE_HEAD.unpack_from(data, begin)[0] in channels
     if opcode == Opcode.SCHEMA:
-        schemas.add(int.from_bytes(data[begin:begin + 2], 'little'))
+        schemas.add(_number_of(data, begin))
     elif opcode == Opcode.CHANNEL:
-        channels.add(int.from_bytes(data[begin:begin + 2], 'little'))
-        return int.from_bytes(data[begin + 2:begin + 4], 'little') in schemas
+        channels.add(_number_of(data, begin))
+        return _number_of(data, begin + 2) in schemas
     return True
+
+
+def _number_of(data: bytes, begin: int = 0) -> int:
+    return int.from_bytes(data[begin:begin + 2], 'little')
+
+
+def summary_definitions(data: bytes | mmap.mmap) -> list[tuple[int, bytes]]:
+    """
+    Return (opcode, content) of the schemas, then of the channels, that the end of a file repeats.
+
+    Empty for a file whose end is missing, whose summary has none, or fails its checksum.
+    """
+    footer = len(data) - len(MAGIC) - _FOOTER.size - RECORD.size
+    if footer < len(MAGIC) or data[len(data) - len(MAGIC):] != MAGIC or (
+            RECORD.unpack_from(data, footer) != (Opcode.FOOTER, _FOOTER.size)):
+        return []
+    start, _, crc = _FOOTER.unpack_from(data, footer + RECORD.size)
+    if not len(MAGIC) <= start <= footer:
+        return []
+    # The checksum is of all but itself, the last number of the footer.
+    summary = data[start:footer + RECORD.size + _FOOTER.size - _TEXT.size]
+    if crc and zlib.crc32(summary) != crc:
+        return []
+    found, position, size = [], 0, footer - start
+    while position + RECORD.size <= size:
+        opcode, length = RECORD.unpack_from(summary, position)
+        begin, position = position + RECORD.size, position + RECORD.size + length
+        if position > size:
+            break
+        if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+            found.append((opcode, summary[begin:position]))
+    return sorted(found, key=lambda one: one[0])
 
 
 def unpack(content: bytes) -> bytes | None:

@@ -275,6 +275,9 @@ def _damage_sentence(content: McapContent, size: int) -> str:
                 else 'no message can be read: give another bag')
     if str(content.damage).startswith(('the file ends', 'the end mark')):
         return f'the recording ended early (no end mark after {size} bytes); {readable}'
+    if not content.message_count:
+        readable = ('no message before that can be read: `pam info --recover` keeps what follows, '
+                    'or give another bag')
     return f'the file is damaged ({content.damage}); {readable}'
 
 

@@ -139,6 +139,32 @@ def test_a_damaged_chunk_is_left_out_and_the_former_file_kept(tmp_path, whole):
         assert topic.payloads[-1] == original.topics[name].payloads[-1]
 
 
+def test_a_damaged_first_chunk_costs_what_is_in_it_alone(tmp_path, whole):
+    data, original = whole
+    bag = broken(tmp_path, data)
+    with open(bag / 'run_0.mcap', 'rb') as stream:
+        first, second = make_reader(stream).get_summary().chunk_indexes[:2]
+    spoiled = bytearray(data)
+    spoiled[first.chunk_start_offset + first.chunk_length // 2] ^= 0xff
+    bag = broken(tmp_path, spoiled)
+    with pytest.raises(InputError, match='no message before that .* `pam info --recover` keeps'):
+        read_bag(bag)
+    file, = recover_bag(bag).files
+    assert (bag / file.kept).read_bytes() == spoiled
+    found = read_bag(bag)
+    assert found.topics.keys() == original.topics.keys()
+    for name, topic in found.topics.items():
+        reference, count = original.topics[name], len(topic.payloads)
+        assert list(topic.payloads) == list(reference.payloads)[-count:]
+        behind = int((reference.log_time_ns >= second.message_start_time).sum())
+        assert 0 < behind <= count + 1
+    for counts in independent_readers(bag).values():
+        assert sum(counts.values()) == sum(found.counts.values())
+    # Without an end the definitions are lost with the chunk.
+    bag = broken(tmp_path, spoiled[:len(spoiled) * 3 // 4])
+    assert recover_bag(bag).messages == 0
+
+
 def test_an_unreadable_description_is_lost_not_forgotten(tmp_path, whole):
     data, original = whole
     name = b'pam_experiment'
