@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from pam_actuation.bags import layout
+from pam_actuation.bags.unpack import SUFFIX
 from pam_actuation.bags.writer import EXPERIMENT_RECORD
 from pam_sim.errors import InputError
 
@@ -62,9 +63,35 @@ def listed_files(path: Path, facts: Mapping[str, Any]) -> list[Path]:
     return files
 
 
+def data_files(path: Path, ending: str) -> list[Path]:
+    """
+    Return the files of one storage in a folder by number, also those that rosbag2 compressed.
+
+    Of a file that is there in both forms this is the plain one: a recorder that is killed while
+    it compresses leaves both.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+        The folder.
+    ending : str
+        Of the plain files, such as ``.mcap``.
+
+    """
+    plain = {file.name: file for file in path.glob(f'*{ending}') if file.is_file()}
+    packed = [file for file in path.glob(f'*{ending}{SUFFIX}')
+              if file.is_file() and file.name.removesuffix(SUFFIX) not in plain]
+    return sorted([*plain.values(), *packed], key=by_number)
+
+
+def plain_ending(path: Path) -> str:
+    """Return the ending of a data file, ``.mcap`` also of ``run_0.mcap.zstd``."""
+    return Path(path.name.removesuffix(SUFFIX)).suffix
+
+
 def by_number(path: Path) -> tuple[int, str]:
     """Return a sort key: run_2 before run_10."""
-    digits = path.stem.rsplit('_', 1)[-1]
+    digits = Path(path.name.removesuffix(SUFFIX)).stem.rsplit('_', 1)[-1]
     return (int(digits) if digits.isdigit() else -1, path.name)
 
 

@@ -36,9 +36,10 @@ from mcap.reader import make_reader
 from mcap.records import Metadata
 from pam_actuation.bags import disk, layout, mcap_salvage
 from pam_actuation.bags.data_file import LIBRARY
-from pam_actuation.bags.directory import by_number
+from pam_actuation.bags.directory import by_number, data_files
 from pam_actuation.bags.mcap_write import MAGIC, McapWriter
 from pam_actuation.bags.metadata import software_version
+from pam_actuation.bags.unpack import SUFFIX
 from pam_actuation.bags.writer import EXPERIMENT_RECORD, ROSBAG2_RECORD
 from pam_sim.errors import InputError
 from pam_sim.files import StrPath
@@ -111,8 +112,8 @@ def recover_bag(path: StrPath) -> Recovery:
     Raises
     ------
     InputError
-        Nothing there, no MCAP file, one that is still being recorded, or no right or space to
-        write the repaired file.
+        Nothing there, no MCAP file, one that is compressed or still being recorded, or no right or
+        space to write the repaired file.
 
     """
     path = Path(path)
@@ -123,11 +124,23 @@ def recover_bag(path: StrPath) -> Recovery:
     if not files:
         raise InputError('there is no .mcap file to repair here', path)
     try:
+        if path.is_dir():
+            _refuse_packed(path)
         return _recover(path, files)
     except OSError as error:
         raise InputError(
             f'the repaired bag cannot be written ({error.strerror or error}); the recording is '
             'as it was, copy it where there is space and the right to write', path) from None
+
+
+def _refuse_packed(path: Path) -> None:
+    """Raise InputError for a folder with files that only the reader can unpack."""
+    packed = [file.name for file in data_files(path, '.mcap') if file.suffix == SUFFIX]
+    if packed:
+        plain = packed[0].removesuffix(SUFFIX)
+        raise InputError(
+            f'{packed[0]} is compressed and cannot be repaired; unpack each such file first: '
+            f'`zstd -d {packed[0]} -o {plain}`', path)
 
 
 def _recover(path: Path, files: Sequence[Path]) -> Recovery:

@@ -29,7 +29,7 @@ import numpy as np
 from pam_actuation.bags import layout
 from pam_actuation.bags.database import scan_database
 from pam_actuation.bags.directory import (
-    announced_counts, by_number, custom_data, directory_facts, listed_files)
+    announced_counts, custom_data, data_files, directory_facts, listed_files, plain_ending)
 from pam_actuation.bags.mcap_scan import MAGIC, McapContent, scan
 from pam_actuation.bags.message_batch import MessageColumns
 from pam_actuation.bags.metadata import names_of, names_text, TOPIC_NAMES
@@ -151,8 +151,8 @@ def read_bag(path: StrPath, recover: bool = False, wanted: Wanted | None = None,
             path = path.parent
         if path.is_dir():
             return _read_directory(path, how)
-        if path.suffix in _STORAGES:
-            return _read_files(path, [path], _STORAGES[path.suffix], how)
+        if plain_ending(path) in _STORAGES:
+            return _read_files(path, [path], _STORAGES[plain_ending(path)], how)
     except PermissionError as error:
         raise InputError('no right to read this', error.filename or path) from None
     except OSError as error:
@@ -188,8 +188,8 @@ def _name_here(recorded: str, names: Mapping[str, str]) -> str:
 def _read_directory(path: Path, how: _How) -> Bag:
     facts = directory_facts(path)
     if facts is None:
-        for suffix, storage in _STORAGES.items():
-            files = sorted(filter(Path.is_file, path.glob(f'*{suffix}')), key=by_number)
+        for ending, storage in _STORAGES.items():
+            files = data_files(path, ending)
             if files:
                 return _read_files(path, files, storage, how)
         raise InputError(

@@ -31,6 +31,7 @@ from typing import NamedTuple
 from pam_actuation.bags.load_joint import joints_of
 from pam_actuation.bags.rig_topics import namespaces
 from pam_actuation.bags.source import Bag, read_bag
+from pam_actuation.bags.unpack import SUFFIX
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.files import StrPath
 from pam_sim.joint.parameters import SIDES
@@ -192,14 +193,18 @@ def _bags_below(folder: Path, without: StrPath | None) -> Iterator[Path]:
 
 def _bag_files(names: Sequence[str]) -> list[str]:
     """Return those of the names of files that are recordings by their ending."""
-    return sorted(name for name in names
-                  if name.endswith(BAG_FILES) and not name.startswith('.'))
+    found = {name for name in names
+             if name.removesuffix(SUFFIX).endswith(BAG_FILES) and not name.startswith('.')}
+    # Of a file that is there in both forms the plain one is read.
+    return sorted(name for name in found
+                  if not name.endswith(SUFFIX) or name.removesuffix(SUFFIX) not in found)
 
 
 def _is_split(name: str, files: Sequence[str]) -> bool:
     """Tell whether these are NAME_0, NAME_1, ... as in a bag whose metadata.yaml is missing."""
+    plain = {file.removesuffix(SUFFIX) for file in files}
     return bool(files) and any(
-        {f'{name}_{number}{ending}' for number in range(len(files))} == set(files)
+        {f'{name}_{number}{ending}' for number in range(len(files))} == plain
         for ending in BAG_FILES)
 
 

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from pam_sim.rig import Rig
 
 SAVED_NAME = 'rules.json'
-_BAG_ENDINGS = ('.mcap', '.db3')
+_BAG_ENDINGS = ('.mcap', '.db3', '.mcap.zstd', '.db3.zstd')
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ def find_rules(name: Path | str, rig: 'Callable[[], Rig | JointRig] | None' = No
     path = Path(name).expanduser()
     if path.suffix == '.json':
         return FoundRules(path.name, 'rule file', load_rules(path))
-    if path.is_dir() or path.suffix in _BAG_ENDINGS or path.name == 'metadata.yaml':
+    if path.is_dir() or path.name.endswith(_BAG_ENDINGS) or path.name == 'metadata.yaml':
         return _of_recording(path, namespace, recover, progress, topics)
     controller = load_controller(
         name, None if rig is None else rig(), accept_other_rig=True)     # it is read, not run

@@ -14,18 +14,24 @@
 
 """Bags of other storages that are not as their metadata says, or have none."""
 
+from pathlib import Path
 import shutil
 import sqlite3
 
 from pam_actuation.bags import layout
+from pam_actuation.bags.directory import by_number
 from pam_actuation.bags.info import bag_info, render_text
 from pam_actuation.bags.load import load_run
+from pam_actuation.bags.recover import recover_bag
+from pam_actuation.bags.source import read_bag
+from pam_actuation.bags.writer import BagWriter
 from pam_actuation.cli.main import main
+from pam_actuation.topics.codec import encode
 from pam_actuation.topics.table import RECORDED
 from pam_sim.errors import InputError
 import pytest
 from rosbags.rosbag2 import CompressionMode, StoragePlugin
-from sample_bag import METADATA, START_NS, STEP_NS, write_bag
+from sample_bag import example_messages, METADATA, START_NS, STEP_NS, write_bag
 from sample_foreign import write_with_rosbags
 import zstandard
 
@@ -130,3 +136,54 @@ def test_a_lone_file_of_compressed_messages_is_read(tmp_path, plugin):
     run = load_run(next(file for file in bag.iterdir() if file.name != layout.METADATA_FILE))
     assert len(run['pressure']) == len(run['contraction']) == COUNT and run.remarks == ()
     assert len(run.reference_trajectories) == COUNT
+
+
+@pytest.fixture
+def killed(tmp_path):
+    """Return a folder as a killed `ros2 bag record --compression-mode file` leaves it."""
+    bag, name = tmp_path / 'run', '/muscle/pressure'
+    with BagWriter(bag, METADATA, max_file_s=0.25) as writer:
+        writer.add_topic(name, 'sensor_msgs/msg/FluidPressure')
+        raw = encode('pressure', example_messages()['pressure'])
+        for time_ns in range(START_NS, START_NS + 120 * STEP_NS, STEP_NS):
+            writer.write(name, raw, time_ns, time_ns)
+    (bag / layout.METADATA_FILE).unlink()
+    first, second, _ = sorted(bag.glob('*.mcap'))
+    for file in (first, second):
+        packed = zstandard.compress(file.read_bytes())
+        # It was being compressed: the plain one is still there.
+        file.with_name(f'{file.name}.zstd').write_bytes(
+            packed[:len(packed) // 2] if file is second else packed)
+    first.unlink()
+    return bag
+
+
+def test_compressed_files_without_metadata_belong_to_the_recording(killed):
+    bag = read_bag(killed)
+    assert bag.counts == {'/muscle/pressure': 120} and not bag.remarks
+    assert list(bag.topics['/muscle/pressure'].log_time_ns) == [
+        START_NS + i * STEP_NS for i in range(120)]
+    lone = killed / 'run_0.mcap.zstd'
+    assert read_bag(lone).counts == {'/muscle/pressure': 50}
+    for file in killed.glob('*.mcap'):
+        file.unlink()
+    (killed / 'run_1.mcap.zstd').unlink()
+    assert read_bag(killed).counts == {'/muscle/pressure': 50}
+
+
+def test_files_are_in_order_of_their_numbers_however_they_are_compressed():
+    names = ['run_2.mcap.zstd', 'run_9.mcap', 'run_10.mcap.zstd', 'run_11.mcap']
+    assert [file.name for file in sorted(map(Path, sorted(names)), key=by_number)] == names
+
+
+def test_a_folder_with_compressed_files_is_repaired_once_they_are_unpacked(killed, capsys):
+    before = sorted(killed.iterdir())
+    with pytest.raises(InputError, match='`zstd -d run_0.mcap.zstd -o run_0.mcap`'):
+        recover_bag(killed)
+    assert main(['info', str(killed), '--recover']) == 2
+    assert 'unpack each such file first' in capsys.readouterr().err
+    assert sorted(killed.iterdir()) == before
+    packed = killed / 'run_0.mcap.zstd'
+    packed.with_suffix('').write_bytes(zstandard.decompress(packed.read_bytes()))
+    assert recover_bag(killed).messages == 120
+    assert read_bag(killed).counts == {'/muscle/pressure': 120}

@@ -26,6 +26,7 @@ from pam_actuation.topics.table import BY_NAME
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 import pytest
+import zstandard
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'bags'))
 from sample_bag import plain_numbers, START_NS, write_bag  # noqa: E402, I100
@@ -163,6 +164,12 @@ def test_a_split_recording_is_one_case(tmp_path):
     (split / 'run' / 'metadata.yaml').unlink()
     assert find_cases(tmp_path / 'lab') == [above]
     assert [case.path for case in find_cases(split / 'run')] == [above.path]
+    # rosbag2 compresses what is finished.
+    packed = split / 'run' / f'{files[1].name}.zstd'
+    packed.write_bytes(zstandard.compress(files[1].read_bytes()))
+    assert find_cases(tmp_path / 'lab') == [above]
+    files[1].unlink()
+    assert find_cases(tmp_path / 'lab') == [above]
     # Files that are not numbered from 0 on by the name of their folder are recordings each.
     files[0].rename(split / 'run' / 'other.mcap')
     assert len(find_cases(tmp_path / 'lab')) == len(files)
