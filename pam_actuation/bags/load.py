@@ -219,7 +219,7 @@ def read_series(short: str, topic: TopicData, odd: Oddities) -> Series:
     if bad.any():
         odd.leave_out(
             f'{topic.name}: {int(bad.sum())} messages are not {topic.type_name}, left out.')
-    stamp_ns, keep = _checked_stamps(row, stamp_ns, keep, topic, odd)
+    stamp_ns, keep = checked_stamps(row, stamp_ns, keep, topic, odd)
     if short in _STAMPED_AT_ONCE:
         keep[keep] = odd.without_stray(topic.name, stamp_ns[keep], topic.log_time_ns[keep])
     if row.missing == KEPT:
@@ -243,12 +243,31 @@ def read_series(short: str, topic: TopicData, odd: Oddities) -> Series:
     return Series(stamp_ns, values, {name: unit_of(name) for name in values}, held=row.held)
 
 
-def _checked_stamps(row: Topic, stamp_ns: IntArray, keep: BoolArray, topic: TopicData,
-                    odd: Oddities) -> tuple[IntArray, BoolArray]:
+def checked_stamps(row: Topic, stamp_ns: IntArray, keep: BoolArray, topic: TopicData,
+                   odd: Oddities) -> tuple[IntArray, BoolArray]:
     """
     Treat messages that nobody stamped: all of them by receive time, single ones left out.
 
     Where a stamp may be zero, such messages count by receive time.
+
+    Parameters
+    ----------
+    row : Topic
+        What the topic is.
+    stamp_ns : ndarray of int64, shape (N,)
+        Header stamps of its messages, in the order of recording.
+    keep : ndarray of bool, shape (N,)
+        Which of them could be read.
+    topic : TopicData
+        The messages.
+    odd : Oddities
+        Takes sentences on what is odd.
+
+    Returns
+    -------
+    stamp_ns : ndarray of int64, shape (N,)
+    keep : ndarray of bool, shape (N,)
+
     """
     unset = keep & (stamp_ns == 0)
     if not row.stamped:
@@ -257,7 +276,8 @@ def _checked_stamps(row: Topic, stamp_ns: IntArray, keep: BoolArray, topic: Topi
         odd.remarks.append(f'{topic.name}: no message has a header stamp, so receive times are '
                            'used, which are later.')
         return topic.log_time_ns, keep
-    if unset.any() and int(np.median(stamp_ns[keep])) > _WALL_CLOCK_NS:
+    others_ns = stamp_ns[keep & ~unset]
+    if unset.any() and others_ns.size and int(np.median(others_ns)) > _WALL_CLOCK_NS:
         odd.leave_out(
             f'{topic.name}: {int(unset.sum())} messages without a header stamp, left out.')
         keep = keep & ~unset

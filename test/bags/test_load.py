@@ -224,11 +224,17 @@ def test_messages_without_stamps(tmp_path):
             return messages.Pressure(0, message.pressure_pa)
         if short == 'force' and i == 3:
             return messages.Force(0, 1.0)
+        if short == 'contraction' and i % 3 != 1:
+            return messages.Contraction(0, message.contraction_m)
         return message
 
     run = load_run(write_bag(tmp_path / 'run', 6, change=unstamped))
     assert run.topics['pressure'].stamp_ns[0] == START_NS + 400_000
     assert len(run.topics['force']) == 5
+    # They are left out also where they are most of the messages.
+    assert list(run.topics['contraction'].stamp_ns) == [START_NS + i * STEP_NS for i in (1, 4)]
+    assert any('contraction: 4 messages without a header stamp' in one for one in run.left_out)
+    assert run.start_ns == START_NS and not any('goes back' in one for one in run.remarks)
     assert any('receive times' in remark for remark in run.remarks)
     assert any('1 messages without a header stamp' in remark for remark in run.remarks)
 
