@@ -214,18 +214,17 @@ def _topic_infos(bag: Bag, remarks: list[str]) -> list[TopicInfo]:
     infos: list[TopicInfo] = []
     heard: dict[str, dict[str, IntArray]] = {}
     for _, topic in sorted(bag.topics.items()):
-        info, stamp_ns, values = topic_info(topic, remarks)
+        info, stamp_ns, received_ns, values = topic_info(topic, remarks)
         add_counts(info, topic, recording, published, places)
         if not recording and not simulated:
             count_from_first_report(info, topic, published)
         remarks += loss_remarks(info)
-        remarks += plausibility.topic_remarks(topic, info, stamp_ns, values, size_of)
+        remarks += plausibility.topic_remarks(info, stamp_ns, received_ns, values, size_of)
         infos.append(info)
-        if values and len(stamp_ns) == len(topic.log_time_ns):
+        if values:
             place = topic.name.rpartition('/')[0]
             rig = place.removesuffix(f'/{side_of(place, places)}'.rstrip('/'))
-            heard.setdefault(rig, {})[topic.name] = heard_ns(
-                topic.log_time_ns, values)
+            heard.setdefault(rig, {})[topic.name] = heard_ns(received_ns, values)
     remarks += [text for one in heard.values() for text in silent_remarks(one)]
     return infos
 

@@ -29,7 +29,6 @@ from pam_sim.muscle.geometry import MOST_STRAIN
 from pam_sim.units import allowed_range, gauge_kpa, P_ATM_PA
 
 if TYPE_CHECKING:
-    from pam_actuation.bags.source import TopicData
     from pam_actuation.bags.topic_info import TopicInfo
     from pam_sim.rig import Rig
 
@@ -145,19 +144,17 @@ def recorded_size(metadata: Mapping[str, str]) -> Size:
     return Size(float(metadata.get('length_m') or MOST_M / MOST_STRAIN), MOST_STRAIN, 'length')
 
 
-def topic_remarks(topic: 'TopicData', info: 'TopicInfo', stamp_ns: IntArray,
+def topic_remarks(info: 'TopicInfo', stamp_ns: IntArray, received_ns: IntArray,
                   values: Mapping[str, FloatArray], size_of: SizeOf | None = None) -> list[str]:
     """
     Return sentences on one topic.
 
     Parameters
     ----------
-    topic : TopicData
-        Its messages and times.
     info : TopicInfo
         Its rate, gaps and stamp counts.
-    stamp_ns : ndarray of int64
-        Header stamps by log time.
+    stamp_ns, received_ns : ndarray of int64, shape (N,)
+        Header stamps and receive times of its messages, by receive time.
     values : dict of str to ndarray
         SI values; empty for topics that are not a rig's.
     size_of : callable, optional
@@ -166,10 +163,10 @@ def topic_remarks(topic: 'TopicData', info: 'TopicInfo', stamp_ns: IntArray,
     """
     if not values and info.type_name not in _WITHOUT_VALUES:
         return []
-    remarks = _time_remarks(topic, info, stamp_ns) + repeat_remarks(
-        topic.name, values, info.rate_hz)
+    remarks = _time_remarks(info, stamp_ns, received_ns) + repeat_remarks(
+        info.name, values, info.rate_hz)
     return remarks + [
-        one.sentence for one in topic_findings(topic.name, stamp_ns, values, size_of)]
+        one.sentence for one in topic_findings(info.name, stamp_ns, values, size_of)]
 
 
 def topic_findings(topic: str, stamp_ns: IntArray, values: Mapping[str, FloatArray],
@@ -241,9 +238,9 @@ def _topics_of_muscle(namespace: str, namespaces: Collection[str]) -> list[Topic
         row.name != 'contraction' and f'{side}{row.name}' in RECORDED_OF_JOINT)]
 
 
-def _time_remarks(topic: 'TopicData', info: 'TopicInfo', stamp_ns: IntArray) -> list[str]:
+def _time_remarks(info: 'TopicInfo', stamp_ns: IntArray, received_ns: IntArray) -> list[str]:
     remarks = []
-    name, row = topic.name, BY_NAME.get(short_name(topic.name))
+    name, row = info.name, BY_NAME.get(short_name(info.name))
     steady = row is not None and row.steady
     if info.stamps_backward:
         remarks.append(f'{name}: the header stamp goes back {info.stamps_backward} times.')
@@ -259,8 +256,8 @@ def _time_remarks(topic: 'TopicData', info: 'TopicInfo', stamp_ns: IntArray) -> 
         remarks.append(
             f'{name}: {info.gaps} gaps, the longest {1e3 * info.max_gap_s:.0f} ms at '
             f'{info.rate_hz:.0f} Hz.')
-    if len(stamp_ns) == len(topic.log_time_ns) and len(stamp_ns):
-        remarks += _clock_remarks(name, topic.log_time_ns - stamp_ns)
+    if len(stamp_ns):
+        remarks += _clock_remarks(name, received_ns - stamp_ns)
     return remarks
 
 

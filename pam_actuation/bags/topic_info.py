@@ -18,7 +18,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from pam_actuation.bags import series
+from pam_actuation.bags.load import checked_stamps
 from pam_actuation.bags.load_joint import is_joint_topic
+from pam_actuation.bags.oddities import Oddities
 from pam_actuation.bags.source import TopicData
 from pam_actuation.topics.cdr import CdrError
 from pam_actuation.topics.definitions import typestore
@@ -61,11 +63,15 @@ class TopicInfo:
     ranges: dict[str, tuple[float, float]] = field(default_factory=dict)
 
 
-def topic_info(topic: TopicData,
-               remarks: list[str]) -> tuple[TopicInfo, IntArray, dict[str, FloatArray]]:
-    """Return (TopicInfo without losses, stamps, values); what is odd goes to ``remarks``."""
+def topic_info(topic: TopicData, remarks: list[str]) -> tuple[
+        TopicInfo, IntArray, IntArray, dict[str, FloatArray]]:
+    """
+    Return (TopicInfo without losses, stamps, receive times, values) of what can be used.
+
+    What is odd goes to ``remarks``.
+    """
     info = TopicInfo(topic.name, topic.type_name, len(topic.payloads))
-    stamp_ns, values = _stamps_and_values(topic, remarks)
+    stamp_ns, received_ns, values = _stamps_and_values(topic, remarks)
     if len(stamp_ns) > 1:
         steps = np.diff(stamp_ns)
         info.stamps_backward = int((steps < 0).sum())
@@ -83,26 +89,32 @@ def topic_info(topic: TopicData,
         finite = column[np.isfinite(column)]
         if len(finite) and not BY_NAME[short_name(topic.name)].internals:
             info.ranges[name] = (float(finite.min()), float(finite.max()))
-    return info, stamp_ns, values
+    return info, stamp_ns, received_ns, values
 
 
-def _stamps_and_values(topic: TopicData,
-                       remarks: list[str]) -> tuple[IntArray, dict[str, FloatArray]]:
-    """Return header stamps by log time (receive times if these tell more) and values."""
+def _stamps_and_values(topic: TopicData, remarks: list[str]) -> tuple[
+        IntArray, IntArray, dict[str, FloatArray]]:
+    """Return header stamps by log time (receive times if these tell more), receipt, values."""
     short = short_name(topic.name)
     row = BY_NAME.get(short)
     if row is not None and row.numeric is not None and is_joint_topic(topic):
         stamp_ns, values, bad = series.table(short, topic.payloads)
         if bad.any():
             remarks.append(f'{topic.name}: {int(bad.sum())} messages cannot be decoded.')
-        times_ns = stamp_ns if row.stamped else topic.log_time_ns
-        return times_ns[~bad], {name: column[~bad] for name, column in values.items()}
+        keep = ~bad
+        if row.stamped:
+            stamp_ns, keep = checked_stamps(row, stamp_ns, keep, topic, Oddities(remarks))
+        else:
+            stamp_ns = topic.log_time_ns
+        return stamp_ns[keep], topic.log_time_ns[keep], {
+            name: column[keep] for name, column in values.items()}
     if _has_header(topic) and (row is None or row.stamped or not is_joint_topic(topic)):
         try:
-            return series.stamps(topic.payloads), {}
+            stamp_ns = series.stamps(topic.payloads)
+            return stamp_ns if stamp_ns.any() else topic.log_time_ns, topic.log_time_ns, {}
         except CdrError:
             remarks.append(f'{topic.name}: some messages cannot be decoded.')
-    return topic.log_time_ns, {}
+    return topic.log_time_ns, topic.log_time_ns, {}
 
 
 def _has_header(topic: TopicData) -> bool:

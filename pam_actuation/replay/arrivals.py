@@ -173,6 +173,9 @@ def _check_clocks(stamp_ns: IntArray, received_ns: IntArray, topic: TopicData,
         return
     late_ns = np.median(received_ns - stamp_ns)
     if abs(late_ns) > CLOCKS_AGREE_NS:
+        unset, count = int((stamp_ns == 0).sum()), len(stamp_ns)
+        problem = (f'{unset} of {count} messages have no header stamp' if 2 * unset > count else
+                   f'header stamps and receive times are {1e-9 * abs(late_ns):.1f} s apart')
         raise InputError(
-            f'{topic.name}: header stamps and receive times are {1e-9 * abs(late_ns):.1f} s '
-            'apart; what had arrived when a node acted cannot be told', str(path))
+            f'{topic.name}: {problem}; what had arrived when a node acted cannot be told',
+            str(path))

@@ -20,6 +20,7 @@ import json
 from mcap.writer import Writer
 import numpy as np
 from pam_actuation import messages
+from pam_actuation.bags.info import bag_info
 from pam_actuation.bags.load import load_run
 from pam_actuation.bags.oddities import recording_remarks, stray
 from pam_actuation.bags.source import read_bag
@@ -242,6 +243,23 @@ def test_messages_that_came_late_are_not_stray():
     with_hole_ns = stamp_ns + 60_000_000_000 * (np.arange(1000) > 0)
     assert not stray(with_hole_ns, np.zeros(1000, dtype=np.int64)).any()
     assert not stray(with_hole_ns, with_hole_ns + 300_000).any()
+
+
+def test_unstamped_messages_are_told_as_such_and_not_as_another_clock(tmp_path):
+    def change(short, i, message):
+        if short == 'pressure':
+            return messages.Pressure(0, message.pressure_pa)
+        if short == 'contraction' and i % 3:
+            return messages.Contraction(0, message.contraction_m)
+        return message
+
+    info = bag_info(write_bag(tmp_path / 'run', 400, change=change))
+    told, = [one for one in info.remarks if '/muscle/pressure' in one]
+    assert 'no message has a header stamp, so receive times are used' in told
+    assert info.topic('/muscle/pressure').rate_hz == pytest.approx(200.0)
+    text = ' '.join(info.remarks)
+    assert '/muscle/contraction: 266 messages without a header stamp, left out' in text
+    assert not any(word in text for word in ('clocks', 'goes back', 'repeat'))
 
 
 def test_a_stray_stamp_does_not_make_gap_refuse(bags, tmp_path, capsys):

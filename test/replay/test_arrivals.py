@@ -163,6 +163,13 @@ def test_a_stamp_that_tells_no_time_of_sending_is_no_other_clock(tmp_path, stamp
     assert [one.stamp_ns for one in topics['joint_trajectory']] == [stamp_ns] * 2
 
 
+def test_a_recording_without_stamps_is_refused_for_that(tmp_path):
+    sample = [('pressure', WALL_NS + i * 5_000_000, messages.Pressure(0, 1e5)) for i in range(5)]
+    run = write(tmp_path / 'run', sample)
+    with pytest.raises(InputError, match='pressure: 5 of 5 messages have no header stamp'):
+        recorded_topics(run, ORDER)
+
+
 def test_only_the_named_values_are_read():
     raws = [codec.encode('controller_state', messages.ControllerState(
         i, ('tick', 'learning'), (float(i), 1.0))) for i in range(20)]
