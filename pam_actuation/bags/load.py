@@ -26,6 +26,7 @@ from functools import cache, cached_property
 import numpy as np
 
 from pam_actuation.bags import renamed, series
+from pam_actuation.bags.entries import entry_remarks
 from pam_actuation.bags.markers import is_marker, markers_of
 from pam_actuation.bags.oddities import heard_ns, Oddities
 from pam_actuation.bags.plausibility import (
@@ -219,6 +220,7 @@ def read_series(short: str, topic: TopicData, odd: Oddities) -> Series:
     if bad.any():
         odd.leave_out(
             f'{topic.name}: {int(bad.sum())} messages are not {topic.type_name}, left out.')
+    odd.remarks += entry_remarks(short, topic)
     stamp_ns, keep = checked_stamps(row, stamp_ns, keep, topic, odd)
     if short in _STAMPED_AT_ONCE:
         keep[keep] = odd.without_stray(topic.name, stamp_ns[keep], topic.log_time_ns[keep])

@@ -20,7 +20,7 @@ The layout is worked out once and all messages that have the same bytes in the
 deciding places are read together as columns of one array.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -78,6 +78,38 @@ def table(
             _read_alike(
                 content, indices[i:i + 1], rows[i:i + 1], stamp_ns, values, bad, only)
     return stamp_ns, values, bad
+
+
+def layouts(short: str, messages: Messages) -> Iterator[bytes]:
+    """
+    Yield a message of each layout, in little-endian CDR.
+
+    They are looked for as in ``table``, up to eight among messages of equal length.
+
+    Parameters
+    ----------
+    short : str
+        Short name of a topic that carries numbers.
+    messages : Payloads or list of bytes
+        CDR bytes.
+
+    """
+    content = topic_of(short).numeric
+    assert content is not None
+    for _, rows in _payloads(messages).tables():
+        for _ in range(_MAX_LAYOUTS):
+            if not len(rows):
+                break
+            first = rows[0].tobytes()
+            try:
+                raw = little_endian(first, content.type_name)
+                fixed = content.layout(raw).fixed
+            except UNREADABLE:
+                rows = rows[1:]
+                continue
+            yield raw
+            # Re-encoded from big-endian: its bytes compare with no other's.
+            rows = rows[~_alike(rows, fixed)] if raw is first else rows[1:]
 
 
 def stamps(messages: Messages) -> IntArray:

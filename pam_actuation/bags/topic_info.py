@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from pam_actuation.bags import series
+from pam_actuation.bags.entries import entry_remarks
 from pam_actuation.bags.load import checked_stamps
 from pam_actuation.bags.load_joint import is_joint_topic
 from pam_actuation.bags.oddities import Oddities
@@ -101,6 +102,7 @@ def _stamps_and_values(topic: TopicData, remarks: list[str]) -> tuple[
         stamp_ns, values, bad = series.table(short, topic.payloads)
         if bad.any():
             remarks.append(f'{topic.name}: {int(bad.sum())} messages cannot be decoded.')
+        remarks += entry_remarks(short, topic)
         keep = ~bad
         if row.stamped:
             stamp_ns, keep = checked_stamps(row, stamp_ns, keep, topic, Oddities(remarks))

@@ -26,6 +26,7 @@ from pam_actuation.bags.oddities import recording_remarks, stray
 from pam_actuation.bags.source import read_bag
 from pam_actuation.bags.writer import BagWriter, EXPERIMENT_RECORD
 from pam_actuation.cli.main import main
+from pam_actuation.topics import cdr
 from pam_actuation.topics.codec import decode, encode
 from pam_sim.errors import InputError
 import pytest
@@ -267,3 +268,32 @@ def test_a_stray_stamp_does_not_make_gap_refuse(bags, tmp_path, capsys):
     assert main(asked('gap', bag, tmp_path)) == 1
     found = json.loads((tmp_path / 'gap' / 'gap.json').read_text())
     assert found['verdict'] == 'no_gap' and '400000000.0 s ahead' in found['remarks'][-1]
+
+
+def bag_of_joint_states(directory, named):
+    """Write a bag with a pressure and JointStates with these names in turn; return its folder."""
+    with BagWriter(directory, {}) as writer:
+        writer.add_topic(PRESSURE, 'sensor_msgs/msg/FluidPressure')
+        writer.add_topic('/joint_states', 'sensor_msgs/msg/JointState')
+        for i in range(60):
+            stamp_ns, names = START_NS + i * 5_000_000, named[i % len(named)]
+            numbers = [0.01 * (k + 1) for k in range(max(len(names), 1))]
+            packer, (one, two, three) = cdr.joint_packer('', names, (len(numbers), 0, 0))
+            joints = packer.pack(
+                cdr.ENCAPSULATION, *cdr.split_stamp(stamp_ns), one, *numbers, two, three)
+            pressure = encode('pressure', messages.Pressure(stamp_ns, 2e5 + i))
+            for name, data in ((PRESSURE, pressure), ('/joint_states', joints)):
+                writer.write(name, data, stamp_ns, stamp_ns)
+    return directory
+
+
+@pytest.mark.parametrize('named, words', [
+    ([('hip', 'slider')], ["messages have 2 entries ('hip', 'slider'), and the first one is"]),
+    ([('hip',), ('slider',)], ["the first entry is 'hip', 'slider' in turn, and all are read as"]),
+    ([('slider',), ()], [])])
+def test_entries_that_are_not_read_are_told(tmp_path, named, words):
+    bag, topics = bag_of_joint_states(tmp_path / 'bag', named), {'contraction': '/joint_states'}
+    for remarks in (load_run(bag, topics=topics).remarks, bag_info(bag, topics=topics).remarks):
+        told = [one for one in remarks if 'entr' in one]
+        assert len(told) == len(words)
+        assert all(f'{CONTRACTION}: {text}' in one for text, one in zip(words, told))
