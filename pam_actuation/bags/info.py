@@ -21,7 +21,7 @@ Completeness is judged twice. One measure is the count of the recorder, kept in 
 may begin long after the nodes: then only what they published since counts.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cache
 from pathlib import Path
@@ -34,13 +34,14 @@ from pam_actuation.bags.completeness import (
 from pam_actuation.bags.ending import Ending, ending_of
 from pam_actuation.bags.facts import recorded_rig_title
 from pam_actuation.bags.info_text import render_text
-from pam_actuation.bags.load_joint import half_joints, MEASURED
+from pam_actuation.bags.load_joint import half_joints, joints_of, MEASURED
 from pam_actuation.bags.markers import markers_of
 from pam_actuation.bags.oddities import heard_ns, silent_remarks
 from pam_actuation.bags.recorder import RECORDING_RECORD
 from pam_actuation.bags.recover import RECOVERY_RECORD
 from pam_actuation.bags.renamed import full_names
-from pam_actuation.bags.rig_topics import namespaces, of_another_type, side_of
+from pam_actuation.bags.rig_topics import (
+    namespaces, of_another_type, of_another_type_of_joint, side_of)
 from pam_actuation.bags.source import Bag, read_bag
 from pam_actuation.bags.topic_info import topic_info, TopicInfo
 from pam_actuation.bags.writer import EXPERIMENT_RECORD
@@ -48,6 +49,7 @@ from pam_actuation.topics.table import DIAGNOSTICS, OF_A_RUN, short_name
 from pam_sim.annotations import IntArray
 from pam_sim.errors import InputError
 from pam_sim.files import StrPath
+from pam_sim.joint.parameters import SIDES
 
 __all__ = ['BagInfo', 'TopicInfo', 'bag_info', 'render_text']
 
@@ -172,8 +174,7 @@ def bag_info(path: StrPath, recover: bool = False, namespace: str | None = None,
     remarks += [f'{joint} has no messages on {MEASURED}: the analyses of a joint need it.'
                 for joint in half_joints(bag)]
     remarks += missing
-    remarks += [text for name, text in of_another_type(bag).items()
-                if name.rpartition('/')[0] in muscles or not muscles]
+    remarks += _of_another_type(bag, muscles)
     ending = ending_of(experiment)
     if ending.early:
         remarks.append(ending.sentence)
@@ -188,6 +189,17 @@ def bag_info(path: StrPath, recover: bool = False, namespace: str | None = None,
         recovered=bag.recovered or bool(bag.records.get(RECOVERY_RECORD)),
         markers=[{'time_s': (one.stamp_ns - start_ns) * 1e-9, 'text': one.text,
                   'namespace': place} for place, one in markers_of(bag)])
+
+
+def _of_another_type(bag: Bag, muscles: Collection[str]) -> list[str]:
+    """Return a sentence on each topic of a muscle or joint that is left out for its type."""
+    others = {name: text for name, text in of_another_type(bag).items()
+              if name.rpartition('/')[0] in muscles or not muscles}
+    joints = {place.rpartition('/')[0] for place in muscles if short_name(place) in SIDES}
+    for joint in sorted({*joints, *joints_of(bag)}):
+        others |= {f'{joint}/{name}': text
+                   for name, text in of_another_type_of_joint(bag, joint).items()}
+    return list(others.values())
 
 
 def _broke_off(bag: Bag) -> list[str]:

@@ -25,6 +25,7 @@ from pam_actuation.bags.load import NAMESPACE, read_series, RecordedRun, run_of
 from pam_actuation.bags.markers import is_marker, markers_of
 from pam_actuation.bags.oddities import Oddities
 from pam_actuation.bags.renamed import full_names, may_be_in
+from pam_actuation.bags.rig_topics import of_another_type_of_joint
 from pam_actuation.bags.source import Bag, read_bag, TopicData
 from pam_actuation.topics.table import BY_NAME, JOINT, MUSCLE, short_name
 from pam_sim.errors import InputError
@@ -73,7 +74,8 @@ def load_recording(path: str | os.PathLike[str], namespace: str | None = None,
         raise InputError(f'the bag has several joints, {", ".join(sorted(joints))}; choose one '
                          f'with {NAMESPACE}', str(path))
     found: dict[str, Series] = {}
-    odd = Oddities(list(bag.remarks))
+    others = of_another_type_of_joint(bag, joints[0])
+    odd = Oddities([*bag.remarks, *others.values()])
     for relative, topic in topics_of_joint(bag, joints[0]).items():
         if BY_NAME[short_name(relative)].numeric is not None:
             series = read_series(short_name(relative), topic, odd)
@@ -83,6 +85,7 @@ def load_recording(path: str | os.PathLike[str], namespace: str | None = None,
     return RecordedRun(topics=found, metadata=bag.experiment, namespace=joints[0],
                        path=str(path), remarks=tuple(odd.remarks),
                        left_out=tuple(odd.left_out), notes=tuple(odd.notes),
+                       of_another_type=others,
                        markers=tuple(one for _, one in markers_of(bag, joints[0])))
 
 
@@ -95,6 +98,11 @@ def joints_of(bag: Bag) -> list[str]:
 def _check_no_half_joint(bag: Bag, path: str | os.PathLike[str]) -> None:
     """Raise InputError for a bag with both muscles of a joint, but without the joint."""
     for joint in half_joints(bag):
+        other = of_another_type_of_joint(bag, joint).get(MEASURED)
+        if other is not None:
+            raise InputError(
+                f'has both muscles of the joint {joint}, but {other.removesuffix(": left out.")}; '
+                f'choose one muscle with {NAMESPACE}', str(path))
         renamed = may_be_in(str(path), MEASURED)
         raise InputError(
             f'has both muscles of the joint {joint} but no {MEASURED}: the recording of '

@@ -17,7 +17,8 @@
 from collections.abc import Collection
 
 from pam_actuation.bags.source import Bag, TopicData
-from pam_actuation.topics.table import OF_A_RUN, RECORDED, short_name
+from pam_actuation.topics.table import (
+    JOINT, MUSCLE, OF_A_RUN, RECORDED, RECORDED_OF_JOINT, short_name, Topic)
 from pam_sim.joint.parameters import SIDES
 
 
@@ -42,9 +43,39 @@ def of_another_type(bag: Bag, namespace: str | None = None) -> dict[str, str]:
     for name, topic in bag.topics.items():
         parent, _, short = name.rpartition('/')
         if short in OF_A_RUN and namespace in (None, parent) and not is_rig_topic(topic):
-            found[name] = (f'{name} is {topic.type_name} in {topic.encoding}, not '
-                           f'{OF_A_RUN[short].type_name} in cdr: left out.')
+            found[name] = _left_out(topic, OF_A_RUN[short])
     return found
+
+
+def of_another_type_of_joint(bag: Bag, joint: str) -> dict[str, str]:
+    """
+    Return the sentences of ``of_another_type`` on the topics of a joint and of its muscles.
+
+    Parameters
+    ----------
+    bag : Bag
+        A bag that was read.
+    joint : str
+        Namespace of the joint.
+
+    Returns
+    -------
+    dict of str to str
+        By name relative to the joint, such as ``flexor/pressure``.
+
+    """
+    found = {}
+    for relative, row in RECORDED_OF_JOINT.items():
+        topic = bag.topics.get(f'{joint}/{relative}')
+        if topic is not None and row.place in (JOINT, MUSCLE) and (
+                (topic.type_name, topic.encoding) != (row.type_name, 'cdr')):
+            found[relative] = _left_out(topic, row)
+    return found
+
+
+def _left_out(topic: TopicData, row: Topic) -> str:
+    return (f'{topic.name} is {topic.type_name} in {topic.encoding}, not {row.type_name} in cdr: '
+            'left out.')
 
 
 def is_read(name: str, type_name: str, encoding: str) -> bool:

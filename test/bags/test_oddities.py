@@ -22,12 +22,14 @@ import numpy as np
 from pam_actuation import messages
 from pam_actuation.bags.info import bag_info
 from pam_actuation.bags.load import load_run
+from pam_actuation.bags.load_joint import load_recording
 from pam_actuation.bags.oddities import recording_remarks, stray
 from pam_actuation.bags.source import read_bag
 from pam_actuation.bags.writer import BagWriter, EXPERIMENT_RECORD
 from pam_actuation.cli.main import main
 from pam_actuation.topics import cdr
 from pam_actuation.topics.codec import decode, encode
+from pam_actuation.topics.table import BY_NAME
 from pam_sim.errors import InputError
 import pytest
 from sample_bag import START_NS, write_bag
@@ -297,3 +299,37 @@ def test_entries_that_are_not_read_are_told(tmp_path, named, words):
         told = [one for one in remarks if 'entr' in one]
         assert len(told) == len(words)
         assert all(f'{CONTRACTION}: {text}' in one for text, one in zip(words, told))
+
+
+def bag_of_a_joint(directory, odd):
+    """Write a bag of /knee in which one topic, relative to it, is another type."""
+    sent = {'joint_state': messages.JointAngle, 'flexor/pressure': messages.Pressure,
+            'extensor/pressure': messages.Pressure, 'flexor/followed_pressure': messages.Pressure,
+            'extensor/followed_pressure': messages.Pressure}
+    with BagWriter(directory, {}) as writer:
+        for name, message in sent.items():
+            short = name.rpartition('/')[2]
+            full = f'/knee/{name}'
+            writer.add_topic(
+                full, 'std_msgs/msg/Float64' if name == odd else BY_NAME[short].type_name)
+            for i in range(60):
+                stamp_ns = START_NS + i * 5_000_000
+                data = bytes(12) if name == odd else encode(short, message(stamp_ns, 2e-1 + i))
+                writer.write(full, data, stamp_ns, stamp_ns)
+    return directory
+
+
+def test_a_topic_of_a_joint_of_another_type_is_no_missing_one(tmp_path):
+    odd = 'std_msgs/msg/Float64 in cdr, not sensor_msgs/msg/'
+    bag = bag_of_a_joint(tmp_path / 'angle', 'joint_state')
+    with pytest.raises(InputError, match=f'joint /knee, but /knee/joint_state is {odd}JointState'):
+        load_recording(bag)
+    assert sum(f'/knee/joint_state is {odd}JointState in cdr: left out.' in one
+               for one in bag_info(bag).remarks) == 1
+    bag = bag_of_a_joint(tmp_path / 'pressure', 'extensor/pressure')
+    sentence = f'/knee/extensor/pressure is {odd}FluidPressure in cdr: left out'
+    run = load_recording(bag)
+    assert run.namespace == '/knee' and f'{sentence}.' in run.remarks
+    with pytest.raises(InputError, match=sentence):
+        run.require('extensor/pressure')
+    assert bag_info(bag).remarks.count(f'{sentence}.') == 1
