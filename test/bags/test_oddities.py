@@ -248,6 +248,13 @@ def test_messages_that_came_late_are_not_stray():
     assert not stray(with_hole_ns, with_hole_ns + 300_000).any()
 
 
+def test_an_announced_topic_without_messages_is_no_mistake(tmp_path):
+    bag = write_bag(tmp_path / 'run', 20, change=lambda short, i, message: (
+        None if short == 'contraction' else message))
+    assert bag_info(bag).topic(CONTRACTION).count == 0
+    assert 'contraction' not in load_run(bag).topics
+
+
 def test_unstamped_messages_are_told_as_such_and_not_as_another_clock(tmp_path):
     def change(short, i, message):
         if short == 'pressure':
