@@ -73,6 +73,28 @@ def check_bag_target(directory: StrPath, overwrite: bool = False) -> Path:
     return directory
 
 
+def bags_called(directory: StrPath) -> dict[Path, int]:
+    """
+    Return each folder that may hold the bag of a name, finished or not, with its inode.
+
+    A bag that replaced another is told from it by the inode. Empty folders do not count.
+
+    Parameters
+    ----------
+    directory : path
+        The folder of the bag, absolute.
+
+    """
+    directory = Path(directory)
+    name = re.compile(re.escape(directory.name) + rf'(({STOPPED}|{UNFINISHED})\d*)?')
+    found = {}
+    with contextlib.suppress(OSError):
+        for path in sorted(directory.parent.iterdir()):
+            if name.fullmatch(path.name) and path.is_dir() and any(path.iterdir()):
+                found[path] = path.stat().st_ino
+    return found
+
+
 class BagPlace:
     """
     The folder a bag is written into until it is settled or given up.

@@ -33,6 +33,7 @@ from typing import Any, Self, TYPE_CHECKING
 from pam_actuation.bags.ending import (
     ERROR, FINISHED, INTERRUPTED, RECORDED_FILE, tell_recorder)
 from pam_actuation.bags.layout import METADATA_FILE, read_metadata
+from pam_actuation.bags.place import bags_called
 from pam_actuation.drivers.watchdog import VENTS
 from pam_actuation.interrupts import undisturbed
 from pam_actuation.messages import LEVEL_ERROR
@@ -70,7 +71,8 @@ class Result:
     Attributes
     ----------
     bag : str
-        Folder of the recording, '' without recorder, or if it ended before it recorded.
+        Folder of the recording, '' without recorder, or if it ended before it recorded. Of a
+        recorder that was killed it may be the unfinished one beside the bag to be replaced.
     duration_s : float
         Time from the activation of the reference to the end of the experiment [s].
     failure : str
@@ -135,6 +137,7 @@ class RigSession:
                 name, f'{self.namespace}/{below}'.rstrip('/'), parameters, label=place,
                 program=tuple((programs or {}).get(place, ())))
         self.group = NodeGroup(nodes, plan.folder, domain_id)
+        self._bags_before = self._bags()
         self._cpu: dict[str, float | None] = {}
         self._active_since: float | None = None
         self.ended_at: float | None = None
@@ -262,18 +265,32 @@ class RigSession:
             else:
                 self._cpu.pop(name, None)
 
+    def _bags(self) -> dict[Path, int]:
+        """Return the folders that may hold the recording, as ``bags_called``."""
+        recorder = self.plan.parameters.get(RECORDER)
+        return {} if recorder is None else bags_called(recorder['output'])
+
     def _told_by_recorder(self) -> dict[str, Any]:
         """Return what the recorder says of the bag, {} where it was killed."""
         with contextlib.suppress(OSError, ValueError):
             return dict(json.loads((self.plan.folder / RECORDED_FILE).read_text()))
         return {}
 
+    def _bag(self, told: Mapping[str, Any]) -> str:
+        """Return the folder of the recording of this run, '' where there is none."""
+        if not self.group.was_asked(RECORDER):
+            return ''
+        path = str(told.get('path', ''))    # of one that ended early, beside a former bag
+        if os.path.isdir(path):
+            return path
+        # It was killed or never began. What was there before is of an earlier run.
+        return next((str(folder) for folder, inode in self._bags().items()
+                     if self._bags_before.get(folder) != inode), '')
+
     def fill(self, result: Result) -> None:
         """Enter counts, exit codes and findings into a Result."""
         told = self._told_by_recorder()
-        result.bag = told.get('path', result.bag)   # of one that ended early, beside a former bag
-        if not self.group.was_asked(RECORDER) or not os.path.isdir(result.bag):
-            result.bag = ''         # there is none, or only that of an earlier run
+        result.bag = self._bag(told)
         client = self.group.client
         if client is None:
             return

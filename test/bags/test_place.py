@@ -19,7 +19,7 @@ from pathlib import Path
 import shutil
 
 from pam_actuation.bags.load import load_run
-from pam_actuation.bags.place import check_bag_target
+from pam_actuation.bags.place import bags_called, check_bag_target
 from pam_actuation.bags.writer import BagWriter
 from pam_actuation.experiments import load_experiment
 from pam_actuation.experiments.offline import simulate_experiment
@@ -143,3 +143,16 @@ def test_one_that_is_not_whole_goes_beside_the_former(tmp_path):
         assert writer.directory == tmp_path / name
         assert load_names(tmp_path / name) == ['bag_0.mcap', 'metadata.yaml']
     assert listed(bag) == before
+
+
+def test_a_new_bag_is_told_from_the_one_it_replaces(tmp_path):
+    bag = tmp_path / 'bag'
+    assert bags_called(bag) == {}
+    BagWriter(bag).close()
+    (tmp_path / 'bag_unfinished').mkdir()       # empty
+    before = bags_called(bag)
+    assert list(before) == [bag]
+    writer = BagWriter(bag, overwrite=True)
+    assert bags_called(bag) == {**before, writer.file.parent: writer.file.parent.stat().st_ino}
+    writer.close()
+    assert list(bags_called(bag)) == [bag] and bags_called(bag) != before

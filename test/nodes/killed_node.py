@@ -22,9 +22,10 @@ from pam_actuation.rigging.session import Result, RigSession, run_guarded
 KILLED_AFTER_S = 1.5
 
 
-def run_and_kill(victim, experiment, rig, bag, namespace='/muscle'):
+def run_and_kill(victim, experiment, rig, bag, namespace='/muscle', overwrite=False):
     """Run an experiment behind on/off valves until a node is killed; return the Result."""
-    plan = make_plan(experiment, rig, None, 'hsv', bag, namespace=namespace)
+    plan = make_plan(
+        experiment, rig, None, 'hsv', bag, namespace=namespace, overwrite=overwrite)
     result = Result(str(bag))
     with RigSession(plan, namespace) as session:
         def kill(done_s, total_s):

@@ -24,6 +24,7 @@ from killed_node import run_and_kill                                        # no
 from pam_actuation.bags.ending import Ending, ending_of                     # noqa: E402, I100
 from pam_actuation.bags.info import bag_info, render_text                   # noqa: E402
 from pam_actuation.bags.load import load_run                                # noqa: E402
+from pam_actuation.bags.writer import BagWriter                             # noqa: E402
 from pam_actuation.replay.controller import replay_controller               # noqa: E402
 from pam_actuation.rigging import node_group, session                       # noqa: E402
 from pam_actuation.rigging.domain import DomainLock                         # noqa: E402
@@ -149,6 +150,17 @@ def test_a_killed_driver_leaves_a_vented_muscle(tmp_path):
     assert pressure_pa.max() > 300e3 and pressure_pa[-1] < 115e3
     signals = run.topics['valve_signal'].values
     assert (signals['fill_duty'][-1], signals['vent_duty'][-1]) == (0.0, 1.0)
+
+
+def test_the_former_bag_is_not_told_as_that_of_a_killed_recorder(tmp_path):
+    bag = tmp_path / 'bag'
+    BagWriter(bag).close()
+    before = (bag / 'bag_0.mcap').read_bytes()
+    result = run_and_kill(
+        'experiment_recorder', LONG, 'dmsp_5_300_hanging_mass', bag, overwrite=True)
+    assert result.bag == str(tmp_path / 'bag_unfinished') and result.recorded == {}
+    assert len(load_run(result.bag, recover=True).topics['pressure']) > 100
+    assert (bag / 'bag_0.mcap').read_bytes() == before
 
 
 def test_the_user_may_stop_it(tmp_path):
