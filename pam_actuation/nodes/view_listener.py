@@ -97,7 +97,8 @@ class ViewListener(Onlooker):
             answer(self._marking.mark(request.view, request.text))
             return
         if request.do in ACTIONS:
-            self._waiting.append(_Question(self._clients, request.do, answer))
+            view = '' if request.do == EMERGENCY_STOP else request.view
+            self._waiting.append(_Question(self._clients, request.do, view, answer))
             return
         wanted = request.experiment
         players = [one for one in self._players if one.startswith(f'{request.view}/')]
@@ -154,13 +155,14 @@ class ViewListener(Onlooker):
 
 
 class _Question:
-    """An action that some drivers were asked for."""
+    """An action that the drivers in a namespace were asked for; '' for all."""
 
-    def __init__(self, clients: dict[str, dict[str, Any]], action: str, answer: Answer) -> None:
+    def __init__(self, clients: dict[str, dict[str, Any]], action: str, namespace: str,
+                 answer: Answer) -> None:
         self._answer, self._until_s = answer, time.monotonic() + ANSWER_S
         self._futures = {
             driver: of_driver[action].call_async(Trigger.Request())
-            for driver, of_driver in clients.items()}
+            for driver, of_driver in clients.items() if is_below(driver, namespace)}
 
     def is_over(self) -> bool:
         """Tell whether all have answered or the time is over; hand on what they said."""

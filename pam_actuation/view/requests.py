@@ -42,7 +42,7 @@ class Request:
     number : int
         By which the page finds the answer.
     view : str
-        Namespace to show.
+        Namespace to show, or of the rigs it is for; '' for all. An emergency stop is for all.
     window_s : float
         Time across the page [s].
     end_s : float, optional
@@ -85,11 +85,15 @@ def parse(text: str | bytes) -> Request:
     number = found.get('number', 0)
     if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number < 2**53:
         raise InputError('number is not a whole number from 0 on', 'request')
-    if do in ACTIONS:
-        return Request(do, number)
-    view, experiment = found.get('view', ''), found.get('experiment', '')
+    if do == EMERGENCY_STOP:
+        return Request(do, number)      # for all drivers, whatever else is in it
+    # A reset lets pressure in, so it must say where.
+    view = found.get('view', None if do == RESET else '')
+    experiment = found.get('experiment', '')
     if not isinstance(view, str):
         raise InputError('view is not a text', 'request')
+    if do == RESET:
+        return Request(do, number, view)
     if do in (PLAY, HALT):
         if not isinstance(experiment, str) or (do == PLAY) != bool(experiment):
             raise InputError('experiment is needed to play, and only there', 'request')

@@ -46,9 +46,11 @@ class Source(Protocol):
 
     def act(self, request: 'Request', answer: Answer) -> None:
         """
-        Ask every driver, or the players of a view, for what is requested; return at once.
+        Ask for what is requested; return at once.
 
-        ``answer`` is called later, from any thread, with what each node said.
+        An emergency stop is for every driver, a reset for the drivers of its view, and an
+        experiment for the players of its view. ``answer`` is called later, from any thread,
+        with what each node said.
         """
 
 

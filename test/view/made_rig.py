@@ -64,11 +64,12 @@ class MadeRig:
         self.store = Store()
         self.asked = []
         self.silent = False
+        self.more_drivers = []
         self._rows = rows
         feed(self.store, 0, rows)
 
     def drivers(self):
-        return [DRIVER]
+        return [DRIVER, *self.more_drivers]
 
     def players(self):
         return [PLAYER]

@@ -15,7 +15,7 @@
 """The page in a real browser: connect, emergency stop, a server that dies, phone, bag, dark."""
 
 from browser import Browser, find_chromium
-from made_rig import feed_rules, MadeRig, Running
+from made_rig import feed, feed_rules, MadeRig, Running
 from pam_actuation.view.recording import load
 from pam_actuation.view.server import ViewServer
 from pam_actuation.view.source import BagSource
@@ -86,6 +86,7 @@ def test_emergency_stop_by_one_press_and_reset_by_two(browser, server, rig):
     browser.press('#reset')
     assert rig.asked == ['emergency_stop']
     assert browser.text('#reset') == 'Press again to reset'
+    assert browser.text('#banner') == 'A second press resets /muscle/valve_driver.'
     browser.press('#reset')
     browser.wait_for("document.querySelector('#banner').innerText.startsWith('Reset confirmed')")
     assert rig.asked == ['emergency_stop', 'reset']
@@ -127,6 +128,28 @@ def test_a_marker_is_set_listed_and_drawn(browser, server, rig):
         page.charts[0].draw({...page.time, cursor: null, markers: page.markers}, () => '#000');
         return without !== canvas.toDataURL(); })()""")
     assert browser.text('#marker') == ''
+
+
+def test_a_reset_names_the_drivers_of_the_rig_that_is_shown(browser, server, rig):
+    rig.more_drivers = ['/right/valve_driver']
+    feed(rig.store, 0, 4000, '/right')
+    browser.go_to(server.url)
+    browser.wait_for("page.drivers.length === 2 && page.views === ',/muscle,/right'")
+
+    def show(view):
+        browser.run(f"""(() => {{ const view = document.querySelector('#view');
+            view.value = '{view}'; view.dispatchEvent(new Event('change')); }})()""")
+
+    show('/right')
+    browser.press('#reset')
+    assert browser.text('#banner') == 'A second press resets /right/valve_driver.'
+    show('/muscle')         # which the first press was not for
+    browser.press('#reset')
+    assert browser.text('#banner') == 'A second press resets /muscle/valve_driver.'
+    assert rig.asked == []
+    browser.press('#reset')
+    browser.wait_for("document.querySelector('#banner').innerText.startsWith('Reset confirmed')")
+    assert rig.asked == ['reset']
 
 
 def test_it_comes_back_after_the_server_died(browser, rig):

@@ -47,12 +47,9 @@ def domain():
     lock.release()
 
 
-@pytest.fixture
-def driver(domain):
-    """Return (node, executor, calls) of a driver that answers its services."""
-    context = local_context(domain)
-    node = Node('valve_driver', namespace='/muscle', context=context)
-    calls = []
+def offering(context, namespace):
+    """Return the node of a driver with its services, and the list of what it was asked."""
+    node, calls = Node('valve_driver', namespace=namespace, context=context), []
 
     def answer(action):
         def called(request, response):
@@ -63,6 +60,14 @@ def driver(domain):
 
     for action in ('emergency_stop', 'reset'):
         node.create_service(Trigger, f'~/{action}', answer(action))
+    return node, calls
+
+
+@pytest.fixture
+def driver(domain):
+    """Return (node, executor, calls) of a driver that answers its services."""
+    context = local_context(domain)
+    node, calls = offering(context, '/muscle')
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)
     yield node, executor, calls
@@ -109,13 +114,37 @@ def test_signals_states_and_the_emergency_stop_of_a_driver(domain, driver):
             {'node': '/muscle/valve_driver', 'ok': True, 'message': 'emergency_stop done'}]
         # A driver that hangs: its executor does not run.
         answers.clear()
-        listener.act(Request('reset'), answers.append)
+        listener.act(Request('reset', view='/muscle'), answers.append)
         begin_s = time.monotonic()
         while not answers:
             listener.run_once()
             assert time.monotonic() < begin_s + 10.0
         assert answers[0][0]['ok'] is False and 'no answer' in answers[0][0]['message']
     finally:
+        listener.close()
+
+
+def test_a_reset_goes_to_the_rig_that_is_shown_and_a_stop_to_all(domain, driver):
+    node, executor, calls = driver
+    other, calls_of_other = offering(node.context, '/right_knee/flexor')
+    executor.add_node(other)
+    listener = ViewListener(domain)
+    try:
+        until(listener, executor, lambda: len(listener.drivers()) == 2)
+        for do, view, asked in (
+                ('reset', '/muscle', (1, 0)), ('reset', '/right_knee', (0, 1)),
+                ('reset', '/right', (0, 0)), ('reset', '', (1, 1)),
+                ('emergency_stop', '/muscle', (1, 1))):
+            answers = []
+            listener.act(Request(do, view=view), answers.append)
+            until(listener, executor, lambda: answers)
+            assert (len(calls), len(calls_of_other)) == asked, (do, view)
+            assert len(answers[0]) == sum(asked) and all(one['ok'] for one in answers[0])
+            calls.clear()
+            calls_of_other.clear()
+    finally:
+        executor.remove_node(other)
+        other.destroy_node()
         listener.close()
 
 

@@ -26,7 +26,7 @@ from pam_actuation.cli.main import main
 from pam_actuation.view import client as client_module
 from pam_actuation.view.access import Access
 from pam_actuation.view.recording import load
-from pam_actuation.view.requests import parse
+from pam_actuation.view.requests import parse, Request
 from pam_actuation.view.server import ViewServer
 from pam_actuation.view.source import BagSource
 from pam_sim.errors import InputError
@@ -92,9 +92,9 @@ def test_a_page_gets_hello_state_layout_and_pictures_that_go_on(server):
 
 
 def test_emergency_stop_and_reset_reach_the_driver_and_are_answered(server, rig):
-    async def press(action, number):
+    async def press(action, number, **more):
         page, connection = Page(), await connect(server)
-        await connection.write_message(json.dumps({'do': action, 'number': number}))
+        await connection.write_message(json.dumps({'do': action, 'number': number, **more}))
         answer = await heard(connection, page, lambda one: one.get('type') == 'answer')
         connection.close()
         return answer
@@ -104,7 +104,7 @@ def test_emergency_stop_and_reset_reach_the_driver_and_are_answered(server, rig)
     assert answer['number'] == 7 and answer['results'] == [
         {'node': DRIVER, 'ok': True, 'message': 'vents'}]
     rig.silent = True
-    answer = asyncio.run(press('reset', 8))
+    answer = asyncio.run(press('reset', 8, view='/muscle'))
     rig.silent = False
     assert not answer['results'][0]['ok']
     assert rig.asked == ['emergency_stop', 'reset']
@@ -118,11 +118,19 @@ def test_emergency_stop_and_reset_reach_the_driver_and_are_answered(server, rig)
     ('{"do": "halt", "experiment": "x"}', 'only there'),
     ('{"do": "watch", "end_s": 1e400}', 'end_s is inf'),
     ('{"do": "reset", "number": -1}', 'number is not'), ('{"do": "mark"}', 'text is None'),
+    ('{"do": "reset"}', 'view is not a text'),
     ('{"do": "mark", "text": " "}', '1 to 80 characters'),
     ('{"do": "mark", "text": "a\\nb"}', 'on one line')])
 def test_other_requests_are_refused_in_one_sentence(request_text, why):
     with pytest.raises(InputError, match=why):
         parse(request_text)
+
+
+def test_a_stop_is_for_all_drivers_and_a_reset_for_those_of_its_view():
+    assert parse('{"do": "emergency_stop", "number": 3, "view": 7}') == Request(
+        'emergency_stop', 3)
+    assert parse('{"do": "reset", "number": 4, "view": "/right"}') == Request(
+        'reset', 4, '/right')
 
 
 def test_a_wrong_request_is_told_and_the_page_goes_on(server):

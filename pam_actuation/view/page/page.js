@@ -49,7 +49,8 @@ function setLink(open) {
 function buttons() {
   const open = page.socket.readyState === WebSocket.OPEN;
   $('stop').hidden = $('reset').hidden = !page.live;
-  $('stop').disabled = $('reset').disabled = !open || !page.drivers.length;
+  $('stop').disabled = !open || !page.drivers.length;
+  $('reset').disabled = !open || !driversShown().length;
   $('play_row').hidden = !page.players.length;
   $('begin').disabled = $('halt').disabled = !open;
   $('marking').hidden = !page.live;
@@ -236,16 +237,21 @@ function rules(content) {
 
 // ---- emergency stop and reset ----
 
+// Those of the rig that is shown. A stop goes to all, a reset to these only.
+function driversShown() {
+  return page.drivers.filter((one) => one.startsWith(`${$('view').value}/`));
+}
+
 function ask(action, words, more = {}) {
-  const number = ++page.number;
-  const asked = action === 'mark' ? [$('view').value || 'all rigs']
-    : more.view === undefined ? page.drivers : page.players;
+  const number = ++page.number, of_driver = ['emergency_stop', 'reset'].includes(action);
+  const asked = action === 'mark' ? [$('view').value || 'all rigs'] : !of_driver ? page.players
+    : action === 'reset' ? driversShown() : page.drivers;
   if (!send({do: action, number, ...more})) {
     banner('bad', `${words} was NOT sent: no connection.`);
     return;
   }
   banner('', `${words}: asking ${asked.join(', ')} …`);
-  const one = {words, of_driver: more.view === undefined};
+  const one = {words, of_driver};
   one.timer = setTimeout(() => unanswered(number, one, 'nothing came back'),
     one.of_driver ? ANSWER_MS : PLAY_MS);
   page.asked.set(number, one);
@@ -276,21 +282,31 @@ function banner(kind, text) {
 }
 
 $('stop').onclick = () => ask('emergency_stop', 'Emergency stop');
-// What moves a muscle or lets pressure in asks for a second press.
-function twice(id, words, action) {
+// What moves a muscle or lets pressure in asks for a second press. Where `about` tells
+// something else by then, that one counts as the first.
+function twice(id, words, action, about = () => '') {
   const button = $(id), first = button.textContent;
-  button.onclick = () => {
-    const sure = button.classList.toggle('sure');
+  let told = null;
+  const calm = () => {
     clearTimeout(button.timer);
-    button.textContent = sure ? words : first;
-    if (sure) {
-      button.timer = setTimeout(() => {
-        button.classList.remove('sure'); button.textContent = first;
-      }, SURE_MS);
-    } else action();
+    told = null;
+    button.classList.remove('sure'); button.textContent = first;
+  };
+  button.onclick = () => {
+    const text = about(), sure = told === text;
+    calm();
+    if (sure) { action(); return; }
+    told = text;
+    button.classList.add('sure'); button.textContent = words;
+    if (text) banner('', text);
+    button.timer = setTimeout(() => {
+      calm();
+      if (text && $('banner').textContent === text) banner('', '');
+    }, SURE_MS);
   };
 }
-twice('reset', 'Press again to reset', () => ask('reset', 'Reset'));
+twice('reset', 'Press again to reset', () => ask('reset', 'Reset', {view: $('view').value}),
+  () => `A second press resets ${driversShown().join(', ')}.`);
 twice('begin', 'Press again to start', () => ask('play', `Start of ${$('experiment').value}`, {
   view: $('view').value, experiment: $('experiment').value}));
 $('marking').onsubmit = (event) => {
@@ -324,7 +340,7 @@ function setTheme(name) {
   page.dirty = true;
 }
 
-$('view').onchange = watch;
+$('view').onchange = () => { buttons(); watch(); };
 $('window').onchange = () => {
   if (page.live) remember('window', $('window').value);
   watch();
