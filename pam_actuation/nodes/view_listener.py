@@ -97,8 +97,12 @@ class ViewListener(Onlooker):
             answer(self._marking.mark(request.view, request.text))
             return
         if request.do in ACTIONS:
-            view = '' if request.do == EMERGENCY_STOP else request.view
-            self._waiting.append(_Question(self._clients, request.do, view, answer))
+            drivers: list[str] | None = None
+            if request.do == EMERGENCY_STOP:
+                self._find_drivers()        # those that came since
+            else:
+                drivers = [one for one in self._clients if is_below(one, request.view)]
+            self._waiting.append(_Question(self._clients, request.do, drivers, answer))
             return
         wanted = request.experiment
         players = [one for one in self._players if one.startswith(f'{request.view}/')]
@@ -113,6 +117,10 @@ class ViewListener(Onlooker):
         self.find_topics((*KEPT, MARKER))
         self._marking.look()
         self._players = sorted(self._found_players())
+        self._find_drivers()
+
+    def _find_drivers(self) -> None:
+        """Find drivers that came, forget drivers that went."""
         found = set(serving(self._node, self._namespace, EMERGENCY_STOP))
         for driver in self._clients.keys() - found:
             for client in self._clients.pop(driver).values():
@@ -155,19 +163,36 @@ class ViewListener(Onlooker):
 
 
 class _Question:
-    """An action that the drivers in a namespace were asked for; '' for all."""
+    """
+    An action that some drivers were asked for.
 
-    def __init__(self, clients: dict[str, dict[str, Any]], action: str, namespace: str,
-                 answer: Answer) -> None:
+    A driver is asked as soon as its service is there. Without a list of drivers all are asked,
+    also those that come before the last answer.
+    """
+
+    def __init__(self, clients: dict[str, dict[str, Any]], action: str,
+                 drivers: list[str] | None, answer: Answer) -> None:
+        self._clients, self._action, self._all = clients, action, drivers is None
         self._answer, self._until_s = answer, time.monotonic() + ANSWER_S
-        self._futures = {
-            driver: of_driver[action].call_async(Trigger.Request())
-            for driver, of_driver in clients.items() if is_below(driver, namespace)}
+        # What a driver will say; None: it is not asked yet.
+        self._futures: dict[str, Any] = dict.fromkeys(drivers or ())
+
+    def _ask(self) -> None:
+        """Ask those who can be asked by now."""
+        for driver, of_driver in self._clients.items():
+            wanted = self._all or driver in self._futures
+            if wanted and self._futures.get(driver) is None:
+                client = of_driver[self._action]
+                self._futures[driver] = (
+                    client.call_async(Trigger.Request()) if client.service_is_ready() else None)
 
     def is_over(self) -> bool:
-        """Tell whether all have answered or the time is over; hand on what they said."""
+        """Ask, and tell whether all have answered or the time is over; hand on what they said."""
         late = time.monotonic() > self._until_s
-        if not late and not all(future.done() for future in self._futures.values()):
+        if not late:
+            self._ask()
+        if not late and not all(
+                future is not None and future.done() for future in self._futures.values()):
             return False
         self._answer([_result(driver, future) for driver, future in self._futures.items()])
         return True
@@ -175,7 +200,7 @@ class _Question:
 
 def _result(driver: str, future: Any) -> dict[str, Any]:
     """Return what a driver answered, or that it did not."""
-    if not future.done():
+    if future is None or not future.done():
         return {'node': driver, 'ok': False, 'message': f'no answer within {ANSWER_S:g} s'}
     response = future.result()
     return {'node': driver, 'ok': bool(response.success), 'message': response.message}

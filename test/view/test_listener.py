@@ -14,6 +14,7 @@
 
 """The listener on real DDS: it finds topics and drivers that come later, and lost ones."""
 
+import math
 import time
 import urllib.error
 import urllib.request
@@ -24,6 +25,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 from pam_actuation.nodes import qos  # noqa: E402, I100
+from pam_actuation.nodes.operator import serving  # noqa: E402
 from pam_actuation.nodes.ros_messages import class_of  # noqa: E402
 from pam_actuation.nodes.view_listener import ViewListener  # noqa: E402
 from pam_actuation.rigging.client import local_context  # noqa: E402
@@ -145,6 +147,31 @@ def test_a_reset_goes_to_the_rig_that_is_shown_and_a_stop_to_all(domain, driver)
     finally:
         executor.remove_node(other)
         other.destroy_node()
+        listener.close()
+
+
+def test_a_stop_reaches_a_driver_that_came_since_the_last_look(domain, driver):
+    node, executor, calls = driver
+    listener = ViewListener(domain)
+    other, calls_of_other = None, []
+    try:
+        until(listener, executor, listener.drivers)
+        listener._look_at_s = math.inf
+        other, calls_of_other = offering(node.context, '/right_knee')
+        executor.add_node(other)
+        until(listener, executor, lambda: len(
+            serving(listener._node, '', 'emergency_stop')) == 2)
+        assert listener.drivers() == ['/muscle/valve_driver']
+        answers = []
+        listener.act(Request('emergency_stop'), answers.append)
+        until(listener, executor, lambda: answers)
+        assert calls == calls_of_other == ['emergency_stop']
+        assert sorted(one['node'] for one in answers[0] if one['ok']) == [
+            '/muscle/valve_driver', '/right_knee/valve_driver']
+    finally:
+        if other is not None:
+            executor.remove_node(other)
+            other.destroy_node()
         listener.close()
 
 
