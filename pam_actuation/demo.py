@@ -201,7 +201,7 @@ class Demo:
         if result.failure:
             self.result.findings.append(f'{TITLES[name]}: {result.failure}')
         elif not result.complete:
-            lost = sum(result.published.values()) - sum(result.recorded.values())
+            lost = result.missing
             self.result.findings.append(f'{TITLES[name]}: {lost} messages were not recorded')
         self.result.findings += [f'{TITLES[name]}: {text}' for text in result.findings]
         self._read[name] = in_processes(2, [

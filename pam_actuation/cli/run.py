@@ -75,6 +75,8 @@ def run(args: argparse.Namespace) -> int:
         remarks += full_valves_in(result.bag, experiment, rig.valve)
     # A node that was killed could not report its last count.
     counted = '' if result.failure else f', {sum(result.published.values())} published'
+    if counted and result.of_others:
+        counted += f' and {result.of_others} of other programs'
     recorded = sum(result.recorded.values())
     number = 'an unknown number of' if result.bag and not result.recorded else recorded
     lines = [f'ran "{experiment.name}" on {rig_title(rig)}, {rig.valve}: {number} messages '

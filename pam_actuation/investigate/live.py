@@ -121,7 +121,7 @@ class LiveRecorder(Recorder):
         if result.failure or not result.bag:
             raise RecordingFailed(result.failure or 'nothing was recorded')
         if not result.complete:
-            lost = sum(result.published.values()) - sum(result.recorded.values())
+            lost = result.missing
             raise RecordingFailed(f'{lost} messages were not recorded')
 
     def _on_hardware(self, experiment: 'Experiment', bag: Path, progress: Progress) -> None:

@@ -81,11 +81,14 @@ class Result:
         Errors the nodes reported on the way.
     published, recorded : dict
         Full topic name to number of messages; ``recorded`` is {} of a recorder that was killed.
+        What other programs sent, such as a marker, is recorded only.
     exit_codes : dict
         Node to exit code (negative: ended by that signal), each by its place below the
         namespace, such as ``flexor/valve_driver``.
     cpu_share : dict
         Node to processor time over run time [cores].
+    missed : int
+        Messages that the recorder knows to be missing, of whatever sender.
 
     """
 
@@ -97,6 +100,7 @@ class Result:
     recorded: dict[str, int] = field(default_factory=dict)
     exit_codes: dict[str, int | None] = field(default_factory=dict)
     cpu_share: dict[str, float] = field(default_factory=dict)
+    missed: int = 0
 
     @property
     def stopped(self) -> bool:
@@ -106,7 +110,19 @@ class Result:
     @property
     def complete(self) -> bool:
         """Tell whether the experiment ended as planned and every message was recorded."""
-        return not self.failure and (not self.bag or self.published == self.recorded)
+        return not self.failure and not (self.bag and self.missing)
+
+    @property
+    def missing(self) -> int:
+        """Return how many messages too few or too many the bag has, by all that is known."""
+        return max(self.missed, sum(abs(count - self.recorded.get(topic, 0))
+                                    for topic, count in self.published.items()))
+
+    @property
+    def of_others(self) -> int:
+        """Return how many messages were recorded on topics of other programs."""
+        return sum(count for topic, count in self.recorded.items()
+                   if topic not in self.published)
 
 
 class RigSession:
@@ -295,6 +311,7 @@ class RigSession:
         if client is None:
             return
         result.published = client.published()
+        result.missed = told.get('lost', 0) + told.get('dropped', 0)
         result.recorded = recorded_counts(result.bag) if result.bag else {}
         if not result.recorded:         # the disk refused the end of the bag
             result.recorded = {name: counts['written']

@@ -14,6 +14,7 @@
 
 """Test whole sessions: real processes, a complete bag, and an orderly end of every kind."""
 
+import time
 from types import SimpleNamespace
 
 import pytest
@@ -25,9 +26,14 @@ from pam_actuation.bags.ending import Ending, ending_of                     # no
 from pam_actuation.bags.info import bag_info, render_text                   # noqa: E402
 from pam_actuation.bags.load import load_run                                # noqa: E402
 from pam_actuation.bags.writer import BagWriter                             # noqa: E402
+from pam_actuation.messages import Marker                                   # noqa: E402
+from pam_actuation.nodes import qos                                         # noqa: E402
+from pam_actuation.nodes.ros_messages import class_of                       # noqa: E402
 from pam_actuation.replay.controller import replay_controller               # noqa: E402
 from pam_actuation.rigging import node_group, session                       # noqa: E402
 from pam_actuation.rigging.domain import DomainLock                         # noqa: E402
+from pam_actuation.rigging.plan import make_plan                            # noqa: E402
+from pam_actuation.topics.codec import encode                               # noqa: E402
 from pam_sim.errors import InputError                                       # noqa: E402
 
 pytestmark = pytest.mark.ros
@@ -161,6 +167,37 @@ def test_the_former_bag_is_not_told_as_that_of_a_killed_recorder(tmp_path):
     assert result.bag == str(tmp_path / 'bag_unfinished') and result.recorded == {}
     assert len(load_run(result.bag, recover=True).topics['pressure']) > 100
     assert (bag / 'bag_0.mcap').read_bytes() == before
+
+
+def test_a_marker_set_meanwhile_leaves_the_run_complete(tmp_path):
+    plan = make_plan(PRESSURE, 'dmsp_5_300_hanging_mass', None, 'ppr', tmp_path / 'bag')
+    result, senders = session.Result(str(tmp_path / 'bag')), []
+    with session.RigSession(plan) as rig:
+        def mark(done_s, total_s):
+            if not senders:
+                node = rig.group.started.node
+                senders.append(node.create_publisher(
+                    class_of('marker'), '/muscle/marker', qos.PUBLISHER))
+            elif len(senders) == 1 and senders[0].get_subscription_count():
+                senders[0].publish(encode('marker', Marker(time.time_ns(), 'supply on')))
+                senders.append(None)
+
+        session.run_guarded(rig, result, mark)
+    plan.remove()
+    assert result.recorded == {**result.published, '/muscle/marker': 1}
+    assert result.complete and result.of_others == 1, result
+    assert load_run(result.bag).markers[0].text == 'supply on'
+
+
+def test_what_is_missing_makes_a_run_incomplete():
+    def made(pressure, **more):
+        return session.Result('bag', published={'/p': 5}, recorded={'/p': pressure, '/x': 1},
+                              **more)
+
+    assert made(5).complete and made(5).missing == 0
+    assert not made(4).complete and not made(6).complete and made(3).missing == 2
+    assert not made(5, missed=2).complete and made(5, missed=2).missing == 2
+    assert not made(5, failure='vented').complete
 
 
 def test_the_user_may_stop_it(tmp_path):
