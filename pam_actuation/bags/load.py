@@ -19,7 +19,7 @@ Any namespace, any rates, topics missing, bags of other recorders: what can be
 used is returned, what is odd is said in ``remarks``.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 
@@ -212,10 +212,15 @@ def _listed(names: Iterable[str]) -> str:
     return ', '.join(name or '/' for name in sorted(names)) or 'none'
 
 
-def read_series(short: str, topic: TopicData, odd: Oddities) -> Series:
-    """Return the Series of a TopicData; what is odd is appended to ``odd`` as sentences."""
+def read_series(short: str, topic: TopicData, odd: Oddities,
+                only: Collection[str] | None = None) -> Series:
+    """
+    Return the Series of a TopicData; what is odd is appended to ``odd`` as sentences.
+
+    Of a topic with named entries ``only`` tells which are wanted; by default all.
+    """
     row = BY_NAME[short]
-    stamp_ns, values, bad = series.table(short, topic.payloads)
+    stamp_ns, values, bad = series.table(short, topic.payloads, only)
     keep = ~bad
     if bad.any():
         odd.leave_out(

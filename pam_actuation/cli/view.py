@@ -156,10 +156,14 @@ def _serve(args: argparse.Namespace, server: 'ViewServer', listener: 'ViewListen
 
 def _say(args: argparse.Namespace, shown: 'Source', url: str) -> None:
     if args.json:
-        print(json.dumps({'url': url, 'live': shown.live}), flush=True)
+        told: dict[str, object] = {'url': url, 'live': shown.live}
+        if not shown.live:
+            told['remarks'] = shown.remarks
+        print(json.dumps(told), flush=True)
     else:
-        print(f'page: {url}\nCtrl-C ends it; the rig goes on without it' if shown.live
-              else f'page: {url}\nCtrl-C ends it', flush=True)
+        end = 'Ctrl-C ends it; the rig goes on without it' if shown.live else 'Ctrl-C ends it'
+        remarks = [f'remark: {text}' for text in shown.remarks]
+        print('\n'.join([f'page: {url}', *remarks, end]), flush=True)
     if args.open:
         import webbrowser
         webbrowser.open(url)

@@ -49,6 +49,7 @@ class ViewListener(Onlooker):
     """
 
     live = True
+    remarks: tuple[str, ...] = ()
 
     def __init__(self, domain_id: int | None = None, namespace: str = '') -> None:
         super().__init__(domain_id, namespace)

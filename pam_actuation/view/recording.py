@@ -15,10 +15,14 @@
 """A bag as the page shows it."""
 
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 
+from pam_actuation.bags.ending import ending_of
+from pam_actuation.bags.load import read_series
 from pam_actuation.bags.markers import is_marker, markers_of
-from pam_actuation.bags.series import table
+from pam_actuation.bags.oddities import Oddities
+from pam_actuation.bags.plausibility import recorded_size, topic_findings
+from pam_actuation.bags.rig_topics import of_another_type
 from pam_actuation.bags.source import Bag, read_bag
 from pam_actuation.namespaces import lies_in
 from pam_actuation.topics.codec import decode
@@ -33,7 +37,11 @@ DIAGNOSTICS = 'diagnostics'
 
 @dataclass(frozen=True)
 class Recording:
-    """A bag that was read: its signals, and what it says of its experiment."""
+    """
+    A bag that was read: its signals, and what it says of its experiment.
+
+    ``remarks`` tell what is odd in it, or cannot be right.
+    """
 
     path: str
     store: Store
@@ -66,6 +74,9 @@ def load(path: StrPath, recover: bool = False, namespace: str = '') -> Recording
     """
     bag = read_bag(path, recover, _is_shown)
     store = Store(span_ns=None)
+    odd = Oddities(list(bag.remarks))
+    findings: list[str] = []
+    size_of = cache(lambda: recorded_size(bag.experiment))
     for full_name, topic in bag.topics.items():
         if not len(topic.payloads) or not _is_shown(full_name, topic.type_name, topic.encoding):
             continue
@@ -77,19 +88,25 @@ def load(path: StrPath, recover: bool = False, namespace: str = '') -> Recording
             continue
         if namespace and not full_name.startswith(f'{namespace}/'):
             continue
-        stamps_ns, values, bad = table(short, topic.payloads, KEPT[short])
-        good = ~bad
-        order = stamps_ns[good].argsort(kind='stable')
-        store.add(full_name.rpartition('/')[0], short, stamps_ns[good][order],
-                  {name: column[good][order] for name, column in values.items()})
+        # A controller has many internals.
+        series = read_series(
+            short, topic, odd, KEPT[short] if BY_NAME[short].internals else None)
+        if len(series):
+            store.add(full_name.rpartition('/')[0], short, series.stamp_ns, series.values)
+            findings += [found.sentence for found in topic_findings(
+                full_name, series.stamp_ns, series.values, size_of)]
     for place, marker in markers_of(bag, namespace or None):
         store.add_markers(place, [marker])
     if not store.lines(''):
         named = f' in the namespace {namespace}' if namespace else ''
         raise InputError(f'the bag has no signal of a rig{named}; its topics: '
                          f'{", ".join(sorted(bag.topics)) or "none"}', path)
-    return Recording(str(path), store, bag.experiment.get('experiment_name', ''),
-                     tuple(bag.remarks))
+    ending = ending_of(bag.experiment)
+    others = [text for name, text in of_another_type(bag).items()
+              if name.rpartition('/')[0] in store.namespaces()]
+    return Recording(
+        str(path), store, bag.experiment.get('experiment_name', ''),
+        (*odd.remarks, *others, *findings, *[ending.sentence] * ending.early))
 
 
 def _is_shown(name: str, type_name: str, encoding: str) -> bool:

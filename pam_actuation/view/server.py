@@ -175,6 +175,7 @@ class ViewServer:
         client.tell({'type': 'hello', 'live': self.source.live, 'title': self.source.title,
                      'windows_s': WINDOWS_S,
                      'experiments': self.source.experiments(),
+                     'remarks': self.source.remarks,
                      'length_s': (end_ns - begin_ns) * 1e-9,
                      'begin_s': begin_ns * 1e-9})
         client.tell(self._state(client))

@@ -30,6 +30,7 @@ class Source(Protocol):
 
     title: str
     live: bool
+    remarks: tuple[str, ...]        # what is odd in a bag, or cannot be right; live: none
 
     @property
     def store(self) -> 'Store':
@@ -62,6 +63,7 @@ class BagSource:
     def __init__(self, recording: 'Recording') -> None:
         self.store = recording.store
         self.title = recording.title or recording.path
+        self.remarks = recording.remarks
 
     def drivers(self) -> list[str]:
         """Return an empty list."""

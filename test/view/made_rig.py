@@ -58,7 +58,7 @@ def feed_rules(store, begin, count, namespace='/muscle', gain=2.0, start_ns=STAR
 class MadeRig:
     """A source of pages; ``stopped`` tells what its driver was asked for."""
 
-    live, title = True, 'made rig'
+    live, title, remarks = True, 'made rig', ()
 
     def __init__(self, rows=4000):
         self.store = Store()

@@ -201,6 +201,7 @@ def test_a_bag_is_shown_at_any_time(tmp_path):
         page, connection = Page(), await connect(one)
         hello = await heard(connection, page, lambda one: one.get('type') == 'hello')
         assert not hello['live'] and hello['length_s'] == pytest.approx(2.995)
+        assert hello['remarks'] == list(one.source.remarks)
         shown = []
         for end_s in (1.0, 2.5, 99.0):
             await connection.write_message(json.dumps(

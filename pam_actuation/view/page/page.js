@@ -73,6 +73,8 @@ function hello(content) {
     $('window').value = remembered('window', page.live ? '10' : longWindow(content));
   }
   $('experiment').replaceChildren(...content.experiments.map((one) => new Option(one, one)));
+  $('odd').hidden = !content.remarks.length;
+  listed('remarks', content.remarks);
   $('player').hidden = page.live; $('hold').hidden = !page.live;
   if (!page.live) {
     $('slider').max = content.length_s.toFixed(2);
@@ -180,12 +182,16 @@ function setMarkers(markers) {
   if (texts.join('\n') === page.markerTexts) return;
   page.markerTexts = texts.join('\n');
   $('marked').hidden = !texts.length;
-  $('markers').replaceChildren(...texts.reverse().map((text) => {
+  listed('markers', texts.reverse());
+  page.dirty = true;
+}
+
+function listed(id, texts) {
+  $(id).replaceChildren(...texts.map((text) => {
     const item = document.createElement('li');
     item.textContent = text;
     return item;
   }));
-  page.dirty = true;
 }
 
 function markerTime(marker) {
