@@ -154,11 +154,14 @@ class BagPlace:
         except BaseException:
             os.rename(aside, self.directory)
             raise
+        former, self._former = self._former, []     # the new bag is in its place
         self._moved()
-        for name in self._former:
-            (aside / name).unlink()
-        aside.rmdir()
-        self._former = []
+        # What else was put into the old folder meanwhile stays there.
+        for name in former:
+            with contextlib.suppress(OSError):
+                (aside / name).unlink()
+        with contextlib.suppress(OSError):
+            aside.rmdir()
         return self.directory
 
     def _moved(self) -> None:

@@ -156,3 +156,14 @@ def test_a_new_bag_is_told_from_the_one_it_replaces(tmp_path):
     assert bags_called(bag) == {**before, writer.file.parent: writer.file.parent.stat().st_ino}
     writer.close()
     assert list(bags_called(bag)) == [bag] and bags_called(bag) != before
+
+
+def test_what_was_put_into_the_former_folder_meanwhile_stays(tmp_path):
+    bag = Path(simulate(tmp_path / 'bag'))
+    writer = BagWriter(bag, {}, overwrite=True)
+    (bag / 'notes.txt').write_text('mine')
+    writer.close()
+    assert writer.finished and writer.directory == bag
+    assert load_names(bag) == ['bag_0.mcap', 'metadata.yaml']
+    assert load_names(tmp_path) == ['bag', 'bag_former']
+    assert listed(tmp_path / 'bag_former') == {'notes.txt': b'mine'}
