@@ -79,8 +79,14 @@ class Processes:
 
     def _begin(self, task: 'Future[Any]', executor: ProcessPoolExecutor,
                arguments: tuple[Any, ...], tries: int) -> None:
-        with kept_from_children():
-            inner = executor.submit(call, *arguments)
+        try:
+            with kept_from_children():
+                inner = executor.submit(call, *arguments)
+        except BrokenProcessPool:
+            # It ended while it had nothing to do, which is no fault of this task.
+            executor = self._replaced(executor)
+            with kept_from_children():
+                inner = executor.submit(call, *arguments)
         inner.add_done_callback(lambda done: self._end(task, executor, arguments, tries, done))
 
     def _end(self, task: 'Future[Any]', executor: ProcessPoolExecutor,
@@ -101,12 +107,17 @@ class Processes:
         else:
             task.set_result(done.result())
 
-    def _again(self, task: 'Future[Any]', broken: ProcessPoolExecutor,
-               arguments: tuple[Any, ...], tries: int) -> None:
+    def _replaced(self, broken: ProcessPoolExecutor) -> ProcessPoolExecutor:
+        """Return a process in the place of one that was lost."""
         with self._lock:
             self._executors.remove(broken)
             executor = self._started()
         broken.shutdown(wait=False)
+        return executor
+
+    def _again(self, task: 'Future[Any]', broken: ProcessPoolExecutor,
+               arguments: tuple[Any, ...], tries: int) -> None:
+        executor = self._replaced(broken)
         if tries < TRIES:
             self._begin(task, executor, arguments, tries + 1)
             return

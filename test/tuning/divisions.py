@@ -25,3 +25,8 @@ def divided(folder, item):
         mark.touch()
         os.kill(os.getpid(), signal.SIGKILL)
     return 10 / item
+
+
+def own_pid(folder, item):
+    """Return the id of the process that does this task."""
+    return os.getpid()

@@ -14,9 +14,12 @@
 
 """Where tasks run: threads, processes and a Dask cluster give the same, mistakes a sentence."""
 
+import os
+import signal
 import sys
+import time
 
-from divisions import divided
+from divisions import divided, own_pid
 from pam_actuation.control.config import load_controller
 from pam_actuation.experiments.experiment import load_experiment
 from pam_actuation.tuning.loops_of_rigs import loops_of
@@ -100,6 +103,19 @@ def test_a_lost_process_costs_its_own_task_only(tmp_path):
     assert isinstance(found.pop(0), ZeroDivisionError)
     assert isinstance(found.pop(5), WorkerLost)
     assert found == {1: 10.0, 2: 5.0, 3: 10 / 3, 4: 2.5}
+
+
+def test_a_process_that_is_lost_while_it_is_idle_is_replaced(tmp_path):
+    with Workers(jobs=1, processes=True) as workers:
+        lost, = workers.map(own_pid, None, [0])
+        broken, = workers._pool._executors
+        os.kill(lost, signal.SIGKILL)
+        deadline = time.monotonic() + 20.0
+        while broken._flags.broken is None:         # what is lost is not known at once
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        assert dict(workers.stream(divided, tmp_path, [1, 3])) == {1: 10.0, 3: 10 / 3}
+        assert workers.map(own_pid, None, [0]) != [lost]
 
 
 def _batch_is_the_same_elsewhere(workers):
