@@ -155,6 +155,10 @@ class ExperimentRecorder(ManagedNode):
         if names:
             self.metadata[TOPIC_NAMES] = names_text(names)
         for name, type_name in self.extra.items():
+            full_name = self.resolve_topic_name(name)
+            if any(source.topic == full_name for source in self.sources.values()):
+                raise InputError(f'{name!r} is {full_name}, which is recorded anyway; leave it '
+                                 'out', 'parameter extra_topics')
             self._record(name, name, type_name, USUAL.recorder)
 
     def _record(self, topic: str, name: str, type_name: str, quality: Quality) -> None:

@@ -148,6 +148,19 @@ def test_it_does_not_await_what_it_does_not_record(made, tmp_path):
     assert not recorder.subscriptions_polled and not (tmp_path / 'bag').exists()
 
 
+@pytest.mark.parametrize('names, twice', [
+    (['/muscle/pressure'], '/muscle/pressure'), (['pressure'], '/muscle/pressure'),
+    (['/muscle/bench', 'bench'], '/muscle/bench')])
+def test_a_topic_is_not_recorded_twice(names, twice, made, tmp_path):
+    recorder = made(topics=['pressure', 'force'], extra_topics=[
+        f'{name}=sensor_msgs/msg/FluidPressure' for name in names])
+    recorder.trigger_configure()
+    assert str(recorder.input_error) == (
+        f'parameter extra_topics: {names[-1]!r} is {twice}, which is recorded anyway; '
+        'leave it out')
+    assert not recorder.subscriptions_polled and not (tmp_path / 'bag').exists()
+
+
 @pytest.mark.parametrize('text', ['["a"]', '7', 'null'])
 def test_a_metadata_file_holds_an_object(text, made, tmp_path):
     file = tmp_path / 'metadata.json'
