@@ -210,7 +210,7 @@ def _plan(args: argparse.Namespace) -> int:
             write_text(folder / 'experiment.yaml', dump_yaml(found.best.experiment))
         played, model = (shlex.quote(str(one)) for one in (
             Path(args.out) / 'experiment.yaml', args.model))
-        text += (f'\nrun it with: {on_hardware(played, model, "first")}'
+        text += (f'\nrun it with: {on_hardware(played, model, "first", valve=rig.valve)}'
                  f'\nsimulated: pam run {played} --rig {model} --valve {rig.valve}')
     emit(args, found.to_dict(), text)
     return EXIT_DONE

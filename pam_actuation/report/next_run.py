@@ -50,22 +50,39 @@ def command_on_rig(runs: 'Sequence[Run]', experiment: StrPath, model: StrPath,
     experiment : path
         File of the experiment.
     model : path
-        Rig file with what is known of the rig; of a joint its file or preset.
+        Rig file with what is known of the rig; of a joint its file or preset. A preset gets the
+        valve of the recordings.
     name : str
         Of the folder in ``runs`` for the new recording.
 
     """
     played, described = shlex.quote(str(experiment)), shlex.quote(str(model))
+    valve = _valve_beside(runs, model)
     if not all(is_simulated(run) for run in runs):
-        return on_hardware(played, described, name, is_of_joint(runs[0]))
-    return f'pam run {played} --rig {_recorded_preset(runs) or described}'
+        return on_hardware(played, described, name, is_of_joint(runs[0]), valve)
+    return f'pam run {played} --rig {_recorded_preset(runs) or described + _option(valve)}'
 
 
-def on_hardware(experiment: str, model: str, name: str, of_joint: bool = False) -> str:
-    """Return the command that runs an experiment on a real rig; files as the shell takes them."""
+def on_hardware(experiment: str, model: str, name: str, of_joint: bool = False,
+                valve: str = '') -> str:
+    """
+    Return the command that runs an experiment on a real rig.
+
+    Parameters
+    ----------
+    experiment, model : str
+        Files as the shell takes them; the model may be a preset.
+    name : str
+        Of the folder in ``runs`` for the recording.
+    of_joint : bool
+        Whether the model is that of a joint.
+    valve : str
+        ``ppr`` or ``hsv``; '' for the one of the model.
+
+    """
     what = 'knee' if of_joint else 'rig'
-    return (f'pam up {what} --hardware {HARDWARE_FILE} --model {model} --experiment {experiment} '
-            f'--record {shlex.quote(os.path.join("runs", name))}')
+    return (f'pam up {what} --hardware {HARDWARE_FILE} --model {model}{_option(valve)} '
+            f'--experiment {experiment} --record {shlex.quote(os.path.join("runs", name))}')
 
 
 def before_it(runs: 'Sequence[Run]', advice: Mapping[str, Any], model: StrPath) -> str:
@@ -94,6 +111,20 @@ def before_it(runs: 'Sequence[Run]', advice: Mapping[str, Any], model: StrPath) 
     if advice['needs_force'] and not any('force' in run for run in runs):
         found.append('record the force with a load cell')
     return '; '.join(found)
+
+
+def _option(valve: str) -> str:
+    return f' --valve {valve}' if valve else ''
+
+
+def _valve_beside(runs: 'Sequence[Run]', model: StrPath) -> str:
+    """Return the recorded valve where the model is a preset; '' of a file, which states one."""
+    from pam_sim import preset_names
+    from pam_sim.gap.data.signals import recorded_valve
+    from pam_sim.joint import joint_preset_names
+    if str(model) not in (*preset_names(), *joint_preset_names()):
+        return ''
+    return next(filter(None, map(recorded_valve, runs)), '')
 
 
 def _recorded_preset(runs: 'Sequence[Run]') -> str:

@@ -14,6 +14,7 @@
 
 """The command that runs a proposed experiment is one for the rig that was recorded."""
 
+import numpy as np
 from pam_actuation.cli import gap as gap_verb
 from pam_actuation.cli.main import build_parser, main
 from pam_actuation.experiments import protocols
@@ -23,7 +24,7 @@ from pam_sim import load_rig
 from pam_sim.gap.result import GapResult
 from pam_sim.joint import load_joint
 from pam_sim.located_yaml import dump_yaml
-from pam_sim.run import Run
+from pam_sim.run import Run, Series
 import pytest
 
 PRESET = 'dmsp_20_300_hanging_mass'
@@ -88,15 +89,29 @@ def test_a_muscle_of_a_joint_is_measured_in_its_joint(joint, is_simulated, rig):
     assert build_parser().parse_args(rig.split()[1:])
 
 
-def test_a_plan_says_how_it_is_run_for_real_and_simulated(tmp_path, capsys, monkeypatch):
+@pytest.mark.parametrize('is_simulated, command', [
+    (False, f'pam up knee --hardware my_hardware.yaml --model {JOINT} --valve hsv '
+     '--experiment next.yaml --record runs/next'),
+    (True, f'pam run next.yaml --rig {JOINT} --valve hsv')])
+def test_a_preset_is_driven_with_the_valve_of_the_recording(is_simulated, command):
+    duties = Series(np.arange(2), {'fill_duty': np.zeros(2), 'vent_duty': np.ones(2)})
+    recorded = load_joint(JOINT, 'hsv').with_(parameters={'inertia_kg_m2': 0.02})
+    seed = {'seed': '3'} if is_simulated else {}
+    run = Run({'valve_signal': duties}, {'rig': recorded.to_yaml(), **seed}, '/knee/flexor')
+    assert next_command('next.yaml', [run], joint_model=JOINT) == command
+    assert build_parser().parse_args(command.split()[1:]).valve == 'hsv'
+
+
+@pytest.mark.parametrize('valve', ['ppr', 'hsv'])
+def test_a_plan_says_how_it_is_run_for_real_and_simulated(valve, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / 'short.yaml').write_text(dump_yaml({
         'name': 'short', 'domain': 'pressure', 'segments': [
-            {'rest': {'duration_s': 1.0}}, *protocols.pieces('ppr')['quick']]}), encoding='utf-8')
-    assert main(['gap', '--plan', 'short.yaml', '--model', 'dmsp_5_300_hanging_mass', '--effects',
-                 'leakage', '--out', 'planned']) == 0
+            {'rest': {'duration_s': 1.0}}, *protocols.pieces(valve)['quick']]}), encoding='utf-8')
+    assert main(['gap', '--plan', 'short.yaml', '--model', 'dmsp_5_300_hanging_mass', '--valve',
+                 valve, '--effects', 'leakage', '--out', 'planned']) == 0
     out = capsys.readouterr().out
     assert ('run it with: pam up rig --hardware my_hardware.yaml --model dmsp_5_300_hanging_mass '
-            '--experiment planned/experiment.yaml --record runs/first') in out
+            f'--valve {valve} --experiment planned/experiment.yaml --record runs/first') in out
     assert ('simulated: pam run planned/experiment.yaml --rig dmsp_5_300_hanging_mass '
-            '--valve ppr') in out
+            f'--valve {valve}') in out
