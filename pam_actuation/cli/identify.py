@@ -76,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
         lines.append(f'results: {args.out}')
         model = Path(args.out) / 'rig.yaml'
         if found.next_experiment is not None:
-            before = before_it(runs, found.next_experiment, model)
+            before = before_it(runs, found.next_experiment, model, args.added_kg)
             lines += [f'before it: {before}'] if before else []
             lines.append('next: ' + command_on_rig(
                 runs, Path(args.out) / 'next_experiment.yaml', model,

@@ -85,7 +85,8 @@ def on_hardware(experiment: str, model: str, name: str, of_joint: bool = False,
             f'--experiment {experiment} --record {shlex.quote(os.path.join("runs", name))}')
 
 
-def before_it(runs: 'Sequence[Run]', advice: Mapping[str, Any], model: StrPath) -> str:
+def before_it(runs: 'Sequence[Run]', advice: Mapping[str, Any], model: StrPath,
+              added_kg: Sequence[float] = ()) -> str:
     """
     Return what must be done before the next experiment of an identification; '' for nothing.
 
@@ -97,17 +98,22 @@ def before_it(runs: 'Sequence[Run]', advice: Mapping[str, Any], model: StrPath) 
         ``next_experiment`` of the result.
     model : path
         Rig file with the numbers found.
+    added_kg : sequence of float
+        Known masses [kg] that hung on the load in addition, one for each recording; empty for
+        none.
 
     """
     found = []
     if advice['added_kg']:
+        masses = ' '.join(f'{kg:g}' for kg in [
+            *(added_kg or [0.0] * len(runs)), advice['added_kg']])
         more = f'{advice["added_kg"]:g} kg'
         found.append(
             f'put {more} more into `mass_kg` of a copy of {model} and run that'
-            if all(is_simulated(run) for run in runs) else f'hang {more} more on the load')
-        found[-1] += (f', since the experiment needs another load than the rig file has; '
-                      f'pam identify is told of it by --added-kg {"0 " * len(runs)}'
-                      f'{advice["added_kg"]:g}')
+            if all(is_simulated(run) for run in runs) else f'hang {more} more on the load'
+            + ', in place of what was added before' * any(added_kg))
+        found[-1] += (', since the experiment needs another load than the rig file has; '
+                      f'pam identify is told of it by --added-kg {masses}')
     if advice['needs_force'] and not any('force' in run for run in runs):
         found.append('record the force with a load cell')
     return '; '.join(found)

@@ -60,6 +60,9 @@ def test_another_load_and_a_load_cell_are_said_before():
     assert said.endswith('; record the force with a load cell')
     said = before_it([OF_A_FILE], advice, 'found/rig.yaml')
     assert 'put 1.2 kg more into `mass_kg` of a copy of found/rig.yaml' in said
+    said = before_it([IMPORTED, IMPORTED], advice, 'found/rig.yaml', [0.0, 2.0])
+    assert said.startswith('hang 1.2 kg more on the load, in place of what was added before')
+    assert '--added-kg 0 2 1.2;' in said
     assert before_it([IMPORTED], {'added_kg': 0.0, 'needs_force': False}, 'found/rig.yaml') == ''
 
 
