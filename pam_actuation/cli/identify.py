@@ -82,7 +82,22 @@ def run(args: argparse.Namespace) -> int:
                 runs, Path(args.out) / 'next_experiment.yaml', model,
                 found.next_experiment['name']))
         else:
-            lines.append('next: ' + shlex.join(
-                ['pam', 'gap', *args.run, '--model', str(model), '--out', 'gap']))
+            lines += _gap_lines(args, model)
     emit(args, found.to_dict(), '\n'.join(lines))
     return EXIT_DONE
+
+
+def _gap_lines(args: argparse.Namespace, model: Path) -> list[str]:
+    """Return how ``pam gap`` reads the recordings that were made without an added mass."""
+    added_kg = args.added_kg or [0.0] * len(args.run)
+    bare = [bag for bag, kg in zip(args.run, added_kg) if not kg]
+    lines = []
+    if len(bare) < len(args.run):
+        lines = ['pam gap knows of no added mass: '
+                 + ('it takes the recordings without one' if bare else 'RUN is one without it')]
+    words = ['pam', 'gap', *(bare or ['RUN'])]
+    if args.namespace is not None:
+        words += ['--namespace', args.namespace]
+    for name, topic in (args.renamed or {}).items():
+        words += ['--topic', f'{name}={topic}']
+    return [*lines, 'next: ' + shlex.join([*words, '--model', str(model), '--out', 'gap'])]

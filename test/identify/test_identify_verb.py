@@ -108,6 +108,24 @@ def test_the_next_experiment_is_run_on_the_rig_that_was_recorded(bag, tmp_path, 
                          f'--rig {out / "rig.yaml"}')
 
 
+@pytest.mark.parametrize('added_kg, taken, told', [
+    ([], ['BAG', 'BAG'], ''),
+    (['0', '2'], ['BAG'], 'no added mass: it takes the recordings without one'),
+    (['2', '2'], ['RUN'], 'no added mass: RUN is one without it')])
+def test_a_gap_is_looked_for_without_added_masses_and_read_as_here(
+        added_kg, taken, told, bag, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr('pam_sim.identify.identify', lambda runs, rig, *_, **__: Identification(
+        rig, [], [], [], {}, False, []))
+    out, reading = tmp_path / 'found', ['--namespace', '/muscle', '--topic', 'force=/muscle/force']
+    assert main(['identify', str(bag), str(bag), '--rig', 'dmsp_5_300_hanging_mass', *reading,
+                 *(['--added-kg', *added_kg] if added_kg else []), '--out', str(out)]) == 0
+    said, _, following = capsys.readouterr().out.rpartition('next: ')
+    assert shlex.split(following) == [
+        'pam', 'gap', *(str(bag) if one == 'BAG' else one for one in taken), *reading,
+        '--model', str(out / 'rig.yaml'), '--out', 'gap']
+    assert told in said and ('added mass' in said) == bool(told)
+
+
 def test_a_recording_on_the_page_has_the_kind_of_all_its_stretches():
     records = [{'path': path, 'kind': kind, 'added_kg': 0.0} for path, kind in (
         ('a', 'valve'), ('a', 'valve'), ('b', 'valve'), ('b', 'muscle and load'))]
