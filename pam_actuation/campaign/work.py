@@ -99,7 +99,7 @@ def gap(run: 'RecordedRun', model: str, settings: Settings, folder: Path) -> Fou
     result = gap_of([run], model, effects=settings.effects or None,
                     seconds=settings.seconds, materiality=settings.materiality)
     result.runtime_s = 0.0
-    save_gap(result, run, folder)
+    save_gap(result, [run], folder)
     share_plotly(folder / 'report.html')
     found = result.to_dict()
     sizes = [size(effect['name'], 'effect', quantity, entry) for effect in found['effects']

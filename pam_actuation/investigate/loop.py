@@ -204,7 +204,7 @@ class Investigation:
              'duration_s': round(duration_s(run), 3)} for run in new),
             GIVEN if given else decision.why, {})
         with self._store.new_round(number) as folder:
-            save_gap(result, runs[0], folder)
+            save_gap(result, runs, folder)
             write_json(folder / ROUND_FILE, found.facts())
         self._store.told_time(number, 'gap', time.perf_counter() - began)
         return Round.read(self._store.rounds / str(number))

@@ -115,7 +115,7 @@ def write_gap(runs: 'Sequence[Run]', model: 'StrPath | Rig', out_dir: StrPath,
     """
     check_folder(out_dir)
     result = gap_of(runs, model, certify, **options)
-    save_gap(result, certify or runs[0], out_dir, of, joint_model)
+    save_gap(result, runs, out_dir, of, joint_model, certify)
     return result
 
 
@@ -193,23 +193,40 @@ def model_for(run: 'Run', model: 'StrPath | Rig') -> Rig:
         model, valve=(recorded_valve(run) or None) if named else None)
 
 
-def save_gap(result: 'GapResult', run: 'Run', out_dir: StrPath, of: str = '',
-             joint_model: StrPath = '') -> None:
+def save_gap(result: 'GapResult', runs: 'Sequence[Run]', out_dir: StrPath, of: str = '',
+             joint_model: StrPath = '', certify: 'Run | None' = None) -> None:
     """
     Write gap.json, model.yaml, compare.mcap and report.html of a result.
 
     Where rivals are left, next_experiment.yaml too, which ``pam run`` executes. Where a term is
     proposed, its effect file and the model with it. Where there is a surrogate, its model. Such
     files of an earlier result are removed.
+
+    Parameters
+    ----------
+    result : GapResult
+        What was found.
+    runs : list of pam_sim.run.Run
+        The recordings that were searched.
+    out_dir : path
+        Folder for the results; made if needed.
+    of, joint_model, certify
+        As of ``write_gap``.
+
+    Raises
+    ------
+    InputError
+        A folder that cannot be written.
+
     """
     # A model that has the proposed effect needs its file.
     kept = (EFFECT_FILE, MODEL_FILE) if Path(EFFECT_FILE).stem in result.model_yaml else ()
     with whole_files(out_dir, set(FILES).difference(kept)) as folder:
-        _save_into(folder, result, run, of, joint_model)
+        _save_into(folder, result, runs, of, joint_model, certify)
 
 
-def _save_into(out_dir: Path, result: 'GapResult', run: 'Run', of: str, joint_model: StrPath
-               ) -> None:
+def _save_into(out_dir: Path, result: 'GapResult', runs: 'Sequence[Run]', of: str,
+               joint_model: StrPath, certify: 'Run | None') -> None:
     write_json(out_dir / 'gap.json', result.to_dict())
     write_text(out_dir / 'model.yaml', result.model_yaml)
     if result.next_experiment:
@@ -221,13 +238,17 @@ def _save_into(out_dir: Path, result: 'GapResult', run: 'Run', of: str, joint_mo
     if result.surrogate:
         write_text(out_dir / SURROGATE_FILE, result.surrogate.model_yaml)
     if result.traces:
-        write_compare(result, run.namespace, out_dir / 'compare.mcap')
+        write_compare(result, (certify or runs[0]).namespace, out_dir / 'compare.mcap')
+    recordings = [(f'recording {k}' if len(runs) > 1 else 'recording', run)
+                  for k, run in enumerate(runs, 1)]
+    if certify is not None:
+        recordings.append(('proof', certify))
     write_text(out_dir / 'report.html', render(
         'Recording against model', VERDICT_TEXT.get(result.verdict, result.verdict) + '.',
         [*numbers_section(result),
          gap_section(result, command=next_command(
-             'next_experiment.yaml', [run], joint_model=joint_model)),
-         provenance([('recording', run)])], footer=FOOTER, of=of))
+             'next_experiment.yaml', runs, joint_model=joint_model)),
+         provenance(recordings)], footer=FOOTER, of=of))
 
 
 def next_command(path: StrPath, runs: 'Sequence[Run]', model: StrPath = 'model.yaml',

@@ -121,7 +121,7 @@ def test_a_proposal_of_an_earlier_result_goes_unless_it_is_used(drag, tmp_path):
     # As of a model with the effect in it, which cannot be loaded here.
     used = replace(drag, proposal=None, model_yaml=f'{drag.model_yaml}# proposed_effect\n')
     for result, left in ((drag, files), (used, files), (replace(drag, proposal=None), set())):
-        save_gap(result, run, tmp_path)
+        save_gap(result, [run], tmp_path)
         assert files & set(os.listdir(tmp_path)) == left
 
 

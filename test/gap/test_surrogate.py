@@ -62,14 +62,14 @@ def test_a_better_model_without_a_name_is_written(found, swinging, tmp_path):
     assert surrogate.names and set(surrogate.names) <= {*NAMES, 'T_m', 'K_m'}
     assert in_words(surrogate.to_dict()) in found.remarks
     assert_form(found)
-    save_gap(found, second, tmp_path)
+    save_gap(found, [first], tmp_path, certify=second)
     calibrated, better = (load_rig(tmp_path / name) for name in ('model.yaml', FILE))
     assert not calibrated.effects and better.effects
     assert rms_kpa(better, second) < 0.85 * rms_kpa(calibrated, second)
     told = json.loads((tmp_path / 'gap.json').read_text())['surrogate']
     assert told['file'] == FILE and told['names'] == list(surrogate.names)
     # A later answer that has none takes the file away.
-    save_gap(replace(found, surrogate=None), second, tmp_path)
+    save_gap(replace(found, surrogate=None), [first], tmp_path, certify=second)
     assert not (tmp_path / FILE).exists()
 
 

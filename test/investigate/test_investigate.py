@@ -114,7 +114,7 @@ def test_a_kill_costs_a_step_and_no_byte(done, lab, capsys):
     code = ('import os, signal, sys\n'
             'from pam_actuation.investigate import loop\n'
             'from pam_actuation.cli.main import main\n'
-            'loop.save_gap = lambda result, run, folder: (\n'
+            'loop.save_gap = lambda result, runs, folder: (\n'
             '    (folder / "half").write_text("half"), os.kill(os.getpid(), signal.SIGKILL))\n'
             'main(sys.argv[1:])\n')
     out = lab / 'killed'

@@ -18,7 +18,7 @@ import numpy as np
 from pam_actuation.cli import gap as gap_verb
 from pam_actuation.cli.main import build_parser, main
 from pam_actuation.experiments import protocols
-from pam_actuation.report.gap import next_command
+from pam_actuation.report.gap import next_command, save_gap
 from pam_actuation.report.next_run import before_it, command_on_rig, is_simulated
 from pam_sim import load_rig
 from pam_sim.gap.result import GapResult
@@ -77,6 +77,24 @@ def test_a_gap_is_measured_on_where_it_was_recorded(tmp_path):
     _, told = gap_verb._next_lines(result, 'gap', [simulated])
     assert told == ('next: pam run gap/next_experiment.yaml --rig dmsp_20_300_hanging_mass '
                     '--valve ppr')
+
+
+def test_the_page_of_a_gap_names_all_recordings_and_the_command_of_the_terminal(tmp_path):
+    result = GapResult('ambiguous', '', model_yaml=OWN.to_yaml())
+    result.next_experiment = {'name': 'next', 'why': 'It tells A from B.', 'experiment': {}}
+    pressure = {'pressure': Series(np.arange(2), {'pressure_pa': np.full(2, 2e5)})}
+    one, two, proof = (
+        Run(pressure, {**metadata}, '/muscle', path) for path, metadata in (
+            ('runs/monday', {}), ('runs/tuesday', {}), ('runs/simulated', {'seed': '1'})))
+    save_gap(result, [one, two], tmp_path, certify=proof)
+    page = (tmp_path / 'report.html').read_text()
+    for words in ('recording 1', 'runs/monday', 'recording 2', 'runs/tuesday', 'proof',
+                  'runs/simulated', next_command('next_experiment.yaml', [one, two])):
+        assert words in page
+    assert 'pam run next_experiment.yaml' not in page
+    save_gap(result, [one], tmp_path)
+    page = (tmp_path / 'report.html').read_text()
+    assert 'runs/monday' in page and 'recording 1' not in page and 'proof</th>' not in page
 
 
 @pytest.mark.parametrize('joint, is_simulated, rig', [
