@@ -222,7 +222,14 @@ def save_gap(result: 'GapResult', runs: 'Sequence[Run]', out_dir: StrPath, of: s
     # A model that has the proposed effect needs its file.
     kept = (EFFECT_FILE, MODEL_FILE) if Path(EFFECT_FILE).stem in result.model_yaml else ()
     with whole_files(out_dir, set(FILES).difference(kept)) as folder:
-        _save_into(folder, result, runs, of, joint_model, certify)
+        _save_into(folder, result, runs, of, _seen_from(out_dir, joint_model), certify)
+
+
+def _seen_from(folder: StrPath, model: StrPath) -> StrPath:
+    """Return the relative path of a model file as seen from a folder; others as they are."""
+    if os.path.isabs(model) or str(model) in joint_preset_names() or not os.path.isfile(model):
+        return model
+    return os.path.relpath(model, folder)
 
 
 def _save_into(out_dir: Path, result: 'GapResult', runs: 'Sequence[Run]', of: str,

@@ -88,7 +88,7 @@ def test_the_page_of_a_gap_names_all_recordings_and_the_command_of_the_terminal(
             ('runs/monday', {}), ('runs/tuesday', {}), ('runs/simulated', {'seed': '1'})))
     save_gap(result, [one, two], tmp_path, certify=proof)
     page = (tmp_path / 'report.html').read_text()
-    for words in ('recording 1', 'runs/monday', 'recording 2', 'runs/tuesday', 'proof',
+    for words in ('recording 1', 'runs/monday', 'recording 2', 'runs/tuesday', 'proof</th>',
                   'runs/simulated', next_command('next_experiment.yaml', [one, two])):
         assert words in page
     assert 'pam run next_experiment.yaml' not in page
@@ -121,6 +121,21 @@ def test_a_preset_is_driven_with_the_valve_of_the_recording(is_simulated, comman
     run = Run({'valve_signal': duties}, {'rig': recorded.to_yaml(), **seed}, '/knee/flexor')
     assert next_command('next.yaml', [run], joint_model=JOINT) == command
     assert build_parser().parse_args(command.split()[1:]).valve == 'hsv'
+
+
+def test_the_page_of_a_muscle_of_a_joint_tells_its_files_as_seen_from_its_folder(
+        tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'my_joint.yaml').write_text(load_joint(JOINT).to_yaml(), encoding='utf-8')
+    result = GapResult('ambiguous', '', model_yaml=OWN.to_yaml())
+    result.next_experiment = {'name': 'next', 'why': 'It tells A from B.', 'experiment': {}}
+    pressure = {'pressure': Series(np.arange(2), {'pressure_pa': np.full(2, 2e5)})}
+    run = Run(pressure, {}, '/knee/flexor')
+    for model, seen in (('my_joint.yaml', '../../my_joint.yaml'), (JOINT, JOINT),
+                        (str(tmp_path / 'my_joint.yaml'), str(tmp_path / 'my_joint.yaml'))):
+        save_gap(result, [run], 'gap/flexor', joint_model=model)
+        assert (f'--model {seen} --experiment next_experiment.yaml'
+                in (tmp_path / 'gap' / 'flexor' / 'report.html').read_text())
 
 
 @pytest.mark.parametrize('valve', ['ppr', 'hsv'])
