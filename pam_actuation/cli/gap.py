@@ -169,14 +169,14 @@ def _next_lines(result: 'GapResult', out: str, runs: 'Sequence[Run]' = (),
     """Return how to use a model without a name, what to measure next and how, if anything."""
     from pathlib import Path
     from pam_actuation.report.gap import next_command, with_term
+    from pam_actuation.report.next_run import simulated
     from pam_sim.gap.propose.surrogate import FILE as SURROGATE_FILE
-    lines = []
+    lines, played = [], simulated(result.model_yaml)
     if result.proposal:
-        lines += [f'the model with the term: {with_term(out)}']
+        lines += [f'the model with the term: {with_term(out, played)}']
     if result.surrogate:
         model = shlex.quote(str(Path(out) / SURROGATE_FILE))
-        lines += ['the surrogate: pam simulate sine_quarter_hz '
-                  f'--rig {model} --out runs/surrogate']
+        lines += [f'the surrogate: pam simulate {played} --rig {model} --out runs/surrogate']
     if result.next_experiment:
         lines += [f'what to measure next: {result.next_experiment["why"]}',
                   'next: ' + next_command(Path(out) / 'next_experiment.yaml', runs,

@@ -24,6 +24,7 @@ from pam_actuation.investigate.decide import (
     ANSWERED, DECLINED, FAILED, IMPOSSIBLE, MINUTES, REFUSED, ROUNDS)
 from pam_actuation.investigate.page import investigation_page
 from pam_actuation.investigate.store import MODEL, OPTIONAL, PAGE, RESULT, Store
+from pam_actuation.report.next_run import is_driven
 from pam_actuation.report.sections.replay import SHOWN
 from pam_sim.files import StrPath, whole_files, write_json, write_text
 from pam_sim.gap.propose.proposal import MODEL_FILE
@@ -106,8 +107,13 @@ class Outcome:
             'next_command': self.next_command('.'), 'question': self.question}
 
     def next_command(self, folder: StrPath) -> str | None:
-        """Return the command that tunes a controller on the final model, None without one."""
-        if not self.has_model:
+        """
+        Return the command that tunes a controller on the final model.
+
+        None without a model, and for a load that does not move freely: no controller of
+        contraction can be tuned on it.
+        """
+        if not self.has_model or is_driven(self.question['model']):
             return None
         model, tuned = (shlex.quote(os.path.normpath(os.path.join(folder, name)))
                         for name in (MODEL, TUNED))

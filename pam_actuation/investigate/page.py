@@ -55,10 +55,11 @@ def investigation_page(outcome: 'Outcome', model: str) -> str:
         sections += [_table(rounds), _shrinking(rounds)]
     sections += [_round(one) for one in rounds]
     if model:
+        command = outcome.next_command('.')
         sections.append(Section('model', 'The final model', paragraph(
             'The given model, calibrated, with what was named added to it. The file is '
-            'model.yaml beside this page.') + f'<pre>{text(model)}</pre>' + paragraph(
-            f'Next: {outcome.next_command(".")}')))
+            'model.yaml beside this page.') + f'<pre>{text(model)}</pre>' + (
+            paragraph(f'Next: {command}') if command else '')))
     return render('Investigation', LEAD, sections, _numbers(outcome), FOOTER,
                   of='investigation')
 

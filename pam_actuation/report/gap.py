@@ -34,7 +34,7 @@ from pam_actuation.bags.writer import BagWriter
 from pam_actuation.experiments.separating import cell_would_tell, next_experiment, not_played
 from pam_actuation.experiments.separating_joint import in_joint
 from pam_actuation.report.model_held import model_held
-from pam_actuation.report.next_run import command_on_rig
+from pam_actuation.report.next_run import command_on_rig, OF_FREE
 from pam_actuation.report.page import render
 from pam_actuation.report.pages import FOOTER
 from pam_actuation.report.sections.gap import gap_section, VERDICT_TEXT
@@ -269,11 +269,11 @@ def next_command(path: StrPath, runs: 'Sequence[Run]', model: StrPath = 'model.y
     return command_on_rig(runs, path, joint_model or model)
 
 
-def with_term(folder: StrPath) -> str:
+def with_term(folder: StrPath, experiment: str = OF_FREE) -> str:
     """Return the command that simulates the model with the term of this folder of a result."""
     searched = os.pathsep.join(filter(None, (os.environ.get('PAM_EFFECTS_PATH'), str(folder))))
     model = shlex.quote(str(Path(folder) / MODEL_FILE))
-    return (f'PAM_EFFECTS_PATH={shlex.quote(searched)} pam simulate sine_quarter_hz --rig {model} '
+    return (f'PAM_EFFECTS_PATH={shlex.quote(searched)} pam simulate {experiment} --rig {model} '
             '--out runs/with_term')
 
 

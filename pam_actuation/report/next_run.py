@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from pam_sim.run import Run
 
 HARDWARE_FILE = 'my_hardware.yaml'       # stands for the user's own; its name is in no bag
+# Preset experiments of a load that moves freely, and of another one: in pressure.
+OF_FREE, OF_DRIVEN = 'sine_quarter_hz', 'pressure_identification'
 
 
 def is_simulated(run: 'Run') -> bool:
@@ -36,6 +38,25 @@ def is_simulated(run: 'Run') -> bool:
 def is_of_joint(run: 'Run') -> bool:
     """Tell whether a recording is of a joint, or of a muscle in one."""
     return run.namespace.rpartition('/')[2] in SIDES
+
+
+def is_driven(model: str) -> bool:
+    """
+    Return whether a model, as YAML text, has a load that does not move freely.
+
+    No controller of contraction works on it. Text that gives no rig tells nothing: False.
+    """
+    from pam_sim import load_rig
+    from pam_sim.errors import InputError
+    try:
+        return bool(model) and load_rig(model).is_driven
+    except InputError:
+        return False
+
+
+def simulated(model: str) -> str:
+    """Return the preset experiment by which a model, as YAML text, is simulated."""
+    return OF_DRIVEN if is_driven(model) else OF_FREE
 
 
 def command_on_rig(runs: 'Sequence[Run]', experiment: StrPath, model: StrPath,

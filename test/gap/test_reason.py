@@ -14,6 +14,7 @@
 
 """The sentences of a gap result never say what its numbers contradict."""
 
+import shlex
 import time
 from types import SimpleNamespace
 
@@ -234,6 +235,19 @@ def test_a_proposed_term_is_told_with_the_command_that_uses_it(monkeypatch):
     monkeypatch.setenv('PAM_EFFECTS_PATH', 'effects')
     told, = gap_verb._next_lines(result, 'gap')
     assert 'PAM_EFFECTS_PATH=effects:gap pam' in told
+
+
+@pytest.mark.parametrize('load', ['driven', 'isometric'])
+def test_a_muscle_that_is_held_or_moved_is_simulated_in_pressure(load, tmp_path):
+    model = load_rig(f'dmsp_5_300_{load}').to_yaml()
+    (tmp_path / 'surrogate_model.yaml').write_text(model, encoding='utf-8')
+    result = GapResult('unknown', '', model_yaml=model)
+    result.proposal = result.surrogate = object()
+    told = [line.partition('pam simulate ')[2]
+            for line in gap_verb._next_lines(result, str(tmp_path))]
+    assert [line.split()[0] for line in told] == ['pressure_identification'] * 2
+    words = shlex.split(told[1])
+    assert main(['simulate', *words[:-1], str(tmp_path / 'bag')]) == 0
 
 
 def test_a_surrogate_is_told_with_the_command_that_simulates_it():

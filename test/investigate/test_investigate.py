@@ -14,6 +14,7 @@
 
 """An investigation: rounds kept whole, the same bytes after a kill, every ending."""
 
+from dataclasses import replace
 import hashlib
 import json
 import os
@@ -28,6 +29,7 @@ from pam_actuation.cli.main import main
 from pam_actuation.experiments import load_experiment
 from pam_actuation.investigate import Budget, Investigation, loop, Question
 from pam_actuation.investigate.decide import decide
+from pam_actuation.investigate.page import investigation_page
 from pam_actuation.investigate.question import digest_of
 from pam_actuation.investigate.recorder import Declined, Recorder, RecordingFailed
 from pam_actuation.investigate.rounds import Round
@@ -316,6 +318,18 @@ def test_recordings_that_are_there_are_the_first_round(small, done, tmp_path, mo
     monkeypatch.setattr(loop, 'load_run', lambda *told, **more: pytest.fail('loaded again'))
     again, _ = small(['unknown'], given=bags, folder=tmp_path / 'again', loaded=runs)
     assert again.to_dict() == outcome.to_dict()
+
+
+@pytest.mark.parametrize('load', ['driven', 'isometric'])
+def test_no_controller_is_tuned_on_a_load_that_does_not_move_freely(small, load):
+    outcome, _ = small(['effects'])
+    assert 'next: pam tune --model x/model.yaml' in outcome.text('x')
+    model = load_rig(f'dmsp_5_300_{load}').to_yaml()
+    outcome = replace(outcome, question={**outcome.question, 'model': model})
+    assert outcome.has_model and outcome.next_command('x') is None
+    assert 'next:' not in outcome.text('x') and 'model: x/model.yaml' in outcome.text('x')
+    page = investigation_page(outcome, model)
+    assert 'The final model</h2>' in page and 'Next: pam' not in page
 
 
 def test_a_proposed_term_lies_beside_the_model(small, done, tmp_path):
