@@ -20,7 +20,8 @@ import time
 from typing import Any, TYPE_CHECKING
 
 from pam_actuation.bags.ending import FINISHED, PLAYING
-from pam_actuation.experiments.limits import highest_gauge_pa
+from pam_actuation.drivers.for_rig import driver_config
+from pam_actuation.experiments.limits import reach_remarks
 from pam_actuation.hardware.files import hardware_file
 from pam_actuation.investigate.motion import Ask, limit_of, Motion
 from pam_actuation.investigate.recorder import Declined, Progress, Recorder, RecordingFailed
@@ -86,10 +87,11 @@ class LiveRecorder(Recorder):
 
     def motion(self, experiment: 'Experiment', why: str = '') -> Motion:
         """Return what a person is asked before an experiment."""
-        limit = highest_gauge_pa(self._rig)
+        limit = driver_config(self._rig).safety.max_pressure_gauge_pa
         if self._file:
             limit = min(limit_of(self._file, limit), limit)
-        return Motion(experiment, limit, self.valve, bool(self._file), why)
+        return Motion(experiment, limit, self.valve, bool(self._file), why,
+                      reach_remarks(experiment, self._rig))
 
     def record(self, experiment: 'Experiment', bag: Path, seed: int, why: str,
                progress: Progress) -> None:

@@ -44,6 +44,8 @@ class Motion:
         False: the muscle is simulated by a node.
     why : str
         What it would show.
+    remarks : tuple of str
+        What the rig cannot do of it, a sentence each.
 
     """
 
@@ -52,6 +54,7 @@ class Motion:
     valve: str
     is_real: bool
     why: str = ''
+    remarks: tuple[str, ...] = ()
 
     def text(self) -> str:
         """Return what is about to move, how long and up to which pressure."""
@@ -65,6 +68,7 @@ class Motion:
             f'{self.limit_gauge_pa * 1e-3:.0f} kPa gauge. It vents at the end.']
         if self.why:
             lines.append(f'Why: {self.why}')
+        lines += [f'Remark: {remark}.' for remark in self.remarks]
         if one.needs:
             lines.append(f'It needs these sensors: {", ".join(one.needs)}.')
         if self.is_real:

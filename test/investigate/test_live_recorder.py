@@ -153,6 +153,19 @@ def test_the_limit_told_is_the_lower_one(tmp_path):
     assert told.limit_gauge_pa == 600e3 and 'a simulated muscle' in told.text()
 
 
+@pytest.mark.parametrize('hardware', ['', 'dummy'])
+def test_the_reach_of_a_regulator_is_not_the_limit_of_the_driver(hardware):
+    rig = load_rig(MODEL)
+    rig = rig.with_(parameters={'K_m': 400e3 / rig.parameters['ppr_highest_v']})
+    recorder, experiment = LiveRecorder(rig, lambda motion: True, hardware), load_experiment(
+        'random_steps')
+    recorder.check(experiment)              # as pam up and pam run, which play it as well
+    motion = recorder.motion(experiment)
+    assert motion.limit_gauge_pa == 600e3
+    assert 'Remark: the experiment asks for up to 539 kPa gauge; the regulator of this rig ends ' \
+        'at 400 kPa' in motion.text()
+
+
 @pytest.mark.parametrize('answer', ['no\n', 'y\n', 'Y\n', 'YES\n', 'yes, but\n', '\n', ''])
 def test_anything_but_yes_at_the_terminal_ends_with_nothing_moved(
         answer, tmp_path, capsys, monkeypatch):
