@@ -16,6 +16,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+import math
 import os
 from typing import Any
 
@@ -25,9 +26,12 @@ from pam_actuation.report.learning import learned_worse, times_rolled_back
 from pam_actuation.report.page import plot, render, Section, table
 from pam_actuation.report.pages import (
     cycle_numbers, default_titles, early_section, implausible_section)
+from pam_actuation.report.sections.cycles import cycle_chart
 from pam_actuation.report.sections.markers import markers_sections
 from pam_actuation.report.sections.metrics_table import (
     each_part, interrupted_text, rolled_back_text, told_of_learning)
+from pam_actuation.report.sections.over_seeds import over_seeds, seeds_section
+from pam_actuation.report.sections.overlaid import lines, read_topic, together
 from pam_actuation.report.sections.provenance import provenance
 from pam_actuation.report.sections.timing import timing
 from pam_sim.annotations import FloatArray
@@ -123,7 +127,7 @@ def joint_report(runs: Sequence[Run], out_path: str | os.PathLike[str],
     Returns
     -------
     dict
-        Main numbers of every run, plain data.
+        Main numbers of every run, plain data; ``over_seeds`` where seeds alone differ.
 
     Raises
     ------
@@ -138,8 +142,12 @@ def joint_report(runs: Sequence[Run], out_path: str | os.PathLike[str],
     titles = default_titles(runs)
     found = [joint_metrics(run) for run in runs]
     named = list(zip(titles, found))
-    sections = [*filter(None, [early_section(runs), implausible_section(list(zip(titles, runs)))]),
-                _merits(named)]
+    spread = over_seeds(list(zip(titles, runs, found)))
+    sections = [*filter(None, [
+        early_section(runs), implausible_section(list(zip(titles, runs))), _merits(named),
+        seeds_section(spread), cycle_chart([
+            (title, np.degrees(one.cycle_rmse_rad), one.cycle_parts) for title, one in named],
+            '°'), _overlaid(list(zip(titles, runs)))])]
     for k, (title, run) in enumerate(zip(titles, runs)):
         heading = 'Signals over time' + (f': {title}' if len(runs) > 1 else '')
         sections.append(_plots(run, f'signals-{k}', heading))
@@ -149,7 +157,8 @@ def joint_report(runs: Sequence[Run], out_path: str | os.PathLike[str],
     write_text(out_path, render(
         f'Experiment {name}', 'Tracking of a joint of two pneumatic muscles: what was asked, '
         'what it did, and how well.', sections, _key_numbers(named), FOOTER, of))
-    return {title: one.to_dict() for title, one in named}
+    return {**{title: one.to_dict() for title, one in named},
+            **({'over_seeds': spread} if spread else {})}
 
 
 def _merits(named: Sequence[tuple[str, JointMetrics]]) -> Section:
@@ -185,6 +194,24 @@ def _key_numbers(named: Sequence[tuple[str, JointMetrics]]) -> list[tuple[str, s
 
 def _degrees(angle_rad: float | None) -> str | None:
     return None if angle_rad is None else f'{np.degrees(angle_rad):.3f}°'
+
+
+def _overlaid(named: list[tuple[str, Run]]) -> Section | None:
+    """Return the section that draws all runs into the same plots, None for a single run."""
+    if len(named) < 2:
+        return None
+    degrees = math.degrees(1.0)
+    reference = signals.series(named[0][1], 'joint_reference', 'angle_rad')
+    return together([
+        ('angle [°]', lines(named, read_topic('joint_state', degrees, field='angle_rad'))
+         + ([] if reference is None else [figures.line(
+             reference[0], np.degrees(reference[1]), 'reference', 'reference', dash='dash',
+             width=1.1, max_points=_POINTS)])),
+        ('tracking error [°]', lines(named, lambda run: (
+            None if (error := angle_error(run)) is None else (error[0], np.degrees(error[1]))))),
+        *((f'{side} [kPa gauge]', lines(named, read_topic(f'{side}/pressure', 1e-3, P_ATM_PA)))
+          for side in SIDES),
+        *((f'{side} [N]', lines(named, read_topic(f'{side}/force', 1.0))) for side in SIDES)])
 
 
 def _plots(run: Run, key: str, title: str) -> Section:

@@ -59,15 +59,44 @@ def test_merits_are_those_of_the_angle(bag):
     assert {one.topic for one in found.timing} >= {'joint_state', 'flexor/valve_signal'}
 
 
+def traces_of(content):
+    """Return the names of the traces of each figure of a page."""
+    found = re.findall(r'<script type="application/json">(.*?)</script>', content, re.S)
+    return [[trace.get('name') for trace in json.loads(one)['data']] for one in found]
+
+
+def test_several_bags_are_laid_over_each_other_with_a_table_over_seeds(bag, tmp_path, capsys):
+    joint = load_joint('joint_dmsp_5_300_realistic', valve='hsv')
+    simulate_experiment(load_experiment(EXPERIMENT), joint,
+                        load_controller('sofc_joint_hsv', joint), tmp_path / 'other', seed=1)
+    out = tmp_path / 'page.html'
+    assert main(['report', str(bag), str(tmp_path / 'other'), '--out', str(out), '--json']) == 0
+    found = json.loads(capsys.readouterr().out)
+    (name, spread), = found['over_seeds'].items()
+    assert name == 'sofc: two_turns, other' and spread['seeds'] == ['0', '1']
+    rmse_rad = [found[title]['tracking_rmse_rad'] for title in spread['runs']]
+    assert spread['tracking_rmse_rad'] == {
+        'mean': pytest.approx(np.mean(rmse_rad)), 'std': pytest.approx(np.std(rmse_rad, ddof=1))}
+    assert len(spread['cycle_rmse_rad']['mean']) == 2 and not spread['same']
+    content = out.read_text(encoding='utf-8')
+    table = content.partition('id="over-seeds"')[2].partition('</section>')[0]
+    assert f'{np.degrees(np.mean(rmse_rad)):.3f} ± ' in table and 'kPa' in table
+    assert 'id="cycles"' in content and r'tracking RMSE [\u00b0]' in content
+    together = next(names for names in traces_of(content)
+                    if names[:3] == ['two_turns', 'other', 'reference'])
+    assert together.count('other') == 6         # angle, error, pressure and force of both
+    joint_report([load_recording(bag)], out)
+    content = out.read_text(encoding='utf-8')
+    assert 'id="overlaid"' not in content and 'id="over-seeds"' not in content
+
+
 def test_the_page_shows_angle_and_both_muscles(bag, tmp_path, capsys):
     out = tmp_path / 'page.html'
     assert main(['report', str(bag), '--out', str(out), '--json']) == 0
     assert len(json.loads(capsys.readouterr().out)['two_turns']['cycle_rmse_rad']) == 2
     content = out.read_text(encoding='utf-8')
     assert 'Experiment two_turns' in content and 'Mean pressure of both muscles' in content
-    figure = json.loads(re.search(
-        r'<script type="application/json">(.*?)</script>', content, re.S)[1])
-    names = [trace['name'] for trace in figure['data']]
+    names = next(names for names in traces_of(content) if 'angle' in names)
     assert names[:3] == ['angle', 'reference', 'reference − angle']
     assert {'flexor', 'extensor', 'flexor command', 'extensor command',
             'extensor vent_duty'} <= set(names)

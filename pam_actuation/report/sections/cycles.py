@@ -21,7 +21,9 @@ from pam_actuation.report.errors import by_part
 from pam_actuation.report.page import paragraph, plot, Section
 
 if TYPE_CHECKING:
+    from pam_actuation.report.errors import Cycles
     from pam_actuation.report.metrics import RunMetrics
+    from pam_sim.annotations import FloatArray
 
 ROLES = ('after', 'frozen', 'second', 'green', 'command')
 
@@ -39,15 +41,33 @@ def cycles(named: 'list[tuple[str, RunMetrics]]', key: str = 'cycles',
         Anchor, and a sentence above the chart.
 
     """
-    tracked = [(name, m) for name, m in named if len(m.cycle_rmse_m)]
+    return cycle_chart([(name, m.cycle_rmse_m * 1e3, m.cycle_parts) for name, m in named], 'mm',
+                       key, remark)
+
+
+def cycle_chart(named: 'list[tuple[str, FloatArray, tuple[Cycles, ...]]]', unit: str,
+                key: str = 'cycles', remark: str = '') -> Section | None:
+    """
+    Return the bar chart of errors per cycle, or None if no run has cycles.
+
+    Parameters
+    ----------
+    named : list of (title, ndarray, tuple of Cycles)
+        The RMSE of every cycle of a run, and the parts of the experiment they belong to.
+    unit : str
+        Of the RMSE.
+    key, remark : str
+        As of ``cycles``.
+
+    """
+    tracked = [one for one in named if len(one[1])]
     if not tracked:
         return None
-    longest = max((m for _, m in tracked), key=lambda m: len(m.cycle_rmse_m))
-    frequencies = [hz for hz, values in by_part(longest.cycle_rmse_m, longest.cycle_parts)
-                   for _ in values]
+    _, longest, parts = max(tracked, key=lambda one: len(one[1]))
+    frequencies = [hz for hz, values in by_part(longest, parts) for _ in values]
     labels = [f'{k} ({hz})' if hz else str(k) for k, hz in enumerate(frequencies, 1)]
-    groups = [(name, m.cycle_rmse_m * 1e3, ROLES[k % len(ROLES)])
-              for k, (name, m) in enumerate(tracked)]
-    figure = figures.bars(labels, groups, 'cycle', 'tracking RMSE [mm]')
+    groups = [(name, values, ROLES[k % len(ROLES)])
+              for k, (name, values, _) in enumerate(tracked)]
+    figure = figures.bars(labels, groups, 'cycle', f'tracking RMSE [{unit}]')
     body = (paragraph(remark) if remark else '') + plot(figure)
     return Section(key, 'Tracking error per cycle', body)

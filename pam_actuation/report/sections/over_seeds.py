@@ -15,6 +15,7 @@
 """Figures of the same experiment with several seeds: mean and standard deviation."""
 
 from collections.abc import Sequence
+import math
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
@@ -25,18 +26,24 @@ from pam_sim.located_yaml import load_yaml
 from pam_sim.run import MEASURED_TOPICS
 
 if TYPE_CHECKING:
+    from pam_actuation.report.joint_page import JointMetrics
     from pam_actuation.report.metrics import RunMetrics
     from pam_sim.run import Run
 
-    Measured = tuple[str, Run, RunMetrics]
+    Measured = tuple[str, Run, RunMetrics | JointMetrics]
 
 _SAME = ('experiment', 'experiment_name', 'rig', 'valve', 'controller', 'preview_s')
+_MEASURED = (*MEASURED_TOPICS, 'joint_state')      # of a joint in the place of each muscle
 _FIGURES = (
     ('Tracking RMSE', 'tracking_rmse_m', 1e3, 'mm'), ('Largest error', 'max_error_m', 1e3, 'mm'),
     ('Force tracking RMSE', 'tracking_rmse_n', 1.0, 'N'),
     ('Largest force error', 'max_error_n', 1.0, 'N'),
     ('RMSE of each cycle', 'cycle_rmse_m', 1e3, 'mm'),
     ('Force RMSE of each cycle', 'cycle_rmse_n', 1.0, 'N'),
+    ('Tracking RMSE', 'tracking_rmse_rad', math.degrees(1.0), '°'),
+    ('Largest error', 'max_error_rad', math.degrees(1.0), '°'),
+    ('RMSE of each cycle', 'cycle_rmse_rad', math.degrees(1.0), '°'),
+    ('Mean pressure of both muscles', 'co_contraction_pa', 1e-3, 'kPa'),
     ('Settling of each step', 'settling_s', 1.0, 's'),
     ('Total variation of the command', 'command_variation_pa_per_s', 1e-3, 'kPa/s'))
 
@@ -47,7 +54,7 @@ def over_seeds(measured: 'Sequence[Measured]') -> dict[str, dict[str, Any]]:
 
     Parameters
     ----------
-    measured : sequence of (title, Run, RunMetrics)
+    measured : sequence of (title, Run, RunMetrics or JointMetrics)
         Runs of the same experiment, rig and controller belong together. Those whose rules
         learn are apart from those whose learning is frozen.
 
@@ -73,7 +80,7 @@ def over_seeds(measured: 'Sequence[Measured]') -> dict[str, dict[str, Any]]:
         found[f'{_kind(runs[0][1])}: {", ".join(titles)}'] = {
             'runs': titles, 'seeds': seeds, 'same': _measured_the_same([r for _, r, _ in runs]),
             **{name: spread for _, name, _, _ in _FIGURES
-               if (spread := _spread([one[name] for one in figures])) is not None}}
+               if (spread := _spread([one.get(name) for one in figures])) is not None}}
     return found
 
 
@@ -87,8 +94,8 @@ def same_remarks(found: dict[str, dict[str, Any]]) -> list[str]:
 
 def _measured_the_same(runs: 'Sequence[Run]') -> bool:
     """Return whether runs have the same values of all that was measured."""
-    first, *others = [{name: run[name].values for name in MEASURED_TOPICS if name in run}
-                      for run in runs]
+    first, *others = [{topic: series.values for topic, series in run.topics.items()
+                       if topic.rpartition('/')[2] in _MEASURED} for run in runs]
     return bool(first) and all(
         one.keys() == first.keys() and all(
             one[topic].keys() == values.keys() and all(

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 ROLES = ('measured', 'second', 'green', 'command', 'after')
 MOST_POINTS = 1600           # of a trace
+Read = Callable[..., tuple[FloatArray, FloatArray] | None]
 _DASHES = (None, 'dash', 'dot')      # once the colours are used up
 
 
@@ -43,12 +44,16 @@ def overlaid(named: 'list[tuple[str, Run]]') -> Section | None:
     """
     if len(named) < 2:
         return None
-    rows = [('contraction [mm]', _lines(named, _topic('contraction', 1e3))
-             + _reference(named[0][1])),
-            ('tracking error [mm]', _lines(named, _error)),
-            ('pressure [kPa gauge]',
-             _lines(named, _topic('pressure', 1e-3, P_ATM_PA))),
-            ('force [N]', _lines(named, _topic('force', 1.0)))]
+    return together([
+        ('contraction [mm]', lines(named, read_topic('contraction', 1e3))
+         + _reference(named[0][1])),
+        ('tracking error [mm]', lines(named, _error)),
+        ('pressure [kPa gauge]', lines(named, read_topic('pressure', 1e-3, P_ATM_PA))),
+        ('force [N]', lines(named, read_topic('force', 1.0)))])
+
+
+def together(rows: list[tuple[str, list[dict[str, Any]]]]) -> Section | None:
+    """Return the section of rows (axis, traces of all runs); None where all are empty."""
     rows = [(label, traces) for label, traces in rows if traces]
     if not rows:
         return None
@@ -59,7 +64,8 @@ def overlaid(named: 'list[tuple[str, Run]]') -> Section | None:
         'Drag to zoom, all rows follow; click a name to hide that run.'))
 
 
-def _lines(named: 'list[tuple[str, Run]]', read: Callable[..., Any]) -> list[dict[str, Any]]:
+def lines(named: 'list[tuple[str, Run]]', read: Read) -> list[dict[str, Any]]:
+    """Return a trace of each (title, run) for which ``read`` gives (time_s, value)."""
     traces = []
     for k, (title, run) in enumerate(named):
         pair = read(run)
@@ -71,9 +77,10 @@ def _lines(named: 'list[tuple[str, Run]]', read: Callable[..., Any]) -> list[dic
     return traces
 
 
-def _topic(topic: str, factor: float, offset: float = 0.0) -> Callable[..., Any]:
+def read_topic(topic: str, factor: float, offset: float = 0.0, field: str | None = None) -> Read:
+    """Return what reads (time_s, value) of a topic: its field less an offset, times a factor."""
     def read(run: 'Run') -> tuple[FloatArray, FloatArray] | None:
-        pair = signals.series(run, topic)
+        pair = signals.series(run, topic, field)
         return None if pair is None else (pair[0], (pair[1] - offset) * factor)
     return read
 
