@@ -21,8 +21,9 @@ the prediction of ``hsv_model`` over the openings under way.
 Once the predicted error is inside the fine band, the valves rest with both duties exactly 0. They
 rest until it leaves the set-point band, so that sensor noise does not start them. Where less is
 wanted than the shortest possible pulse does, both valves open in the same period and the
-difference of their pulses is the dose (``hsv_pulses``). Where that would take pulses too long, at
-low pressure, an error below a part of the shortest pulse's effect is left alone.
+difference of their pulses is the dose (``hsv_pulses``). Where that would take openings or duties
+above ``LONGEST_OF_A_PAIR``, an error below a part of the shortest pulse's effect is left alone.
+That is at low pressure, and sooner for valves that open later than they shut.
 """
 
 from collections.abc import Callable
@@ -144,7 +145,8 @@ def _wanted_openings(state: np.record, par: np.record, p_pa: float, volume_m3: f
                 full if filling else other, other if filling else full,
                 learned_opening(state, shortest, True), learned_opening(state, shortest, False))
             fill, vent = sheet_opening(state, fill, True), sheet_opening(state, vent, False)
-            if max(fill, vent) <= LONGEST_OF_A_PAIR:
+            # An output refuses longer pulses, and a pulse may be longer than its opening.
+            if max(fill, vent, _duty(par, fill), _duty(par, vent)) <= LONGEST_OF_A_PAIR:
                 return fill, vent
     if abs(error) < par.rest_share * least * full:
         return 0.0, 0.0

@@ -21,9 +21,11 @@ from pathlib import Path
 import numba
 import numpy as np
 from pam_actuation.drivers import hsv_kernel as kernel, hsv_pulses as pulses
+from pam_actuation.drivers.config import DriverConfig
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.drivers.hsv import HsvLaw, initial_state
 from pam_actuation.drivers.hsv_config import HsvConfig, PARAMETERS
+from pam_actuation.hardware.dummy import DummyValve
 import pam_sim
 from pam_sim.effects import valve_dead_zone
 from pam_sim.errors import InputError
@@ -222,6 +224,19 @@ def test_small_steps_of_the_command(rig, fidelity):
         assert np.mean(duties[300:].max(axis=1) == 0.0) > 0.5
     assert away[400.0] < 0.35
     assert away[400.0] < 0.6 * away[0.0]
+
+
+def test_valves_that_open_late_keep_the_limit_of_the_outputs(rig):
+    """Their pulses are longer than their openings; a device vents and latches above the limit."""
+    effects = [{'name': item.name, 'parameters': {'open_time_s': 3.5e-3, 'close_time_s': 2.5e-3}
+                if item.name == 'valve_dead_zone' else item.parameters} for item in rig.effects]
+    p, c, duties = run(rig.with_(effects=effects), lambda t: 300.0 + 30.0 * t, 6.0)
+    device = DummyValve({}, DriverConfig())
+    for duty in duties:
+        device.write(tuple(duty))
+    together = duties[duties.min(axis=1) > 0.0]
+    assert len(together) > 10 and together.max() <= pulses.LONGEST_OF_A_PAIR
+    assert np.abs(p - c)[1000:].mean() < 3.0
 
 
 @pytest.mark.parametrize('delay_s', [0.020, 0.045])
