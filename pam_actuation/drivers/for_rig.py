@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from pam_actuation.drivers.config import DriverConfig
-from pam_actuation.drivers.hsv_config import HsvConfig
+from pam_actuation.drivers.hsv_config import check_pulses, HsvConfig
 from pam_actuation.drivers.loop import DriverLoop
 from pam_actuation.drivers.parameter import declared_numbers
 from pam_actuation.drivers.ppr import PprConfig
@@ -71,7 +71,7 @@ def driver_config(rig: 'Rig', changes: Mapping[str, object] | None = None,
     ------
     InputError
         For an unknown or impossible parameter in ``changes``, or a number of the rig that the
-        driver does not take.
+        driver does not take, such as a PWM period too short for the valves.
 
     """
     values = rig.parameters
@@ -91,8 +91,15 @@ def driver_config(rig: 'Rig', changes: Mapping[str, object] | None = None,
     told['hsv.gain'] = _GAIN + (_GAIN_AT_ONCE - _GAIN) * max(0.0, 1.0 - dead_time_s / 0.02)
     _check_told(rig, told)
     told.update(_load(rig))
-    config = DriverConfig.from_parameters(told, where=f'rig {rig.name}')
-    return DriverConfig.from_parameters(changes, config, where)
+    place = f'rig {rig.name}'
+    of_rig = DriverConfig.from_parameters(told, where=place)
+    config = DriverConfig.from_parameters(changes, of_rig, where)
+    if rig.valve == 'hsv':
+        if config.hsv.period_s == of_rig.hsv.period_s:
+            check_pulses(config.hsv, place, _AS_STATED['hsv.period_s'])
+        else:
+            check_pulses(config.hsv, where)
+    return config
 
 
 def _check_told(rig: 'Rig', told: dict[str, float]) -> None:

@@ -34,6 +34,7 @@ from pam_sim.valve import hsv
 SENT_SIZE = 32                        # periods a command may be under way
 _RIG = check_parameters(hsv.PARAMETERS, {})
 _SPAN_PA = 600_000.0
+_LONGEST_PERIOD_S = 0.01
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,8 @@ class HsvConfig:
     ``correct_by_contraction`` switch on what ``hsv_learned`` and ``hsv_motion`` do.
     """
 
-    period_s: float = number(_RIG['pwm_period_s'], 0.002, 0.01, 'PWM period')
+    period_s: float = number(
+        _RIG['pwm_period_s'], 0.002, _LONGEST_PERIOD_S, 'PWM period')
     conductance_m3_per_s_pa: float = number(_RIG['C'], 1e-12, 1e-7, 'sonic conductance of a valve')
     critical_ratio: float = number(_RIG['b'], 0.0, 0.8, 'critical pressure ratio of a valve')
     supply_pa: float = number(_RIG['supply_pa'], 1.1e5, 2e6, 'nominal supply pressure, absolute')
@@ -118,6 +120,38 @@ class HsvConfig:
                              f'{longest_s:.2f} s', 'dead_time_s')
         derived = {name: function(self) for name, function in _DERIVED.items()}
         return values_of(PARAMETERS, {**asdict(self), **derived})
+
+
+def check_pulses(config: HsvConfig, where: str, period: str = 'hsv.period_s') -> None:
+    """
+    Refuse a PWM period in which no pulse opens a valve and lets it shut again.
+
+    Parameters
+    ----------
+    config : HsvConfig
+        Period, opening and closing time, and what a pulse is longer than the opening time.
+    where : str
+        Place of the period for the error text.
+    period : str
+        Name by which it is stated.
+
+    Raises
+    ------
+    InputError
+        With the period, those that are allowed, and what to change.
+
+    """
+    least_s = config.open_time_s + config.pulse_margin_s + config.close_time_s
+    if config.period_s > least_s:
+        return
+    remedy = (f'allowed are above {least_s:.4g} to {_LONGEST_PERIOD_S:g} s: state a longer period'
+              if least_s < _LONGEST_PERIOD_S else
+              f'it would have to be above {least_s:.4g} s, and the longest allowed is '
+              f'{_LONGEST_PERIOD_S:g} s: take valves that switch faster')
+    raise InputError(
+        f'`{period}` is {config.period_s:g} s, in which valves that open in '
+        f'{config.open_time_s:g} s and shut in {config.close_time_s:g} s, with a margin of '
+        f'{config.pulse_margin_s:g} s, give no short pulse; {remedy}', where)
 
 
 def _volume_curve(config: HsvConfig) -> float:

@@ -35,7 +35,7 @@ def duty_of_opening(opening: float, open_part: float, close_part: float, margin:
     if opening > 0.5 * (1.0 + longest - open_part + close_part):
         return 1.0
     duty = opening + open_part - close_part
-    return min(max(duty, open_part + margin), longest)
+    return max(min(max(duty, open_part + margin), longest), 0.0)
 
 
 @compiled

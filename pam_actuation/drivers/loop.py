@@ -27,6 +27,7 @@ from typing import Any
 from pam_actuation.drivers.config import check_valve_type, DriverConfig
 from pam_actuation.drivers.decision import Decision
 from pam_actuation.drivers.hsv import HsvLaw
+from pam_actuation.drivers.hsv_config import check_pulses
 from pam_actuation.drivers.monitors import MOST_RESTARTS, Relapses, RELAPSES_WITHIN_S
 from pam_actuation.drivers.not_emptied import NotEmptiedMonitor, OPEN_DUTY
 from pam_actuation.drivers.ppr import PprLaw
@@ -55,7 +56,7 @@ class DriverLoop:
     Raises
     ------
     InputError
-        For an unknown valve type or parameter.
+        For an unknown valve type or parameter, or a PWM period too short for the valves.
 
     """
 
@@ -67,6 +68,8 @@ class DriverLoop:
             config = DriverConfig.from_parameters(config or {})
         self.config = config
         self.is_hsv = valve_type == 'hsv'
+        if self.is_hsv:
+            check_pulses(config.hsv, 'parameter')
         self._names = VALVE_NAMES[valve_type]
         self.period_s = config.hsv.period_s if self.is_hsv else config.ppr.period_s
         lag_s, dead_time_s = self._lag()

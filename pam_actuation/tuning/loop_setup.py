@@ -22,6 +22,7 @@ import numpy as np
 from pam_actuation.drivers import hsv_kernel, ppr
 from pam_actuation.drivers.config import DriverConfig
 from pam_actuation.drivers.hsv import initial_state
+from pam_actuation.drivers.hsv_config import check_pulses
 from pam_actuation.slow_rise import LONGEST_STEP_S
 from pam_actuation.tuning.loop_parts import Driver, READINGS, RISE
 from pam_sim.annotations import FloatArray
@@ -139,7 +140,7 @@ class DriverLaw:
         Raises
         ------
         InputError
-            The period of a pair of valves is no whole number of ticks.
+            The period of a pair of valves is no whole number of ticks, or too short for them.
 
         """
         config = DriverConfig.from_parameters(asked, self._config) if asked else self._config
@@ -153,4 +154,5 @@ class DriverLaw:
                 f'the driver acts every {period_s:g} s; a rollout needs a whole number of the '
                 f"controller's ticks in that, not of {self._tick_s:g} s; allowed rates are "
                 f'{_rates_for(period_s)}', _PERIOD)
+        check_pulses(config.hsv, 'parameter')
         return (initial_state(), config.hsv.par(), zeros(hsv_kernel.OUTPUT)), every

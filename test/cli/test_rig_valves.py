@@ -82,3 +82,18 @@ def test_a_period_of_pulses_that_the_driver_does_not_take_is_told(capsys):
     assert driver_config(rig.with_(valve='ppr')).hsv.period_s == 0.01
     new('--valve', 'hsv', '--known', 'pwm_period_s=0.004', '--overwrite')
     assert 'the valve driver takes' not in capsys.readouterr().out
+
+
+def test_a_period_of_pulses_too_short_for_the_valves_is_told(capsys):
+    """Every pulse was swallowed up to an opening of 65 %, then the valve stayed open."""
+    switching = ('valve_dead_zone.open_time_s=0.0035', 'valve_dead_zone.close_time_s=0.0025')
+    rig = new('--valve', 'hsv', '--known', 'pwm_period_s=0.005', *switching)
+    told = ('`pwm_period_s` is 0.005 s, in which valves that open in 0.0035 s and shut '
+            'in 0.0025 s, with a margin of 0.0001 s, give no short pulse; allowed are above '
+            '0.0061 to 0.01 s: state a longer period')
+    assert f'{told}. So pam simulate' in capsys.readouterr().out
+    assert main(['simulate', 'short_sine', '--rig', 'made.yaml', '--out', 'bag']) == 2
+    assert f'rig made: {told}' in capsys.readouterr().err
+    assert driver_config(rig.with_(valve='ppr')).hsv.period_s == 0.005
+    new('--valve', 'hsv', '--known', 'pwm_period_s=0.0065', *switching, '--overwrite')
+    assert 'no short pulse' not in capsys.readouterr().out

@@ -325,6 +325,8 @@ def test_safe_signal():
     ('xyz', None, "unknown valve type 'xyz', choose ppr or hsv"),
     ('hsv', {'hsv.dead_tme_s': 0.03}, 'did you mean `hsv.dead_time_s`'),
     ('hsv', {'hsv.gain': 3.0}, '`hsv.gain` is 3; allowed 0.05 to 1'),
+    ('hsv', {'hsv.period_s': 0.002},
+     '`hsv.period_s` is 0.002 s, in which valves .* allowed are above 0.0038 to 0.01 s'),
     ('ppr', {'max_pressure_gauge_pa': 'high'},
      'must be a number, not .high.; allowed 1000 to 1e.06 Pa gauge'),
     ('ppr', {'max_pressure_gauge_pa': math.nan}, 'is nan; allowed 1000 to'),

@@ -16,7 +16,9 @@
 """What a driver is told of a rig does not depend on the formulation of an effect."""
 
 from pam_actuation.drivers.for_rig import driver_config
+from pam_actuation.drivers.hsv_pulses import duty_of_opening
 from pam_sim import load_rig
+from pam_sim.errors import InputError
 import pytest
 
 SWITCHING = {'open_time_s': 3.5e-3, 'close_time_s': 2.5e-3}
@@ -44,3 +46,29 @@ def test_a_dead_time_by_direction_reaches_the_driver_of_a_regulator_as_its_mean(
     # It acts on no pair of valves, so their driver has nothing to wait for.
     pair = rig.with_(valve='hsv', effects=[by_direction])
     assert driver_config(pair).hsv == driver_config(pair.with_(effects=[])).hsv
+
+
+@pytest.mark.parametrize('changes, words', [
+    ({'hsv.period_s': 0.004}, (
+        'parameter: `hsv.period_s` is 0.004 s, in which valves that open in 0.0035 s and shut in '
+        '0.0025 s, with a margin of 0.0001 s, give no short pulse; allowed are above 0.0061 to '
+        '0.01 s: state a longer period')),
+    ({'hsv.open_time_s': 0.009}, (
+        'rig dmsp_20_300_hanging_mass: `pwm_period_s` is 0.01 s, in which valves that open in '
+        '0.009 s and shut in 0.0025 s, with a margin of 0.0001 s, give no short pulse; it would '
+        'have to be above 0.0116 s, and the longest allowed is 0.01 s: take valves that switch '
+        'faster'))])
+def test_a_period_in_which_the_valves_cannot_open_and_shut_is_refused(changes, words):
+    dead_zone = {'name': 'valve_dead_zone', 'parameters': SWITCHING}
+    rig = load_rig('dmsp_20_300_hanging_mass', valve='hsv').with_(effects=[dead_zone])
+    with pytest.raises(InputError) as refused:
+        driver_config(rig, changes)
+    assert str(refused.value) == words
+    # Behind a regulator it does not matter.
+    driver_config(rig.with_(valve='ppr'), changes)
+
+
+def test_no_duty_is_below_0():
+    """A period of 2 ms and a closing time of 2.3 ms gave -0.15."""
+    for opening in (0.01, 0.3, 0.6, 1.0):
+        assert 0.0 <= duty_of_opening(opening, 0.2, 1.15, 0.05) <= 1.0
