@@ -17,8 +17,9 @@ Driver law of a proportional pressure regulator (PPR): pressure to volts.
 
 The regulator closes its own pressure loop, with a static gain ``K_m`` of 100 kPa/V in the nominal
 rig. The law is therefore its static inverse, clipped to the input range and optionally limited in
-slew. ``ppr_step`` is the compiled form; it shares its signature with ``hsv_step`` so that a
-closed-loop rollout can hold either.
+slew. A command of the atmosphere is never limited: a controller vents by it, also at a fault.
+``ppr_step`` is the compiled form; it shares its signature with ``hsv_step`` so that a closed-loop
+rollout can hold either.
 """
 
 from collections.abc import Mapping
@@ -64,7 +65,8 @@ def _step(state: np.record, par: np.record, p_cmd_pa: float, out: np.record) -> 
     elif wanted < par.lowest_v:
         out.saturated = -1.0
     out.slew_limited = 0.0
-    if state.known > 0.5 and abs(volts - state.sent_v) > par.largest_change_v:
+    vents = p_cmd_pa <= P_ATM_PA        # never slowly: a fault may be the reason
+    if not vents and state.known > 0.5 and abs(volts - state.sent_v) > par.largest_change_v:
         volts = state.sent_v + math.copysign(par.largest_change_v, volts - state.sent_v)
         out.slew_limited = 1.0
     state.sent_v = volts
@@ -98,7 +100,8 @@ class PprConfig:
 
     ``gain_pa_per_v`` is K_m [Pa gauge per V]; the input range is ``lowest_v``..``highest_v``;
     ``atmospheric_v`` is the input at which the gauge pressure is 0;
-    ``slew_v_per_s`` limits the change (0 = no limit); ``period_s`` is the time between two steps;
+    ``slew_v_per_s`` limits the change, but for a command of the atmosphere (0 = no limit);
+    ``period_s`` is the time between two steps;
     ``time_constant_s`` is the lag of the regulator and ``dead_time_s`` its pure delay. They serve
     only to judge whether a pressure reading should have moved, and how far it is behind during the
     slow rise.
@@ -110,7 +113,8 @@ class PprConfig:
     atmospheric_v: float = number(
         0.0, -10.0, 10.0, 'input at which the gauge pressure of the regulator is 0')
     highest_v: float = number(MAX_VOLTAGE_V, 0.1, 24.0, 'highest input of the regulator')
-    slew_v_per_s: float = number(0.0, 0.0, 1e6, 'limit of the input change, 0 = none')
+    slew_v_per_s: float = number(
+        0.0, 0.0, 1e6, 'limit of the input change, but for a command of the atmosphere; 0 = none')
     period_s: float = number(0.005, 0.001, 0.01, 'time between two signals')
     time_constant_s: float = number(_RIG['T_m'], 0.001, 10.0, 'lag of the regulator')
     dead_time_s: float = number(0.030, 0.0, 1.0, 'time from voltage to pressure')

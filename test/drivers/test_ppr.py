@@ -55,6 +55,18 @@ def test_slew_limit():
     assert volts[28] < 3.0 - 1e-6 and volts[30] == pytest.approx(3.0) and max(volts) <= 3.0 + 1e-12
 
 
+def test_a_command_of_the_atmosphere_is_not_slow():
+    """A controller vents by it, also for a fault; it took 5 s from 500 kPa."""
+    law = PprLaw(PprConfig(slew_v_per_s=1.0))
+    law.step(P_ATM_PA + 500e3)
+    assert law.step(P_ATM_PA + 100e3) == pytest.approx(4.995)      # a fall is limited
+    assert law.step(P_ATM_PA) == 0.0
+    assert law.step(P_ATM_PA + 500e3) == pytest.approx(0.005)
+    law = PprLaw(PprConfig(slew_v_per_s=1.0, lowest_v=1.0, atmospheric_v=1.0))
+    law.step(P_ATM_PA + 300e3)
+    assert law.step(P_ATM_PA - 1.0, 0.01) == 1.0
+
+
 def test_forced_signal_is_where_the_slew_limit_starts():
     """After venting the limit counts from 0 V."""
     law = PprLaw(PprConfig(slew_v_per_s=20.0))
