@@ -24,6 +24,7 @@ from pam_sim.joint.statics import static_angle
 from pam_sim.records import fields, values_of, zeros
 from pam_sim.rollout import layout as muscle
 from pam_sim.rollout.kernel import refuse_terms
+from pam_sim.rollout.packing import damping_of_effects
 from pam_sim.units import P_ATM_PA
 
 if TYPE_CHECKING:
@@ -106,7 +107,7 @@ def _substeps(joint: 'JointRig', dt_s: float) -> int:
                      (value['extensor_radius_m'], joint.extensor)):
         number = rig.parameters
         stiffness += arm * arm * number['force_map_gain'] * rig.muscle.stiffness_n_per_m
-        damping += arm * arm * number['damping_n_s_per_m']
+        damping += arm * arm * (number['damping_n_s_per_m'] + damping_of_effects(rig))
     inertia = value['inertia_kg_m2']
     count = max(1, math.ceil(dt_s * math.sqrt(stiffness / inertia) / _STEP_PER_PERIOD),
                 math.ceil(dt_s * damping / inertia / _STEP_PER_DECAY))

@@ -43,6 +43,7 @@ if TYPE_CHECKING:
 _LAW_CODES, _LOAD_CODES = law_codes(), load_codes()
 _RT_J_PER_KG = GAS_CONSTANT_AIR * TEMPERATURE_K
 _DENSITY_FACTOR = math.sqrt(T_REFERENCE_K / TEMPERATURE_K)
+_DAMPING = 'N s/m'          # unit of the numbers of effects that damp the motion
 
 
 def pack_rig(rig: 'Rig', dt_s: float, initial_pressure_pa: float,
@@ -114,6 +115,12 @@ def _numbers(rig: 'Rig', dt_s: float, pressure: float, contraction: float | None
         float(pressure), float(contraction), rig.force_at_start_n(contraction), rig.muscle)
 
 
+def damping_of_effects(rig: 'Rig') -> float:
+    """Return the most damping [N s/m] that the effects of a rig add to the nominal one."""
+    return sum(max(setting.parameters[number.name], 0.0) for setting in rig.effects
+               for number in all_effects()[setting.name].parameters if number.unit == _DAMPING)
+
+
 def _substep(rig: 'Rig', dt_s: float) -> float:
     """Return the physics step: 0.1 ms when switching, shorter where something is faster."""
     value = rig.parameters
@@ -123,7 +130,8 @@ def _substep(rig: 'Rig', dt_s: float) -> float:
         of_load, damping = (steepest(load, value, rig.muscle.stroke_m) if has_force(load)
                             else (value['spring_n_per_m'], 0.0))
         stiffness = value['force_map_gain'] * rig.muscle.stiffness_n_per_m + of_load
-        fastest = max((value['damping_n_s_per_m'] + damping) / value['mass_kg'],
+        damping += value['damping_n_s_per_m'] + damping_of_effects(rig)
+        fastest = max(damping / value['mass_kg'],
                       2.0 * math.sqrt(stiffness / value['mass_kg']))
     if rig.valve == 'ppr':
         return dt_s / max(1, math.ceil(dt_s * max(fastest, 1.0 / value['T_m'])))

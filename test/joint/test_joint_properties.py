@@ -190,3 +190,15 @@ def test_a_light_limb_takes_several_coupling_steps(level, inertia, substeps):
     assert substeps <= count <= 2 * substeps
     assert np.max(np.abs(coarse.angle_rad - fine.angle_rad[::2])) < 1e-3 * np.ptp(fine.angle_rad)
     assert coarse.flexor.time_s[-1] == coarse.time_s[-1] == pytest.approx(0.3)
+
+
+def test_strong_damping_takes_coupling_steps_as_a_number_and_as_an_effect(level):
+    light = level.with_({'limb_mass_kg': 0.0, 'inertia_kg_m2': 1e-3})
+    as_effect = with_effects(light, [
+        {'name': 'viscous_damping', 'parameters': {'damping_n_s_per_m': 1000.0}}])
+    of_muscle = {'damping_n_s_per_m': 1000.0 + light.flexor.parameters['damping_n_s_per_m']}
+    as_number = light.with_(flexor=light.flexor.with_(of_muscle),
+                            extensor=light.extensor.with_(of_muscle))
+    nominal, *counts = (fields(one.plant().par, PARAMETERS).substeps
+                        for one in (light, as_effect, as_number))
+    assert counts[0] == counts[1] > nominal

@@ -134,6 +134,24 @@ def test_a_damper_that_yields_at_speed(damping):
     assert np.allclose(fast.force_n, linear.force_n, atol=2e-4)
 
 
+@pytest.mark.parametrize('name, more', [
+    ('viscous_damping', {}), ('viscous_damping_thinning', {'speed_m_per_s': 100.0})])
+@pytest.mark.parametrize('mass_kg, damping', [(0.2, 1000.0), (0.1, 250.0)])
+def test_strong_damping_of_a_light_load_is_the_parameter_by_another_name(
+        name, more, mass_kg, damping):
+    """The step was too long for it: the velocity grew and alternated between the stops."""
+    rig = load_rig('dmsp_5_300_hanging_mass').with_({'mass_kg': mass_kg})
+    signal = np.repeat([1.5, 2.5, 1.8], 500)
+    start = {'initial_pressure_pa': P_ATM_PA + 150e3}
+    as_effect = rig.with_(effects=[
+        {'name': name, 'parameters': {'damping_n_s_per_m': damping, **more}}]).simulate(
+            signal, **start)
+    as_number = rig.with_({'damping_n_s_per_m': 25.0 + damping}).simulate(signal, **start)
+    for quantity in ('contraction_m', 'velocity_m_per_s'):
+        one, other = getattr(as_effect, quantity), getattr(as_number, quantity)
+        assert np.abs(one - other).max() < 0.02 * np.ptp(other), quantity
+
+
 def test_thermal_softening_loses_force_with_work():
     effect = ('thermal_softening', {'gain_loss_at_20mm_per_s': 0.05, 'time_constant_s': 2.0})
     response, nominal = driven(effect), driven()
