@@ -50,7 +50,7 @@ def _is_file_name(name: object) -> bool:
 
 
 def listed_files(path: Path, facts: Mapping[str, Any]) -> list[Path]:
-    """Return the data files that metadata.yaml lists."""
+    """Return the data files that metadata.yaml lists; InputError where one is missing."""
     files = []
     for name in facts['relative_file_paths']:
         # Version 3 and older repeat the directory's name in front of the file's.
@@ -58,7 +58,8 @@ def listed_files(path: Path, facts: Mapping[str, Any]) -> list[Path]:
         found = [candidate for candidate in candidates if candidate.is_file()]
         if not found:
             raise InputError(
-                f'the file {name} named in {layout.METADATA_FILE} is missing', path)
+                f'the file {name} named in {layout.METADATA_FILE} is missing; copy it here, or '
+                f'remove {layout.METADATA_FILE} to read the files that are here', path)
         files.append(found[0])
     return files
 

@@ -32,7 +32,9 @@ _MESSAGE_HEAD = struct.Struct('<HIQQ')
 LARGEST_CHUNK_BYTES = 2**30
 # Opcode, content, and the unpacked records of a chunk.
 Found = tuple[int, bytes, bytes | None]
-_TAKEN = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE, Opcode.METADATA)
+_TAKEN = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE, Opcode.METADATA, Opcode.ATTACHMENT)
+# Opcodes from here on are those of applications; no MCAP reader knows what they hold.
+PRIVATE_OPCODE = 0x80
 
 
 class Walk:
@@ -72,15 +74,13 @@ class Walk:
             if opcode in (Opcode.DATA_END, Opcode.FOOTER):
                 self.finished = data[size - len(MAGIC):size] == MAGIC
                 return
-            if end > size or not 1 <= opcode <= 15:
+            if end > size or not (1 <= opcode <= 15 or opcode >= PRIVATE_OPCODE):
                 self._lost_from(position)
                 return
             if opcode == Opcode.CHUNK:
                 yield from self._chunk(data[begin:end], end == size)
-            elif opcode in _TAKEN:
+            elif opcode in _TAKEN or opcode >= PRIVATE_OPCODE:
                 yield from self._single(opcode, data[begin:end])
-            elif opcode == Opcode.ATTACHMENT:
-                self.lose(data[begin:end])  # nothing of ours has them: the former file is kept
             position = end
 
     def _lost_from(self, position: int) -> None:

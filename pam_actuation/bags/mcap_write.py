@@ -31,8 +31,8 @@ from mcap.data_stream import ReadDataStream, RecordBuilder
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import (
-    Channel, ChunkIndex, DataEnd, Footer, Header, Metadata, MetadataIndex, Schema, Statistics,
-    SummaryOffset)
+    Attachment, AttachmentIndex, Channel, ChunkIndex, DataEnd, Footer, Header, Metadata,
+    MetadataIndex, Schema, Statistics, SummaryOffset)
 import numpy as np
 from pam_actuation.bags import disk
 from pam_sim.annotations import ByteArray, IntArray
@@ -110,6 +110,7 @@ class McapWriter:
         self._chunk_index: BinaryIO = io.BytesIO() if index is None else index
         self._chunk_index_bytes = self._chunk_count = 0
         self._metadata: list[MetadataIndex] = []
+        self._attachments: list[AttachmentIndex] = []
         self._start_ns: int | None = None
         self._end_ns: int | None = None
         self._begin_chunk()
@@ -265,6 +266,30 @@ class McapWriter:
             self._append(RECORD.pack(opcode, len(content)) + content)
         return readable
 
+    def copy_attachment(self, content: bytes) -> bool:
+        """Append an attachment of another file; return False for one that is damaged."""
+        stream = ReadDataStream(io.BytesIO(content))
+        try:
+            attachment = Attachment.read(stream)
+        except (McapError, ValueError, OverflowError, struct.error):
+            return False
+        crc = int.from_bytes(content[-4:], 'little')
+        if stream.count != len(content) or crc and zlib.crc32(content[:-4]) != crc:
+            return False
+        offset = self.copy_private(Opcode.ATTACHMENT, content)
+        self._attachments.append(AttachmentIndex(
+            offset=offset, length=self.offset - offset, log_time=attachment.log_time,
+            create_time=attachment.create_time, data_size=len(attachment.data),
+            name=attachment.name, media_type=attachment.media_type))
+        return True
+
+    def copy_private(self, opcode: int, content: bytes) -> int:
+        """Append a record of another file that only its writer knows; return its offset."""
+        self.close_chunk()
+        offset = self.offset
+        self._write(RECORD.pack(opcode, len(content)) + content)
+        return offset
+
     def _write_chunk(self, content: bytes, index: Mapping[int, list[int]]) -> None:
         chunk = RECORD.pack(Opcode.CHUNK, len(content)) + content
         start_ns, end_ns, size, _ = CHUNK_HEAD.unpack_from(content)
@@ -327,6 +352,7 @@ class McapWriter:
                 (Opcode.CHANNEL, _all_bytes(self._channels.values())),
                 (Opcode.STATISTICS, _bytes(self._statistics())),
                 (Opcode.CHUNK_INDEX, self._all_chunks()),
+                (Opcode.ATTACHMENT_INDEX, _all_bytes(self._attachments)),
                 (Opcode.METADATA_INDEX, _all_bytes(self._metadata))):
             if group:
                 offsets += _bytes(SummaryOffset(
@@ -347,7 +373,7 @@ class McapWriter:
 
     def _statistics(self) -> Statistics:
         return Statistics(
-            attachment_count=0, channel_count=len(self._channels),
+            attachment_count=len(self._attachments), channel_count=len(self._channels),
             channel_message_counts=dict(self._counts), chunk_count=self._chunk_count,
             message_count=sum(self._counts.values()), metadata_count=len(self._metadata),
             message_start_time=self._start_ns or 0, message_end_time=self._end_ns or 0,

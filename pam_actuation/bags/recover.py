@@ -21,7 +21,7 @@ its successor is complete and on the disk.
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 import io
 import mmap
 import os
@@ -36,7 +36,7 @@ from mcap.reader import make_reader
 from mcap.records import Metadata
 from pam_actuation.bags import disk, layout, mcap_salvage
 from pam_actuation.bags.data_file import LIBRARY
-from pam_actuation.bags.directory import by_number, data_files
+from pam_actuation.bags.directory import by_number, data_files, directory_facts, listed_files
 from pam_actuation.bags.mcap_write import MAGIC, McapWriter
 from pam_actuation.bags.metadata import software_version
 from pam_actuation.bags.unpack import SUFFIX
@@ -67,11 +67,17 @@ class RecoveredFile:
 
 @dataclass
 class Recovery:
-    """What ``recover_bag`` did; ``changed`` is False for a bag that was whole."""
+    """
+    What ``recover_bag`` did; ``changed`` is False for a bag that was whole.
+
+    ``unlisted`` are the .mcap files of the folder that metadata.yaml does not list. They stay as
+    they are.
+    """
 
     path: str
     changed: bool
     files: list[RecoveredFile]
+    unlisted: list[str] = field(default_factory=list)
 
     @property
     def messages(self) -> int:
@@ -84,8 +90,11 @@ class Recovery:
 
     def sentences(self) -> list[str]:
         """Return what was done, one sentence per line."""
+        beside = [f'{name} stays as it is: {layout.METADATA_FILE} does not list it. If it is a '
+                  f'part of the recording, remove {layout.METADATA_FILE} and repair the bag again.'
+                  for name in self.unlisted]
         if not self.changed:
-            return ['Nothing to repair: the bag is whole.']
+            return ['Nothing to repair: the bag is whole.', *beside]
         lines = []
         for file in self.files:
             if file.rebuilt:
@@ -93,7 +102,7 @@ class Recovery:
                     f'{file.name}: index rebuilt, {file.messages} messages, '
                     f'{file.unreadable_bytes} bytes were not readable'
                     + (f'; the former file is {file.kept}.' if file.kept else '.'))
-        return lines or [f'{layout.METADATA_FILE} rebuilt.']
+        return [*(lines or [f'{layout.METADATA_FILE} rebuilt.']), *beside]
 
 
 def recover_bag(path: StrPath) -> Recovery:
@@ -103,7 +112,8 @@ def recover_bag(path: StrPath) -> Recovery:
     Parameters
     ----------
     path : path
-        Directory of a bag with MCAP storage, or one .mcap file.
+        Directory of a bag with MCAP storage, or one .mcap file. Of a directory whose
+        metadata.yaml can be read, the files that it lists are the bag.
 
     Returns
     -------
@@ -112,21 +122,19 @@ def recover_bag(path: StrPath) -> Recovery:
     Raises
     ------
     InputError
-        Nothing there, no MCAP file, one that is compressed or still being recorded, or no right or
-        space to write the repaired file.
+        Nothing there, no MCAP file, one that is compressed, still being recorded, or listed and
+        missing, or no right or space to write the repaired file.
 
     """
     path = Path(path)
-    if path.is_dir():
-        files = sorted(path.glob('*.mcap'), key=by_number)
-    else:
-        files = [path] if path.is_file() and path.suffix == '.mcap' else []
+    try:
+        files, unlisted = _files_of(path)
+    except OSError as error:
+        raise InputError(f'cannot be read: {error.strerror or error}', path) from None
     if not files:
         raise InputError('there is no .mcap file to repair here', path)
     try:
-        if path.is_dir():
-            _refuse_packed(path)
-        return _recover(path, files)
+        return _recover(path, files, unlisted)
     except OSError as error:
         raise InputError(
             f'the repaired bag cannot be written ({error.strerror or error}); the recording is '
@@ -143,7 +151,27 @@ def _refuse_packed(path: Path) -> None:
             f'`zstd -d {packed[0]} -o {plain}`', path)
 
 
-def _recover(path: Path, files: Sequence[Path]) -> Recovery:
+def _files_of(path: Path) -> tuple[list[Path], list[str]]:
+    """Return the .mcap files of a bag, and the names of others that lie beside them."""
+    if not path.is_dir():
+        return [path] if path.is_file() and path.suffix == '.mcap' else [], []
+    here = sorted(path.glob('*.mcap'), key=by_number)
+    try:
+        facts = directory_facts(path)
+    except InputError:          # it is no description, and is made anew
+        facts = None
+    if facts is None or not here:
+        _refuse_packed(path)
+        return here, []
+    listed = listed_files(path, facts)
+    for file in listed:
+        if file.suffix != '.mcap' or file.parent != path:
+            raise InputError(f'{layout.METADATA_FILE} lists {file.name}, which is no .mcap file '
+                             'of this folder: it cannot be repaired', path)
+    return listed, [file.name for file in here if file not in listed]
+
+
+def _recover(path: Path, files: Sequence[Path], unlisted: list[str]) -> Recovery:
     contents, done = _Contents(), []
     for file in files:
         done.append(_recover_file(file, contents))
@@ -151,7 +179,7 @@ def _recover(path: Path, files: Sequence[Path]) -> Recovery:
     if path.is_dir() and (changed or _announced(path) != contents.metadata()['message_count']):
         layout.write_metadata(path, contents.metadata())
         changed = True
-    return Recovery(str(path), changed, done)
+    return Recovery(str(path), changed, done, unlisted)
 
 
 def _announced(path: Path) -> object:
@@ -251,6 +279,11 @@ def _copy(
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             if not writer.copy_record(opcode, content):
                 walk.lose(content)
+        elif opcode == Opcode.ATTACHMENT:
+            if not writer.copy_attachment(content):
+                walk.lose(content)
+        elif opcode >= mcap_salvage.PRIVATE_OPCODE:
+            writer.copy_private(opcode, content)
         elif opcode == Opcode.MESSAGE:
             writer.add_message(*mcap_salvage.message(content))
         elif opcode == Opcode.METADATA:

@@ -15,13 +15,17 @@
 """Repairing a recording that broke off: whole again, nothing altered, nothing thrown away."""
 
 import random
+import shutil
 
+from mcap.data_stream import RecordBuilder
 from mcap.reader import make_reader
+from mcap.records import Attachment
 from mcap.writer import CompressionType, IndexType, Writer
 from pam_actuation.bags import disk, recover
 from pam_actuation.bags.check import independent_readers
 from pam_actuation.bags.info import bag_info
 from pam_actuation.bags.load import load_run
+from pam_actuation.bags.mcap_write import McapWriter, RECORD
 from pam_actuation.bags.recover import recover_bag
 from pam_actuation.bags.source import read_bag
 from pam_actuation.bags.writer import BagWriter
@@ -199,12 +203,18 @@ def test_zeros_behind_the_last_chunk_are_an_end_not_damage(tmp_path, whole):
     assert_is_beginning(read_bag(bag), original)
 
 
-def test_a_split_recording_is_repaired_from_all_its_files(tmp_path):
-    writer = BagWriter(tmp_path / 'run', METADATA, max_file_s=0.25)
+def split(directory):
+    """Return the writer of a bag of three files that is not finished."""
+    writer = BagWriter(directory, METADATA, max_file_s=0.25)
     payload = example_payload()
     writer.add_topic('/muscle/pressure', 'sensor_msgs/msg/FluidPressure')
     for i in range(120):
         writer.write('/muscle/pressure', payload, START_NS + i * 5_000_000, START_NS)
+    return writer
+
+
+def test_a_split_recording_is_repaired_from_all_its_files(tmp_path):
+    writer = split(tmp_path / 'run')
     writer.flush()
     writer.abandon()
     names = ['run_0.mcap', 'run_1.mcap', 'run_2.mcap']
@@ -244,6 +254,90 @@ def test_foreign_files_are_indexed_too(tmp_path):
         assert [m.sequence for m in messages] == list(range(200))
         assert messages[7].publish_time == START_NS + 14
         assert messages[7].data == bytes(range(30))
+
+
+def test_a_copy_beside_a_whole_bag_is_no_part_of_it(tmp_path):
+    bag = write_bag(tmp_path / 'run', 20)
+    shutil.copy(bag / 'run_0.mcap', bag / 'run_0_filtered.mcap')
+    before = (bag / 'metadata.yaml').read_bytes()
+    done = recover_bag(bag)
+    assert not done.changed and done.unlisted == ['run_0_filtered.mcap']
+    assert done.sentences()[1].startswith('run_0_filtered.mcap stays as it is: metadata.yaml does')
+    assert (bag / 'metadata.yaml').read_bytes() == before
+    (bag / 'metadata.yaml').unlink()
+    assert len(recover_bag(bag).files) == 2
+
+
+@pytest.mark.parametrize('change, told', [
+    (lambda text: text, 'run_1.mcap named in metadata.yaml is missing; copy it here, or remove'),
+    (lambda text: text.replace('run_1.mcap', '../run_1.mcap'), 'lists run_1.mcap, which is no')])
+def test_a_bag_without_one_of_its_files_is_not_made_whole(tmp_path, change, told):
+    split(tmp_path / 'run').close()
+    (tmp_path / 'run' / 'run_1.mcap').rename(tmp_path / 'run_1.mcap')
+    description = tmp_path / 'run' / 'metadata.yaml'
+    description.write_text(change(description.read_text()))
+    before = description.read_bytes()
+    with pytest.raises(InputError, match=told):
+        recover_bag(tmp_path / 'run')
+    assert description.read_bytes() == before
+
+
+def with_extras():
+    """Return the bytes of a file with an attachment and a record of an application."""
+    pieces, builder = [], RecordBuilder()
+    Attachment(1, START_NS, 'photo.png', 'image/png', bytes(range(200))).write(builder)
+    writer = McapWriter(pieces.append)
+    schema = writer.add_schema('pkg/msg/Odd', 'ros2msg', b'int8 x')
+    channel = writer.add_channel('/odd', schema, {})
+    for i in range(100):
+        if i == 40:
+            writer.copy_private(0x80, b'of an application')
+        if i == 60:
+            assert writer.copy_attachment(builder.end()[RECORD.size:])
+        writer.add_message(channel, START_NS + i, bytes(30), START_NS + i)
+    writer.close_chunk()
+    data = b''.join(pieces)
+    writer.finish()
+    return data, b''.join(pieces)
+
+
+def test_attachments_and_records_of_applications_are_no_damage(tmp_path):
+    cut, data = with_extras()
+    path = tmp_path / 'run_0.mcap'
+    path.write_bytes(data)
+    done = recover_bag(path)
+    assert not done.changed and done.messages == 100 and path.read_bytes() == data
+    path.write_bytes(cut)
+    file, = recover_bag(path).files
+    assert (file.rebuilt, file.messages, file.unreadable_bytes, file.kept) == (True, 100, 0, '')
+    with open(path, 'rb') as stream:
+        reader = make_reader(stream, validate_crcs=True)
+        attachment, = reader.iter_attachments()
+        assert (attachment.name, attachment.data) == ('photo.png', bytes(range(200)))
+        assert len(list(reader.iter_messages())) == 100
+        assert reader.get_summary().statistics.attachment_count == 1
+    assert b'of an application' in path.read_bytes()
+    assert not recover_bag(path).changed
+    spoiled = bytearray(data)
+    spoiled[data.index(bytes(range(200))) + 7] ^= 1
+    path.write_bytes(spoiled)
+    file, = recover_bag(path).files
+    assert file.messages == 100 and file.unreadable_bytes > 200
+    assert (tmp_path / file.kept).read_bytes() == spoiled
+
+
+def test_a_whole_file_of_another_writer_with_an_attachment_stays_as_it_is(tmp_path):
+    path = tmp_path / 'foreign.mcap'
+    with open(path, 'wb') as stream:
+        writer = Writer(stream)
+        writer.start(profile='ros2')
+        channel = writer.register_channel(
+            '/odd', 'cdr', writer.register_schema('pkg/msg/Odd', 'ros2msg', b'int8 x'))
+        writer.add_message(channel, START_NS, bytes(9), START_NS)
+        writer.add_attachment(START_NS, START_NS, 'notes.txt', 'text/plain', b'a note')
+        writer.finish()
+    before = path.read_bytes()
+    assert not recover_bag(path).changed and path.read_bytes() == before
 
 
 def test_what_cannot_be_repaired_is_told(tmp_path, whole, monkeypatch):
