@@ -30,6 +30,7 @@ _FOOTER = struct.Struct('<QQI')
 _MESSAGE_HEAD = struct.Struct('<HIQQ')
 # No recorder makes chunks near this size; a damaged length must not fill the memory.
 LARGEST_CHUNK_BYTES = 2**30
+_BLOCK_BYTES = 2**20          # looked at in one piece
 # Opcode, content, and the unpacked records of a chunk.
 Found = tuple[int, bytes, bytes | None]
 _TAKEN = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE, Opcode.METADATA, Opcode.ATTACHMENT)
@@ -84,12 +85,20 @@ class Walk:
             position = end
 
     def _lost_from(self, position: int) -> None:
-        """Count the rest; an unknown opcode means damage unless only zeros follow it."""
-        rest = self._data[position:]
-        self.bytes += len(rest)
-        torn = RECORD.unpack_from(rest)[0] in (
-            Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.METADATA, Opcode.HEADER)
-        self.inside = self.inside or (not torn and bool(rest.strip(b'\0')))
+        """
+        Count the rest: damage, or only the end that was not written.
+
+        An unknown opcode means damage unless only zeros follow it. So does a record that is too
+        long in a file that has its end mark.
+        """
+        size = len(self._data)
+        self.bytes += size - position
+        torn = self._data[size - len(MAGIC):size] != MAGIC and RECORD.unpack_from(
+            self._data, position)[0] in (
+                Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.METADATA, Opcode.HEADER)
+        self.inside = self.inside or (not torn and any(
+            self._data[begin:begin + _BLOCK_BYTES].strip(b'\0')
+            for begin in range(position, size, _BLOCK_BYTES)))
 
     def _chunk(self, content: bytes, is_last: bool) -> Iterator[Found]:
         records = unpack(content)

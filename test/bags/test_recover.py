@@ -25,7 +25,8 @@ from pam_actuation.bags import disk, recover
 from pam_actuation.bags.check import independent_readers
 from pam_actuation.bags.info import bag_info
 from pam_actuation.bags.load import load_run
-from pam_actuation.bags.mcap_write import McapWriter, RECORD
+from pam_actuation.bags.mcap_salvage import Walk
+from pam_actuation.bags.mcap_write import MAGIC, McapWriter, RECORD
 from pam_actuation.bags.recover import recover_bag
 from pam_actuation.bags.source import read_bag
 from pam_actuation.bags.writer import BagWriter
@@ -338,6 +339,35 @@ def test_a_whole_file_of_another_writer_with_an_attachment_stays_as_it_is(tmp_pa
         writer.finish()
     before = path.read_bytes()
     assert not recover_bag(path).changed and path.read_bytes() == before
+
+
+def test_a_damaged_length_in_a_finished_file_keeps_the_former_one(tmp_path, whole):
+    data, original = whole
+    with open(broken(tmp_path, data) / 'run_0.mcap', 'rb') as stream:
+        second = make_reader(stream).get_summary().chunk_indexes[1]
+    spoiled = bytearray(data)
+    spoiled[second.chunk_start_offset + 8] ^= 0x40
+    bag = broken(tmp_path, spoiled)
+    file, = recover_bag(bag).files
+    assert (bag / file.kept).read_bytes() == spoiled
+    assert_is_beginning(read_bag(bag), original)
+
+
+def test_what_follows_a_damaged_head_is_not_copied_into_memory():
+    class Watched(bytes):
+
+        longest = 0
+
+        def __getitem__(self, place):
+            found = super().__getitem__(place)
+            if isinstance(place, slice):
+                Watched.longest = max(Watched.longest, len(found))
+            return found
+
+    for end, damaged in ((b'\0', False), (b'\1', True)):
+        walk = Walk(Watched(MAGIC + bytes(2**23) + end))
+        assert list(walk) == [] and walk.bytes == 2**23 + 1 and walk.inside is damaged
+    assert Watched.longest <= 2**20
 
 
 def test_what_cannot_be_repaired_is_told(tmp_path, whole, monkeypatch):
