@@ -141,6 +141,11 @@ def _place(name: str, namespace: str) -> str | None:
     return relative if below in ('', *SIDES) and short in BY_NAME else None
 
 
+def is_read_of_joint(namespace: str, name: str, type_name: str, encoding: str) -> bool:
+    """Return whether a topic is one of a joint or of its muscles, by name, type, encoding."""
+    return _place(name, namespace) is not None and _is_of_rig(name, type_name, encoding)
+
+
 def _is_of_rig(name: str, type_name: str, encoding: str) -> bool:
     row = BY_NAME.get(short_name(name))
     return row is not None and encoding == 'cdr' and (

@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 from pam_actuation.bags import series
 from pam_actuation.bags.load import topics_of
-from pam_actuation.bags.load_joint import topics_of_joint
+from pam_actuation.bags.load_joint import is_read_of_joint, topics_of_joint
 from pam_actuation.bags.metadata import names_of
 from pam_actuation.bags.rig_topics import is_read
 from pam_actuation.bags.source import read_bag, TopicData
@@ -156,7 +156,10 @@ def recorded_topics_of_joint(run: Run) -> dict[str, RecordedTopic]:
     Commands and signals of each muscle are beside each other: the flexor comes first, as in a
     simulation. Errors are those of ``recorded_topics``.
     """
-    bag = read_bag(run.path, recover=True, names=names_of(run.metadata))
+    bag = read_bag(run.path, recover=True, names=names_of(run.metadata),
+                   wanted=lambda name, *kind: (
+                       short_name(name) in ORDER_OF_JOINT
+                       and is_read_of_joint(run.namespace, name, *kind)))
     found = topics_of_joint(bag, run.namespace)
     ordered = sorted(
         (name for name in found if short_name(name) in ORDER_OF_JOINT),

@@ -34,7 +34,7 @@ from pam_actuation.bags.oddities import recording_remarks
 from pam_actuation.control.config import load_controller
 from pam_actuation.control.modes.joint import JointController
 from pam_actuation.drivers.recorded import as_recorded
-from pam_actuation.replay.arrivals import recorded_topics_of_joint
+from pam_actuation.replay.arrivals import recorded_topics_of_joint, RecordedTopic
 from pam_actuation.replay.chain import ChainReplay, recorded_seed, RepeatedLoops, replay_chain
 from pam_actuation.replay.joint_controller import replay_joint_controller, states_suffice
 from pam_actuation.replay.model import GIVE_MODEL, other_model, with_model
@@ -171,6 +171,7 @@ def replay_joint(run: Run, controller: 'Controller | str | os.PathLike[str] | No
     parts: dict[str, ChainReplay] = {}
     notes: dict[str, str] = {}
     internals: dict[str, int] = {}
+    recorded: dict[str, RecordedTopic] = {}
     for name in wanted:
         if name == 'controller' and (law is None or 'controller_state' not in run):
             notes[name] = 'the bag has no recorded controller'
@@ -182,7 +183,8 @@ def replay_joint(run: Run, controller: 'Controller | str | os.PathLike[str] | No
             continue
         loops = RepeatedLoops(joint, law, recorded_seed(run), name_of(run.metadata, run.namespace),
                               (name,), as_recorded(run.metadata, run.path))
-        loops.run(recorded_topics_of_joint(run))
+        recorded = recorded or recorded_topics_of_joint(run)
+        loops.run(recorded)
         parts[name] = ChainReplay(joint.name, *loops.signals(), run.start_ns)
         internals = loops.internals or internals
     if not parts:

@@ -22,6 +22,7 @@ import numpy as np
 from pam_actuation.bags.load import load_run
 from pam_actuation.bags.load_joint import load_recording
 from pam_actuation.bags.metadata import own_name
+from pam_actuation.bags.source import read_bag
 from pam_actuation.cli.main import main
 from pam_actuation.control import tick as codes
 from pam_actuation.control.config import load_controller
@@ -32,9 +33,11 @@ from pam_actuation.experiments.joint_offline import JointLoops
 from pam_actuation.experiments.offline import simulate_experiment
 from pam_actuation.messages import (
     AngleReference, AngleTrajectory, ControllerState, NamedEfforts, Pressure, Torque)
+from pam_actuation.replay.arrivals import recorded_topics_of_joint
 from pam_actuation.replay.joint import PARTS, replay_joint
 from pam_actuation.replay.joint_controller import COMMANDS
 from pam_actuation.replay.model import is_joint, model_of
+from pam_actuation.topics.table import BY_NAME
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.joint import load_joint
@@ -101,8 +104,13 @@ def test_a_run_of_a_joint_has_the_topics_of_joint_and_muscles(run, bag):
         load_recording(bag, namespace='/hip')
 
 
-def test_each_part_and_the_chain_are_reproduced_to_the_bit(run):
+def test_each_part_and_the_chain_are_reproduced_to_the_bit(run, monkeypatch):
+    reads = []
+    monkeypatch.setattr(
+        'pam_actuation.replay.joint.recorded_topics_of_joint',
+        lambda of_run: reads.append(of_run) or recorded_topics_of_joint(of_run))
     parts = replay_joint(run)
+    assert len(reads) == 1              # for driver and plant
     assert set(parts.parts) == set(PARTS) and parts.internals == {}
     assert all(part.identical and part.recorded for part in parts.parts.values())
     assert not parts.unexpected_difference
@@ -115,6 +123,24 @@ def test_each_part_and_the_chain_are_reproduced_to_the_bit(run):
     for name in wanted:
         topic, _, field = name.rpartition('.')
         assert np.array_equal(np.sort(chain.recorded[name]), np.sort(run[topic][field]))
+
+
+def test_of_a_bag_only_the_topics_of_the_joint_are_kept(run, monkeypatch):
+    asked = []
+
+    def noted(*arguments, wanted=None, **options):
+        asked.append(wanted)
+        return read_bag(*arguments, wanted=wanted, **options)
+
+    monkeypatch.setattr('pam_actuation.replay.arrivals.read_bag', noted)
+    assert len(recorded_topics_of_joint(run)['joint_state']) == len(run['joint_state'])
+    wanted, = asked
+    angle, pressure = BY_NAME['joint_state'].type_name, BY_NAME['pressure'].type_name
+    assert wanted('/knee/joint_state', angle, 'cdr')
+    assert wanted('/knee/flexor/pressure', pressure, 'cdr')
+    for name, kind in (('/knee/image', 'sensor_msgs/msg/Image'), ('/hip/joint_state', angle),
+                       ('/hip/flexor/pressure', pressure), ('/knee/joint_state', pressure)):
+        assert not wanted(name, kind, 'cdr'), name
 
 
 def test_a_joint_is_repeated_under_the_name_that_its_recorder_told(run):
