@@ -22,6 +22,7 @@ used is returned, what is odd is said in ``remarks``.
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache, cached_property
+from typing import Any
 
 import numpy as np
 
@@ -158,7 +159,7 @@ def run_of(bag: Bag, path: StrPath, namespace: str | None = None) -> RecordedRun
     trajectories: tuple[ReferenceTrajectory, ...] = ()
     for short, topic in found.items():
         if OF_A_RUN[short].numeric is None:
-            trajectories = _trajectories(topic, odd)
+            trajectories = read_trajectories(short, topic, odd)
         else:
             one = read_series(short, topic, odd)
             if len(one):
@@ -317,11 +318,12 @@ def _remark_not_finite(short: str, values: Mapping[str, FloatArray], name: str,
                 f'{name}: {count} of {len(column)} {key} are not finite, kept as NaN.')
 
 
-def _trajectories(topic: TopicData, odd: Oddities) -> tuple[ReferenceTrajectory, ...]:
+def read_trajectories(short: str, topic: TopicData, odd: Oddities) -> tuple[Any, ...]:
+    """Return the trajectories of a TopicData by stamp; how many are damaged goes to ``odd``."""
     messages, bad = [], 0
     for raw in topic.payloads:
         try:
-            messages.append(decode('reference_trajectory', raw))
+            messages.append(decode(short, raw))
         except InputError:
             bad += 1
     if bad:

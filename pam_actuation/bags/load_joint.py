@@ -21,7 +21,8 @@ The topics of a joint are named relative to it: ``joint_state``, ``flexor/pressu
 from collections.abc import Mapping
 import os
 
-from pam_actuation.bags.load import NAMESPACE, read_series, RecordedRun, run_of
+from pam_actuation.bags.load import (
+    NAMESPACE, read_series, read_trajectories, RecordedRun, run_of)
 from pam_actuation.bags.markers import is_marker, markers_of
 from pam_actuation.bags.oddities import Oddities
 from pam_actuation.bags.renamed import full_names, may_be_in
@@ -41,7 +42,8 @@ def load_recording(path: str | os.PathLike[str], namespace: str | None = None,
     """
     Load the run of a muscle, or of a joint where the bag has one and no muscle is chosen.
 
-    Trajectories of a joint are no series: ``replay`` reads them where it needs them.
+    Trajectories of a joint are no series: ``replay`` reads them where it needs them. Those
+    that are damaged are counted in a remark all the same.
 
     Parameters
     ----------
@@ -77,10 +79,12 @@ def load_recording(path: str | os.PathLike[str], namespace: str | None = None,
     others = of_another_type_of_joint(bag, joints[0])
     odd = Oddities([*bag.remarks, *others.values()])
     for relative, topic in topics_of_joint(bag, joints[0]).items():
-        if BY_NAME[short_name(relative)].numeric is not None:
-            series = read_series(short_name(relative), topic, odd)
-            if len(series):
-                found[relative] = series
+        if BY_NAME[short_name(relative)].numeric is None:
+            read_trajectories(short_name(relative), topic, odd)
+            continue
+        series = read_series(short_name(relative), topic, odd)
+        if len(series):
+            found[relative] = series
     odd.tell_silent()
     return RecordedRun(topics=found, metadata=bag.experiment, namespace=joints[0],
                        path=str(path), remarks=tuple(odd.remarks),

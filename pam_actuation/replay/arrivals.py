@@ -61,7 +61,8 @@ class RecordedTopic:
     The messages of one topic in the order of their arrival.
 
     They are read as arrays; a plain message is made when its turn comes, so that an
-    hour takes no more memory than its numbers.
+    hour takes no more memory than its numbers. Messages that are not of the topic's type are
+    left out; the remarks of the loaded run count them.
     """
 
     def __init__(self, short: str, topic: TopicData, by_stamp: bool,
@@ -70,17 +71,18 @@ class RecordedTopic:
         self._messages: list[Message] | None = None
         numeric = BY_NAME[short].numeric
         if numeric is None:
-            self._messages = [decode(short, raw) for raw in topic.payloads]
+            decoded = [_decoded(short, raw) for raw in topic.payloads]
+            self._messages = [one for one in decoded if one is not None]
             self._columns: dict[str, FloatArray] = {}
             stamp_ns = np.array([one.stamp_ns for one in self._messages], dtype=np.int64)
+            good = np.array([one is not None for one in decoded], dtype=bool)
         else:
-            stamp_ns, self._columns, bad = series.table(short, topic.payloads, only)
-            self._make = numeric.maker(tuple(self._columns))
-            if bad.any():
-                raise InputError(
-                    f'{topic.name}: {int(bad.sum())} messages are not {topic.type_name}',
-                    str(path))
-        received_ns = np.asarray(topic.log_time_ns, dtype=np.int64)
+            stamp_ns, columns, bad = series.table(short, topic.payloads, only)
+            self._make = numeric.maker(tuple(columns))
+            good = ~bad
+            stamp_ns = stamp_ns[good]
+            self._columns = {name: column[good] for name, column in columns.items()}
+        received_ns = np.asarray(topic.log_time_ns, dtype=np.int64)[good]
         if BY_NAME[short].stamped:
             _check_clocks(stamp_ns, received_ns, topic, path)
         time_ns = stamp_ns if by_stamp else received_ns
@@ -132,8 +134,7 @@ def recorded_topics(run: Run, topics: Iterable[str],
     Raises
     ------
     InputError
-        The bag cannot be read, a message is not of its topic's type, or header stamps and
-        receive times come from different clocks.
+        The bag cannot be read, or header stamps and receive times come from different clocks.
 
     """
     topics, ticks = set(topics), set(ticks)
@@ -167,6 +168,14 @@ def recorded_topics_of_joint(run: Run) -> dict[str, RecordedTopic]:
             name.rpartition('/')[0]) if '/' in name else 0))
     return {name: RecordedTopic(short_name(name), found[name], short_name(name) in TICKED,
                                 run.path) for name in ordered}
+
+
+def _decoded(short: str, raw: bytes) -> Message | None:
+    """Return a plain message, None where the bytes are none of this topic."""
+    try:
+        return decode(short, raw)
+    except InputError:
+        return None
 
 
 def _check_clocks(stamp_ns: IntArray, received_ns: IntArray, topic: TopicData,

@@ -30,7 +30,6 @@ from pam_actuation.replay.arrivals import (
     ORDER, recorded_topics, recorded_topics_of_joint, TICKED)
 from pam_actuation.topics import codec
 from pam_actuation.topics.table import BY_NAME, RECORDED
-from pam_sim.errors import InputError
 from process_replay import bag_of
 import pytest
 
@@ -126,14 +125,46 @@ def test_arrivals_of_a_recording_are_those_of_decoding_one_by_one():
     assert found == list(map(plain, one_by_one(run, topics))) and len(found) > 1000
 
 
-def test_a_message_that_is_none_is_refused(tmp_path):
-    with BagWriter(tmp_path / 'run', {}) as writer:
-        writer.add_topic('/muscle/pressure', RECORDED['pressure'].type_name)
-        for i in range(3):
-            raw = codec.encode('pressure', messages.Pressure(START_NS + i, 1e5))
-            writer.write('/muscle/pressure', raw[:9] if i == 1 else raw, START_NS, START_NS)
-    with pytest.raises(InputError, match='1 messages are not sensor_msgs/msg/FluidPressure'):
-        recorded_topics(load_run(tmp_path / 'run'), ORDER)
+def write_damaged(path, namespace, sent):
+    """Write four messages a topic, of ``sent(stamp_ns)``; number 1 is damaged where it can."""
+    with BagWriter(path, {}) as writer:
+        for name in sent(0):
+            writer.add_topic(f'{namespace}/{name}', BY_NAME[name].type_name)
+        for i in range(4):
+            now_ns = START_NS + i * 5_000_000
+            for name, message in sent(now_ns).items():
+                raw = codec.encode(name, message)
+                damaged = i == 1 and name != 'joint_state'
+                writer.write(f'{namespace}/{name}', raw[:9] if damaged else raw, now_ns, now_ns)
+
+
+def test_a_message_that_is_none_is_left_out(tmp_path):
+    write_damaged(tmp_path / 'run', '/muscle', lambda stamp_ns: {
+        'pressure': messages.Pressure(stamp_ns, 1e-3 * (stamp_ns - START_NS)),
+        'reference_trajectory': messages.ReferenceTrajectory(
+            stamp_ns, (0, 20_000_000), (0.01, 0.02), (0.0, 0.1))})
+    run = load_run(tmp_path / 'run')
+    assert len(run.left_out) == 2
+    topics = recorded_topics(run, ORDER)
+    times = [START_NS + ms * 1_000_000 for ms in (0, 10, 15)]
+    assert [list(topics[name].times()) for name in ('pressure', 'reference_trajectory')] == (
+        [times, times])
+    assert [one.pressure_pa for one in topics['pressure']] == [0.0, 1e4, 1.5e4]
+    assert [one.stamp_ns for one in topics['reference_trajectory']] == times
+
+
+def test_a_trajectory_of_a_joint_that_is_none_is_left_out_with_a_remark(tmp_path):
+    write_damaged(tmp_path / 'run', '/knee', lambda stamp_ns: {
+        'joint_state': messages.JointAngle(stamp_ns, 0.1),
+        'joint_trajectory': messages.AngleTrajectory(
+            stamp_ns, (0, 10), (0.1, 0.2), (0.0, 0.0))})
+    run = load_recording(tmp_path / 'run')
+    kind = BY_NAME['joint_trajectory'].type_name
+    told = f'/knee/joint_trajectory: 1 messages are not {kind}, left out.'
+    assert run.left_out == (told,) and told in run.remarks
+    topics = recorded_topics_of_joint(run)
+    assert {name: len(one) for name, one in topics.items()} == {
+        'joint_state': 4, 'joint_trajectory': 3}
 
 
 @pytest.mark.parametrize('stamp_ns', [0, WALL_NS + 20_000_000_000])
