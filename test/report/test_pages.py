@@ -14,6 +14,7 @@
 
 """The pages: complete, self-contained, small, safe against odd names."""
 
+from dataclasses import replace
 import json
 import re
 from types import SimpleNamespace
@@ -113,6 +114,19 @@ def test_a_run_with_hardly_any_topics_still_has_a_page(tmp_path):
     run.topics.clear()
     pages.bag_report([run], tmp_path / 'empty.html')
     assert 'holds no signal' in (tmp_path / 'empty.html').read_text()
+
+
+@pytest.mark.parametrize('still', [('force',), ('pressure', 'contraction', 'reference')])
+def test_stamps_that_never_change_have_no_rate(still, tmp_path):
+    run = tracking_run(AMPLITUDES)
+    for topic in still:
+        series = run.topics[topic]
+        still_ns = np.full_like(series.stamp_ns, series.stamp_ns[0])
+        run.topics[topic] = replace(series, stamp_ns=still_ns)
+    pages.bag_report([run], tmp_path / 'page.html')
+    html, _ = markup(tmp_path / 'page.html')
+    for topic in still:
+        assert re.search(rf'<td>{topic}</td><td[^>]*>\d+</td><td[^>]*>–</td>', html)
 
 
 def test_a_report_of_nothing_is_refused(tmp_path):

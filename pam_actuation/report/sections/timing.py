@@ -47,7 +47,7 @@ def timing(named: 'Sequence[tuple[str, Run, RunMetrics | JointMetrics]]',
     for name, _, m in named:
         for t in m.timing:
             rows.append([f'{name}: {t.topic}' if len(named) > 1 else t.topic, t.count,
-                         f'{1.0 / t.mean_s:.1f} Hz', f'{t.median_s * 1e3:.3f} ms',
+                         _rate(t.mean_s), f'{t.median_s * 1e3:.3f} ms',
                          f'{t.jitter_s * 1e3:.3f} ms', f'{t.p99_s * 1e3:.3f} ms',
                          f'{t.max_s * 1e3:.2f} ms', f'{100 * t.late_share:.2f} %'])
     body = paragraph(
@@ -65,3 +65,8 @@ def timing(named: 'Sequence[tuple[str, Run, RunMetrics | JointMetrics]]',
                      f'Periods of the loops, {named[0][0]}; the outer 0.1 % are drawn in the '
                      'outermost bins.')
     return Section(key, 'Loop timing', body)
+
+
+def _rate(period_s: float) -> str | None:
+    """Return the rate of a mean period, None where the stamps of a topic never change."""
+    return f'{1.0 / period_s:.1f} Hz' if period_s > 0.0 else None
