@@ -117,7 +117,7 @@ def save_characterisation(result: 'Characterisation', out_dir: StrPath) -> dict[
     texts.update({f'{name}.svg': text for name, text in pictures.items()})
     if result.loads:
         texts['holds.csv'] = holds_csv(result)
-    with whole_files(out) as folder:
+    with whole_files(out, FILES) as folder:
         for name, text in texts.items():
             write_text(folder / name, text)
         if result.surfaces.air_mass_kg is not None:

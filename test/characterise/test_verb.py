@@ -79,6 +79,18 @@ def test_bags_become_a_table_numbers_figures_and_a_page(bags, tmp_path, capsys):
     assert page.count('src="data:image/svg+xml;base64,') == 3 and 'src="http' not in page
 
 
+def test_files_of_the_muscle_before_do_not_stay(bags, tmp_path, capsys):
+    out = tmp_path / 'out'
+    assert main(['characterise', *bags, '--out', str(out)]) == 0
+    (out / 'notes.txt').write_text('mine')
+    capsys.readouterr()
+    assert main(['characterise', str(MAP), '--length-m', '0.25', '--out', str(out), '--overwrite',
+                 '--json']) == 0
+    files = json.loads(capsys.readouterr().out)['files']
+    assert 'lookup.csv' not in files
+    assert {path.name for path in out.iterdir()} == {*files, 'notes.txt'}
+
+
 def test_a_table_of_others_is_taken_and_what_it_lacks_is_said(tmp_path, capsys):
     assert main(['characterise', str(MAP), '--length-m', '0.25', '--out', str(tmp_path)]) == 0
     text = capsys.readouterr().out
