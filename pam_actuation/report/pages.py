@@ -17,6 +17,7 @@
 from collections.abc import Sequence
 from typing import Any, TYPE_CHECKING
 
+from pam_actuation.bags.facts import recorded_muscle
 from pam_actuation.bags.oddities import recording_remarks
 from pam_actuation.report.errors import by_part
 from pam_actuation.report.full_valves import full_valves_section
@@ -30,14 +31,12 @@ from pam_actuation.report.sections.overlaid import overlaid
 from pam_actuation.report.sections.provenance import provenance
 from pam_actuation.report.sections.signals_plot import time_plots
 from pam_actuation.report.sections.timing import timing
-from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.files import StrPath, write_text
 
 if TYPE_CHECKING:
     from pam_actuation.report.errors import Cycles
     from pam_sim.annotations import FloatArray
-    from pam_sim.rig import Rig
     from pam_sim.run import Run
 
 FOOTER = ('Written by pam_actuation. Pressures are gauge, against 101.325 kPa. This page needs '
@@ -46,20 +45,9 @@ FOOTER = ('Written by pam_actuation. Pressures are gauge, against 101.325 kPa. T
 TAKEN = ('report', 'remarks', 'over_seeds', 'implausible')
 
 
-def recorded_rig(run: 'Run') -> 'Rig | None':
-    """Return the rig in a run's metadata, or None."""
-    content = (run.metadata or {}).get('rig')
-    if not content:
-        return None
-    try:
-        return load_rig(content)
-    except InputError:
-        return None
-
-
 def recorded_metrics(run: 'Run') -> RunMetrics:
-    """Return the figures of a run, with the rig in its metadata."""
-    return run_metrics(run, rig=recorded_rig(run))
+    """Return the figures of a run, with its rig or its side of a joint in the metadata."""
+    return run_metrics(run, rig=recorded_muscle(run.metadata, run.namespace))
 
 
 def bag_report(runs: 'Sequence[Run]', out_path: StrPath, titles: Sequence[str] | None = None,

@@ -18,12 +18,15 @@ import json
 import re
 
 import numpy as np
+from pam_actuation.bags.load import load_run
 from pam_actuation.bags.load_joint import load_recording
 from pam_actuation.cli.main import main
 from pam_actuation.control.config import load_controller
 from pam_actuation.experiments import load_experiment
 from pam_actuation.experiments.offline import simulate_experiment
 from pam_actuation.report.joint_page import angle_error, joint_metrics, joint_report
+from pam_actuation.report.metrics import run_metrics
+from pam_actuation.report.pages import recorded_metrics
 from pam_sim.errors import InputError
 from pam_sim.joint import load_joint
 import pytest
@@ -112,6 +115,14 @@ def test_the_page_says_what_cannot_be_right_in_the_data(bag, tmp_path):
     joint_report([run], out)
     content = out.read_text(encoding='utf-8')
     assert title in content and '/knee/extensor/pressure' in content
+
+
+def test_the_figures_of_one_muscle_are_those_of_its_rig(bag):
+    run = load_run(bag, '/knee/extensor')
+    rig = load_joint('joint_dmsp_5_300_realistic', valve='hsv').extensor
+    found, wanted = recorded_metrics(run), run_metrics(run, rig)
+    assert found.air_use_kg == wanted.air_use_kg > 0.0
+    assert found.air_fed_kg == wanted.air_fed_kg > 0.0
 
 
 def test_a_muscle_is_not_shown_on_the_page_of_a_joint(bag, tmp_path):
