@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 
 HELP = 'Make the surfaces P(m_air, load), strain(P, load), F(strain, P) from fixed-load runs.'
 # Options that would change nothing: of a simulation, or of bags.
-UNUSED = {'bags': ('experiment', 'seed'),
-          'a table': ('experiment', 'seed', 'namespace', 'load_n', 'recover', 'renamed')}
+UNUSED = {'bags': ('experiment', 'seed', 'jobs'),
+          'a table': ('experiment', 'seed', 'jobs', 'namespace', 'load_n', 'recover', 'renamed')}
 EXAMPLE = 'pam characterise --simulate dmsp_5_300_realistic --out surfaces'
 
 

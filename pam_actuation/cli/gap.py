@@ -42,7 +42,7 @@ MODEL = 'dmsp_5_300_hanging_mass'
 # Options that a question of the other kind needs: here they would change nothing.
 UNUSED = {
     '--explain': ('plan', 'valve', 'no_force', 'certify', 'effects', 'seconds', 'materiality',
-                  'out'),
+                  'out', 'overwrite'),
     '--plan': ('namespace', 'renamed', 'certify', 'seconds'),
     'a recording': ('valve', 'no_force')}
 

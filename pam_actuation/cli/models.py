@@ -31,10 +31,10 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument('name', type=source, nargs='?', default=None,
                         help='show this entry in full')
     parser.add_argument('--html', type=out_path, metavar='FILE', default=None,
-                        help='write all entries as one HTML page')
+                        help='write all entries, or the one that is named, as one HTML page')
     parser.add_argument('--markdown', type=out_path, metavar='FILE', default=None,
-                        help='write all entries as a Markdown page; one made this way before '
-                             'is made again')
+                        help='write all entries, or the one that is named, as a Markdown page; '
+                             'a page made this way before is made again')
     add_overwrite_option(parser)
 
 

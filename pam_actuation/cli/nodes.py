@@ -18,10 +18,12 @@ import argparse
 from pathlib import Path
 
 from pam_actuation.cli.common import add_overwrite_option, emit, EXIT_DONE
-from pam_actuation.cli.options import out_path, Parser, source
+from pam_actuation.cli.options import out_path, Parser, refuse_unused, source
 
 HELP = 'List the nodes with parameters, topics and services; write their pages.'
 EXAMPLE = 'pam nodes valve_driver'
+# Options that would change nothing beside another one.
+UNUSED = {'--topics': ('name', 'markdown', 'overwrite'), '--markdown': ('name',)}
 
 
 def add_arguments(parser: Parser) -> None:
@@ -42,6 +44,9 @@ def run(args: argparse.Namespace) -> int:
     """Print the names, or one page; write the pages asked for."""
     from pam_sim.errors import did_you_mean, InputError
     from pam_sim.files import check_folder, whole_files, write_text
+    asked = '--topics' if args.topics is not None else '--markdown'
+    if getattr(args, asked.strip('-')) is not None:
+        refuse_unused(args, add_arguments, UNUSED[asked], asked)
     if args.topics is not None:
         written = _write_topics(Path(args.topics))
         emit(args, {'schema': 1, 'nodes': {}, 'written': written},

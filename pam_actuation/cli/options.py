@@ -220,7 +220,8 @@ def refuse_unused(args: argparse.Namespace, declare: Callable[[Parser], None],
     declare(declared)
     for action in declared._actions:
         if action.dest in unused and getattr(args, action.dest) != action.default:
-            raise InputError(f'does not go with {asked}', action.option_strings[0])
+            name = (action.option_strings or [action.dest])[0]
+            raise InputError(f'does not go with {asked}', name)
 
 
 class Pairs(argparse.Action):

@@ -114,6 +114,8 @@ def test_a_table_of_others_is_taken_and_what_it_lacks_is_said(tmp_path, capsys):
     ([str(MAP), '--length-m', '0.25', '--topic', 'pressure=/p'], '--topic: does not go with'),
     (['bag', '--experiment', 'step_10mm'], '--experiment: does not go with bags'),
     (['bag', '--seed', '1'], '--seed: does not go with bags'),
+    (['bag', '--jobs', '8'], '--jobs: does not go with bags'),
+    ([str(MAP), '--length-m', '0.25', '--jobs', '8'], '--jobs: does not go with a table'),
 ])
 def test_mistakes_are_one_sentence_and_write_nothing(arguments, words, tmp_path, capsys):
     assert main(['characterise', *arguments, '--out', str(tmp_path / 'out')]) == 2

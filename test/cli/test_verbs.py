@@ -57,6 +57,16 @@ def test_help_has_an_example(verb):
     assert f'pam {verb}' in done.stdout and 'Example:' in done.stdout and '--json' in done.stdout
 
 
+@pytest.mark.parametrize('words, told', [
+    (('valve_driver', '--topics', 'pages'), 'name: does not go with --topics'),
+    (('--topics', 'pages', '--markdown', 'nodes'), '--markdown: does not go with --topics'),
+    (('--topics', 'pages', '--overwrite'), '--overwrite: does not go with --topics'),
+    (('valve_driver', '--markdown', 'nodes'), 'name: does not go with --markdown')])
+def test_nodes_refuses_what_another_option_ignores(words, told, capsys):
+    assert pam_here('nodes', *words) == 2
+    assert capsys.readouterr().err == f'pam nodes: {told}\n'
+
+
 def test_simulate_gives_the_same_bytes_twice(bags, tmp_path):
     assert pam_here(
         'simulate', 'short_sine', '--valve', 'hsv', '--out', tmp_path / 'hsv') == 0

@@ -126,6 +126,7 @@ def test_a_name_that_cannot_be_tried_is_told_and_alone_refused(tmp_path, capsys)
     (['--plan', '--topic', 'pressure=/p'], '--topic: does not go with --plan'),
     (['--plan', '--explain', 'creep'], '--plan: does not go with --explain'),
     (['--explain', 'creep', '--out', 'g'], '--out: does not go with --explain'),
+    (['--explain', 'creep', '--overwrite'], '--overwrite: does not go with --explain'),
     (['second', '--explain', 'creep'], '--explain: takes one bag, 2 were given')])
 def test_an_option_of_another_question_is_refused(words, told, capsys):
     assert main(['gap', 'bag', *words]) == 2
