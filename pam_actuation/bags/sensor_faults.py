@@ -141,10 +141,9 @@ def slips(stamp_ns: IntArray, column: FloatArray, most_acceleration: float) -> l
 
     """
     known = np.isfinite(column)
-    values = column[known]
-    if len(values) < FEWEST_SAMPLES:
+    if known.sum() < FEWEST_SAMPLES:
         return []
-    time_s = (stamp_ns[known] - stamp_ns[0]) * 1e-9
+    values, time_s = column[known], (stamp_ns[known] - stamp_ns[0]) * 1e-9
     steps = np.abs(np.diff(values))
     largest = np.argsort(steps)[:-MOST_SLIPS - 2:-1]
     sizes = steps[largest]

@@ -329,6 +329,15 @@ def test_values_that_cannot_be_true(tmp_path, short, message, words):
     assert said(info, f'/muscle/{short}', *words)
 
 
+def test_a_topic_of_which_no_message_can_be_decoded_is_told(tmp_path):
+    with BagWriter(tmp_path / 'run', {}) as writer:
+        writer.add_topic('/muscle/contraction', RECORDED['contraction'].type_name)
+        raw = codec.encode('contraction', messages.Contraction(START_NS, 0.01, 0.0))
+        for i in range(3):
+            writer.write('/muscle/contraction', raw[:12], START_NS + i, START_NS + i)
+    assert said(bag_info(tmp_path / 'run'), '/muscle/contraction: 3 messages cannot be decoded')
+
+
 def test_undefined_internals_and_short_pauses_are_no_findings(tmp_path):
     def change(short, i, message):
         if short == 'controller_state':
