@@ -29,6 +29,7 @@ from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.propose.library import Factor, library, NOTHING, STAND_INS, Term
 from pam_sim.gap.propose.proposal import (
     EFFECT_FILE, MODEL_FILE, NO_TIME, NONE, propose)
+from pam_sim.gap.propose.ranges import ranges_of
 from pam_sim.gap.propose.search import candidate_of, ends_of
 from pam_sim.gap.propose.writing import EffectText
 from pam_sim.gap.result import GapResult
@@ -172,3 +173,17 @@ def test_noise_alone_has_no_term():
 def test_a_search_that_was_cut_short_says_so():
     result = asked(nominal().with_(effects=[DRAG]), out_of_time=lambda: True)
     assert result.proposal is None and result.remarks == [NO_TIME]
+
+
+def test_the_range_of_a_set_point_is_that_of_the_regulator():
+    """One of 2 to 8 V for 5 to 455 kPa, commanded beyond both ends."""
+    rig = nominal().with_(parameters={
+        'K_m': 75e3, 'ppr_lowest_v': 2.0, 'ppr_highest_v': 8.0, 'ppr_zero_pa': 5e3})
+    command = 1.5 * voltages(8.0)
+    command[4000:4500], command[7000:] = 9.0, 1.0
+    recording = Recording(recorded(rig, command), 'ppr')
+    estimator = Estimator(rig, subsystem_problems(rig, [recording], True, 0, CRITERIA))
+    found = ranges_of([recording], estimator, estimator.base)
+    assert found['s'] == pytest.approx((5e3, 455e3), rel=0.01)
+    low, high = found['e']
+    assert -455e3 < low < 0.0 < high < 455e3

@@ -24,7 +24,9 @@ from pam_sim.gap.fit.hypothesis import Fit
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.gap.verify.model import model_of
 from pam_sim.units import P_ATM_PA
+from pam_sim.valve.ppr import set_point_of
 
+ENDS = 'ppr_lowest_v', 'ppr_highest_v'        # of the input of a regulator
 LEAST_SPAN = {'p': 5e3, 'x': 5e-4, 's': 5e3, 'F': 1.0, 'v': 2e-3, 'e': 2e3, 't': 5.0, 'a': 0.05,
               'b': 0.05}
 SLOWEST_WAVES, FASTEST_HZ = 1.5, 15.0        # periods in the record, frequency
@@ -55,7 +57,10 @@ def ranges_of(recordings: Sequence[Recording], estimator: Estimator, found: Fit
             continue
         signal = r.valve_signal()
         if rig.valve == 'ppr':
-            aim = rig.parameters['K_m'] * np.clip(signal, 0.0, None)
+            # Linear between the ends of the input, and constant beyond them.
+            ends_v = [rig.parameters[name] for name in ENDS]
+            aim = np.interp(signal, ends_v, [
+                set_point_of(one, rig.parameters, 0.0) for one in ends_v])
             add('s', aim)
             add('e', aim - pressure[1:])
         else:
