@@ -187,14 +187,15 @@ def plan(rig: Rig, experiments: Sequence[Experiment] = (), with_force: bool = Tr
 
     judged = [_judged(e.to_dict(), _some(looked(e.to_dict())), materiality)
               for e in experiments]
-    looks = {}
+    looks, refused = {}, ''
     for name, segments in pieces(rig.valve, within_reach(rig)).items():
         try:
             looks[name] = looked(_experiment([name], segments, rig, with_force))
-        except InputError:
-            continue                   # a piece that this rig cannot do
+        except InputError as error:
+            refused = str(error)       # a piece that this rig cannot do
     if not looks:
-        raise InputError('can do none of the candidate protocols', rig.name)
+        raise InputError(f'can do none of the candidate protocols; of the last one: {refused}',
+                         rig.name)
     first = _some(next(iter(looks.values())))
     chosen, tried = _best(looks, rig.valve, materiality)
     plain = _experiment(chosen, _joined(chosen, rig), rig, with_force)

@@ -51,7 +51,7 @@ from pam_sim.files import check_folder, StrPath, whole_files, write_json, write_
 from pam_sim.gap import find_gap
 from pam_sim.gap.data.commanded import all_commanded, commanded
 from pam_sim.gap.data.duties import once_a_period
-from pam_sim.gap.data.health import check_for, dead_signals
+from pam_sim.gap.data.health import check_for, dead_signals, held_m
 from pam_sim.gap.data.pressed import recorded_gauge_pa
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.signals import FIELD, recorded_valve
@@ -307,7 +307,7 @@ def free_run_overlay(run: 'Run', rig: Rig) -> list[Overlay]:
     (run,), _ = commanded([run], rig)
     if not check_for(run, rig).usable:
         return []
-    recording = Recording(once_a_period(run, rig), rig.valve, driven=rig.is_driven)
+    recording = Recording(once_a_period(run, rig), rig.valve, rig.is_driven, held_m(rig) or 0.0)
     simulated = free_run(rig, recording)
     offset = (recording.start_ns - start_ns(run)) * 1e-9
     return [Overlay(s, recording.time_s[s] + offset, np.asarray(recording.measured[s]),

@@ -21,7 +21,7 @@ from pam_sim.errors import InputError
 from pam_sim.gap.criteria import CRITERIA, Criteria
 from pam_sim.gap.data.commanded import all_commanded
 from pam_sim.gap.data.duties import once_a_period
-from pam_sim.gap.data.health import check_for, without_dead
+from pam_sim.gap.data.health import check_for, held_m, without_dead
 from pam_sim.gap.data.holes import split_at_holes
 from pam_sim.gap.data.overlap import check_apart
 from pam_sim.gap.data.recording import Recording
@@ -85,4 +85,5 @@ def checked_runs(runs: Run | Sequence[Run], certify: Run | None, rig: Rig,
 def recording_of(run: Run, rig: Rig, criteria: Criteria = CRITERIA) -> Recording:
     """Return a recording without dead sensors, repeats, and the force of a load at rest."""
     run = once_a_period(without_dead(run), rig)
-    return Recording(run, rig.valve, rig.is_driven, rest=rest_of(run, rig, criteria))
+    return Recording(run, rig.valve, rig.is_driven, held_m(rig) or 0.0,
+                     rest_of(run, rig, criteria))

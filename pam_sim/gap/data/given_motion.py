@@ -36,7 +36,8 @@ def given_motion(time_s: FloatArray, values: FloatArray, grid_s: FloatArray
     Return a measured contraction [m] on an even grid, smoothed, and still where it rests.
 
     And where it rests, or moves by less than its noise: the direction of dry friction is not
-    known there. Nowhere where that is the greater part, as in a muscle that is held.
+    known there. Nowhere where that is the greater part, as in a muscle that is held. One that is
+    held all the time stays at the median.
 
     Parameters
     ----------
@@ -52,6 +53,8 @@ def given_motion(time_s: FloatArray, values: FloatArray, grid_s: FloatArray
     within = max(WINDOW_S / float(np.median(np.diff(time_s))), PARABOLA_GAIN)
     noise = noise_of(time_s, values).sd * float(np.sqrt(PARABOLA_GAIN / within))
     found = followed(y, STILL_SD * noise)
+    if np.ptp(found) <= STILL_SD * noise:        # held: what is left of the noise is no motion
+        found = np.full(y.size, float(np.median(y)))
     hidden = np.append((np.diff(found) == 0.0) & (np.diff(y) != 0.0), False)
     return found, hidden & (np.mean(hidden) < MOSTLY)
 

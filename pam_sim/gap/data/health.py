@@ -30,6 +30,8 @@ HOLE_PERIODS = 3.0           # of a slow log, from which on messages are missing
 OPTIONAL = ('force',)        # signals without which a comparison is possible
 ALONE = ('the recording has no command of the valve, so the measured pressure drives muscle and '
          'load, and the valve is not judged')
+HELD = 'the recording has no contraction; by the model, the muscle is held at {:.4g} mm'
+LENGTH = 'contraction_m'     # of the load `isometric`
 
 
 @dataclass
@@ -58,7 +60,7 @@ class Health:
 def check_for(run: Run, rig: Rig, criteria: Criteria = CRITERIA) -> Health:
     """Check a recording that shall be compared with a rig; see ``check_health``."""
     health = check_health(run, rig.valve, criteria, rig.is_driven,
-                          rig.parameters.get('ppr_highest_v', MAX_VOLTAGE_V))
+                          rig.parameters.get('ppr_highest_v', MAX_VOLTAGE_V), held_m(rig))
     problem, remark = duties_told(run, rig)
     health.problems += [problem] if problem else []
     health.remarks += [remark] if remark else []
@@ -67,8 +69,14 @@ def check_for(run: Run, rig: Rig, criteria: Criteria = CRITERIA) -> Health:
     return health
 
 
+def held_m(rig: Rig) -> float | None:
+    """Return the contraction [m] at which a rig holds its muscle, None where it is not known."""
+    return None if rig.load != 'isometric' or LENGTH in rig.unknown else rig.parameters[LENGTH]
+
+
 def check_health(run: Run, valve: str, criteria: Criteria = CRITERIA,
-                 driven: bool = False, highest_v: float = MAX_VOLTAGE_V) -> Health:
+                 driven: bool = False, highest_v: float = MAX_VOLTAGE_V,
+                 held_at_m: float | None = None) -> Health:
     """
     Check a recording before anything is computed from it.
 
@@ -84,6 +92,9 @@ def check_health(run: Run, valve: str, criteria: Criteria = CRITERIA,
         Whether the contraction is given, as in an isometric rig or a joint.
     highest_v : float
         Voltage above which the regulator gives no more pressure.
+    held_at_m : float, optional
+        Contraction at which the muscle is held [m], where the model states it. Then it need not
+        be recorded.
 
     Returns
     -------
@@ -106,9 +117,11 @@ def check_health(run: Run, valve: str, criteria: Criteria = CRITERIA,
                            and s not in health.dead)
     health.remarks += [] if health.valve else [ALONE]
     health.remarks += [_dead(run, s) for s in health.dead]
-    for needed in ('pressure', 'contraction'):
+    for needed in ('pressure', *(('contraction',) if held_at_m is None else ())):
         if needed not in health.signals:
             health.problems.append(f'the recording has no {needed}')
+    if held_at_m is not None and 'contraction' not in health.signals:
+        health.remarks.append(HELD.format(1e3 * held_at_m))
     if driven and not health.valve and 'force' not in health.signals:
         health.problems.append(
             'the recording has neither a command of the valve nor a force, and the contraction is '
@@ -122,7 +135,7 @@ def check_health(run: Run, valve: str, criteria: Criteria = CRITERIA,
         _check_duration(run, health, criteria)
         for topic in _compared(health):
             _check_stamps(run, topic, health, criteria)
-        _check_motion(run, health, criteria)
+        _check_motion(run, health, criteria, driven)
         if health.valve:
             _check_saturation(run, health, criteria, highest_v)
     return health
@@ -216,9 +229,11 @@ def _check_stamps(run: Run, topic: str, health: Health, criteria: Criteria) -> N
             health.problems.append(f'{topic} holds values that are not finite')
 
 
-def _check_motion(run: Run, health: Health, criteria: Criteria) -> None:
-    for signal, least in (('pressure', criteria.min_pressure_move_pa),
-                          ('contraction', criteria.min_contraction_move_m)):
+def _check_motion(run: Run, health: Health, criteria: Criteria, driven: bool) -> None:
+    # Where the contraction is given, the force tells of the muscle: it may be held.
+    moves = [('pressure', criteria.min_pressure_move_pa)]
+    moves += [] if driven else [('contraction', criteria.min_contraction_move_m)]
+    for signal, least in moves:
         if np.ptp(run.topics[signal].values[FIELD[signal]]) < least:
             health.problems.append(
                 f'the {signal} hardly moves, so the recording says nothing about the model')

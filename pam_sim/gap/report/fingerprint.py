@@ -74,7 +74,7 @@ def conditions_of(recording: Measured, subsystem: str, time_s: FloatArray
     grid = recording.grid_s
     level = {s: np.interp(grid, recording.time_s[s], recording.measured[s])
              for s in ('pressure', 'contraction')}
-    moves = np.ptp(level['contraction']) > 10.0 * REST['contraction'] * GRID_S
+    moves = np.ptp(level['contraction']) > CRITERIA.min_contraction_move_m
     leading = 'pressure' if subsystem == 'valve' or not moves else 'contraction'
     window = min(SMOOTH_STEPS, 2 * ((grid.size - 1) // 2) - 1)
     rate = savgol_filter(level[leading], window, 2, deriv=1, delta=GRID_S)
@@ -260,7 +260,7 @@ def _force_errors(estimator: Estimator, problem: SubsystemProblem, index: int, f
     Return the same in force [N], while moving; None where there is hardly any motion.
 
     At rest dry friction takes any value that keeps the balance, and at the lower stop the
-    mass hangs on it.
+    mass hangs on it. Of a muscle that is held, the motion is that of its pressure.
     """
     recording = problem.recordings[index]
     chosen = (problem.run == index) & (problem.signal == len(problem.signals) - 1)
@@ -296,7 +296,8 @@ def _sides(rig: Rig, recording: Recording, subsystem: str) -> tuple[FloatArray, 
             weight = weight + np.append(recording.external_force_n, 0.0)
         noise.append(rig.parameters['mass_kg'] * noise_sd(a[::SMOOTH_EVERY]))
     if subsystem == 'muscle':
-        tension = simulate_driven(pressure_driven(rig), recording, x).force_n
+        tension = simulate_driven(pressure_driven(rig), recording, (
+            recording.given_contraction_m if recording.is_held else x)).force_n
         noise.append(noise_sd(tension))
         return tension, weight if cell is None else cell, float(np.linalg.norm(noise))
     assert cell is not None              # without one there is no error of the load
