@@ -25,6 +25,7 @@ from pam_actuation.tuning.joint_loop import JointLoop
 from pam_sim.errors import InputError
 from pam_sim.joint.rig import JointRig
 from pam_sim.units import P_ATM_PA
+from pam_sim.valve.reach import reach_gauge_pa
 
 if TYPE_CHECKING:
     from pam_actuation.experiments.experiment import Experiment
@@ -38,17 +39,22 @@ def reachable(rig: 'Rig | JointRig', experiment: 'Experiment', controller: 'Law'
     """
     Return whether a rig can hold what an experiment asks for with some pressure to spare.
 
-    A muscle is to hold the largest contraction, a joint both outermost angles.
+    A muscle is to hold the largest contraction, a joint both outermost angles. None gets more
+    than its regulator or supply gives.
     """
     lowest, highest = experiment.chain.extremes()
-    limit_pa = P_ATM_PA + controller.settings['max_pressure_gauge_pa']
-    if rig.valve == 'hsv':
-        limit_pa = min(limit_pa, *(one.parameters['supply_pa'] for one in rig.muscles.values()))
     if isinstance(rig, JointRig):
-        pulling_pa = limit_pa - _MARGIN_PA
-        return (rig.static_torque_n_m(highest, pulling_pa, P_ATM_PA) >= 0.0
-                and rig.static_torque_n_m(lowest, P_ATM_PA, pulling_pa) <= 0.0)
-    return float(rig.static_pressure_pa(highest)) + _MARGIN_PA <= limit_pa
+        flexor_pa, extensor_pa = (
+            _limit_pa(one, controller) - _MARGIN_PA for one in (rig.flexor, rig.extensor))
+        return (rig.static_torque_n_m(highest, flexor_pa, P_ATM_PA) >= 0.0
+                and rig.static_torque_n_m(lowest, P_ATM_PA, extensor_pa) <= 0.0)
+    return float(rig.static_pressure_pa(highest)) + _MARGIN_PA <= _limit_pa(rig, controller)
+
+
+def _limit_pa(muscle: 'Rig', controller: 'Law') -> float:
+    """Return the highest pressure [Pa] that controller and valve give a muscle."""
+    return P_ATM_PA + min(controller.settings['max_pressure_gauge_pa'],
+                          reach_gauge_pa(muscle.valve, muscle.parameters))
 
 
 def loops_of(rigs: 'Sequence[Rig | JointRig]', experiments: 'Sequence[Experiment]', seed: int,

@@ -145,6 +145,10 @@ def test_random_joints_are_reachable_or_left_out_and_tracked_alike_by_every_thre
     assert reachable(joint, experiment, controller)
     assert not reachable(joint.with_(parameters={
         'limb_mass_kg': 30.0, 'inertia_kg_m2': 0.4}), experiment, controller)
+    # A regulator that ends far below the limit of the controller, of either muscle.
+    for side in ('flexor', 'extensor'):
+        weak = getattr(joint, side).with_(parameters={'K_m': 1e4})
+        assert not reachable(joint.with_(**{side: weak}), experiment, controller)
     loops = [JointLoop(one, experiment, 1) for one in (joint, drawn[0])]
     problem = Problem(loops, controller)
     assert list(problem.costs({})) == [loop.cost(rebuild(controller, {})) for loop in loops]
