@@ -31,6 +31,7 @@ from pam_actuation.replay.arrivals import (
 from pam_actuation.topics import codec
 from pam_actuation.topics.table import BY_NAME, RECORDED
 from process_replay import bag_of
+from pam_sim.errors import InputError
 import pytest
 
 START_NS = 1_000_000_000_000

@@ -21,6 +21,7 @@ friction. Noise at rest would turn that direction hundreds of times a second.
 
 import numpy as np
 from pam_sim.annotations import BoolArray, FloatArray
+from pam_sim.gap.criteria import CRITERIA
 from pam_sim.gap.data.noise import noise_of
 
 WINDOW_S = 0.061             # of the parabolas that smooth; passes what is slower than 15 Hz
@@ -57,6 +58,11 @@ def given_motion(time_s: FloatArray, values: FloatArray, grid_s: FloatArray
         found = np.full(y.size, float(np.median(y)))
     hidden = np.append((np.diff(found) == 0.0) & (np.diff(y) != 0.0), False)
     return found, hidden & (np.mean(hidden) < MOSTLY)
+
+
+def hardly_moves(contraction_m: FloatArray) -> bool:
+    """Return whether a muscle is held, as in an isometric rig."""
+    return bool(np.ptp(contraction_m) < CRITERIA.min_contraction_move_m)
 
 
 def followed(values: FloatArray, play: float) -> FloatArray:

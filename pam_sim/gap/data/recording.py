@@ -20,7 +20,6 @@ from typing import Protocol
 
 import numpy as np
 from pam_sim.annotations import BoolArray, FloatArray
-from pam_sim.gap.criteria import CRITERIA
 from pam_sim.gap.data.given_motion import given_motion, smooth_motion
 from pam_sim.gap.data.jumps import jump_shares
 from pam_sim.gap.data.noise import SLOW_S
@@ -190,11 +189,6 @@ class Recording:
     def given_contraction_m(self) -> FloatArray:
         """Return the contraction that a driven load prescribes [m], on the grid, without noise."""
         return self._given[0]
-
-    @property
-    def is_held(self) -> bool:
-        """Return whether the contraction is given and hardly moves, as in an isometric rig."""
-        return self.driven and bool(np.ptp(self._given[0]) < CRITERIA.min_contraction_move_m)
 
     @cached_property
     def motion(self) -> tuple[FloatArray, FloatArray, FloatArray]:

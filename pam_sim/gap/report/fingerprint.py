@@ -34,6 +34,7 @@ import numpy as np
 from pam_sim.annotations import BoolArray, FloatArray, IntArray
 from pam_sim.effects.registry import get_effect
 from pam_sim.gap.criteria import CRITERIA, Criteria
+from pam_sim.gap.data.given_motion import hardly_moves
 from pam_sim.gap.data.noise import noise_sd
 from pam_sim.gap.data.recording import GRID_S, Measured, Recording
 from pam_sim.gap.data.signals import UNIT
@@ -296,8 +297,9 @@ def _sides(rig: Rig, recording: Recording, subsystem: str) -> tuple[FloatArray, 
             weight = weight + np.append(recording.external_force_n, 0.0)
         noise.append(rig.parameters['mass_kg'] * noise_sd(a[::SMOOTH_EVERY]))
     if subsystem == 'muscle':
-        tension = simulate_driven(pressure_driven(rig), recording, (
-            recording.given_contraction_m if recording.is_held else x)).force_n
+        if recording.driven and hardly_moves(recording.given_contraction_m):
+            x = recording.given_contraction_m
+        tension = simulate_driven(pressure_driven(rig), recording, x).force_n
         noise.append(noise_sd(tension))
         return tension, weight if cell is None else cell, float(np.linalg.norm(noise))
     assert cell is not None              # without one there is no error of the load
