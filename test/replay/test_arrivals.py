@@ -30,8 +30,8 @@ from pam_actuation.replay.arrivals import (
     ORDER, recorded_topics, recorded_topics_of_joint, TICKED)
 from pam_actuation.topics import codec
 from pam_actuation.topics.table import BY_NAME, RECORDED
-from process_replay import bag_of
 from pam_sim.errors import InputError
+from process_replay import bag_of
 import pytest
 
 START_NS = 1_000_000_000_000
