@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Pressure needed before the bladder touches the braid: F(p - p_th, eps)."""
+"""Pressure needed before the bladder touches the braid: F(max(p - p_th, 0), eps)."""
 
 import numpy as np
 from pam_sim.compiled import compiled
@@ -26,7 +26,7 @@ EFFECT = Effect(
     subsystem='muscle',
     sentence='Part of the pressure only brings the bladder to the braid and gives no force.',
     source='Radial expansion of the bladder, e.g. Davis et al. (2003), Int. J. Robotics Research.',
-    equation='F(p_g, eps) -> F(p_g - p_th, eps)',
+    equation='F(p_g, eps) -> F(max(p_g - p_th, 0), eps)',
     parameters=(
         Parameter('pressure_pa', 'Pa', 10e3, -100e3, 200e3, description='Pressure without force.'),
     ),
@@ -41,5 +41,5 @@ EFFECT = Effect(
 
 @compiled
 def map_input(gauge_pa: float, strain: float, par: np.record) -> tuple[float, float]:
-    """Return the pressure less the threshold."""
-    return gauge_pa - par.pressure_pa, strain
+    """Return the pressure less the threshold, never a suction: some laws would pull by it."""
+    return max(gauge_pa - par.pressure_pa, 0.0), strain

@@ -63,6 +63,34 @@ def test_pressure_friction_holds_the_mass():
         free.contraction_m[-1] - free.contraction_m[0])
 
 
+def slow_pull(signal, length_m, gauge_pa, **changes):
+    """Return (rig, path [m], response) of a driven rig without damping that is pushed short."""
+    rig = load_rig('dmsp_5_300_driven').with_(parameters={'damping_n_s_per_m': 0.0}, **changes)
+    path_m = np.linspace(0.0, length_m, len(signal) + 1)
+    return rig, path_m, rig.simulate(signal, contraction_m=path_m,
+                                     initial_pressure_pa=P_ATM_PA + gauge_pa)
+
+
+@pytest.mark.parametrize('gauge_pa', [0.0, 20e3, 240e3])
+def test_a_threshold_gives_no_force_below_it(gauge_pa):
+    """Beyond its stroke, such a law times a pressure below 0 would pull."""
+    rig, path_m, response = slow_pull(
+        np.full(2000, gauge_pa / 100e3), 0.04, gauge_pa, law='tondu_lopez',
+        effects=[{'name': 'threshold_pressure', 'parameters': {'pressure_pa': 40e3}}])
+    wanted_n = rig.muscle.law.law.force_n(
+        max(gauge_pa - 40e3, 0.0), path_m / rig.muscle.length_m, 'allow')
+    assert response.force_n == pytest.approx(wanted_n, abs=1e-6)
+    assert wanted_n.any() == (gauge_pa > 40e3)
+
+
+@pytest.mark.parametrize('law, length_m', [('tondu_lopez', 0.03), ('situm_herceg', 0.07)])
+def test_air_below_the_atmosphere_does_not_pull(law, length_m):
+    """Both valves are shut, and the muscle is pushed short: its volume grows."""
+    _, _, response = slow_pull(np.zeros((2000, 2)), length_m, 0.0, law=law, valve='hsv')
+    assert response.pressure_pa[-1] < P_ATM_PA - 1e3
+    assert not response.force_n.any()
+
+
 def test_bladder_stiffness_takes_its_force():
     response = driven(('bladder_stiffness', {'stiffness_n_per_m': 500.0}))
     nominal = driven()

@@ -85,7 +85,8 @@ GEOMETRY = (
 def tension_n(gauge_pa: float, strain: float, par: np.record) -> float:
     """Return p S (a (1 - eps)^2 - b) [N], one point."""
     ratio = 1.0 - strain
-    return gauge_pa * par.area_m2 * (par.a * ratio * ratio - par.b)
+    # Below the atmosphere both factors may be negative, and their product would pull.
+    return max(gauge_pa, 0.0) * par.area_m2 * (par.a * ratio * ratio - par.b)
 
 
 @compiled

@@ -41,7 +41,8 @@ def _chosen(bore_m: float, length_m: float, force_n: float, pressure_pa: float,
 @compiled
 def tension_n(gauge_pa: float, strain: float, par: np.record) -> float:
     """Return the formula's value [N], one point."""
-    return par.k_p_n_per_pa_m * gauge_pa * (
+    # Below the atmosphere both factors may be negative, and their product would pull.
+    return par.k_p_n_per_pa_m * max(gauge_pa, 0.0) * (
         par.length_m * (1.0 - strain) - par.shortest_length_m)
 
 

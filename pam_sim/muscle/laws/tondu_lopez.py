@@ -42,7 +42,8 @@ def tension_n(gauge_pa: float, strain: float, par: np.record) -> float:
     """Return the formula's value [N], one point."""
     factor = par.k0 + par.k_rise * math.exp(-gauge_pa * par.inverse_k_pressure_per_pa)
     left = max(0.0, 1.0 - factor * strain)
-    return gauge_pa * par.area_m2 * (par.a * left * left - par.b)
+    # Below the atmosphere both factors may be negative, and their product would pull.
+    return max(gauge_pa, 0.0) * par.area_m2 * (par.a * left * left - par.b)
 
 
 @compiled
