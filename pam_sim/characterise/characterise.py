@@ -23,9 +23,10 @@ from pam_sim.annotations import FloatArray
 from pam_sim.characterise.dimensions import Dimensions
 from pam_sim.characterise.fixed_load import check_given, fixed_load, FixedLoad
 from pam_sim.characterise.force_map import surfaces_of_map
-from pam_sim.characterise.points import points_of, without_stuck
+from pam_sim.characterise.points import EDGE_PA, points_of, without_stuck
 from pam_sim.characterise.surfaces import build_surfaces, Surfaces
 from pam_sim.characterise.tables import loads_of_table, MeasuredTable
+from pam_sim.characterise.zeros import without_zeros
 from pam_sim.errors import InputError
 from pam_sim.joint import load_rig_or_joint
 from pam_sim.muscle.lookup_table import LookupTable
@@ -87,6 +88,8 @@ def characterise_runs(
     """
     Return the Characterisation of recordings, one fixed load each.
 
+    Zeros that the rig of a recording states are taken off its readings.
+
     Parameters
     ----------
     runs : list of pam_sim.run.Run
@@ -109,9 +112,10 @@ def characterise_runs(
         raise InputError(f'has {len(loads_n)} loads for {len(runs)} recordings', '--load-n')
     rigs = [rig_of(run) for run in runs]
     size = one_muscle(runs, rigs, dimensions)
+    runs, remarks = without_zeros(runs, rigs)
     loads = [fixed_load(run, size.length_m, None if loads_n is None else loads_n[k], rigs[k])
              for k, run in enumerate(runs)]
-    remarks = check_given(loads)
+    remarks += check_given(loads) + _evacuated(loads)
     points, stuck = without_stuck(points_of(loads))
     surfaces = build_surfaces(points, size, load_step_n)
     loads = sorted(loads, key=lambda one: one.load_n)
@@ -169,6 +173,16 @@ def characterise_table(
 def _stuck_words(loads: Sequence[float]) -> list[str]:
     return [f'The load of {load:.2f} N did not pull the muscle long again when the pressure fell '
             f'(friction holds it); it was left out.' for load in loads]
+
+
+def _evacuated(loads: Sequence[FixedLoad]) -> list[str]:
+    """Return a sentence where a pressure stood still so low that a sensor must be off."""
+    lowest_pa, path = min(
+        (hold.pressure_gauge_pa, one.path) for one in loads for hold in one.holds)
+    return [] if lowest_pa >= -EDGE_PA else [
+        f'{path}: the pressure stood still at {1e-3 * lowest_pa:.1f} kPa gauge. A muscle is not '
+        'evacuated: the pressures of the table are off by the zero of the sensor. State it in the '
+        'rig file with which you record.']
 
 
 def rig_of(run: Run) -> Rig | None:

@@ -29,6 +29,7 @@ from pam_sim.characterise.dimensions import Dimensions
 from pam_sim.characterise.held_lengths import check_recorded, lengths_told, rising_force
 from pam_sim.characterise.holds import samples_of, still_spans
 from pam_sim.characterise.tables import MeasuredTable
+from pam_sim.characterise.zeros import without_zeros
 from pam_sim.errors import InputError
 from pam_sim.run import Run
 from pam_sim.units import P_ATM_PA
@@ -113,6 +114,8 @@ def characterise_held(runs: Sequence[Run], held_m: Sequence[float],
     """
     Return the Characterisation of recordings at held lengths.
 
+    Zeros that the rig of a recording states are taken off its readings.
+
     Parameters
     ----------
     runs, held_m :
@@ -131,7 +134,9 @@ def characterise_held(runs: Sequence[Run], held_m: Sequence[float],
     """
     rigs = [rig_of(run) for run in runs]
     size = one_muscle(runs, rigs, dimensions)
+    runs, zeros = without_zeros(runs, rigs)
     table, remarks = held_table(runs, held_m)
+    remarks += zeros
     for run, rig, contraction_m in zip(runs, rigs, held_m):
         remarks += check_recorded(run, rig, contraction_m, size.length_m)
     result = characterise_table(table, size, load_step_n)

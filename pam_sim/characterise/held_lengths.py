@@ -46,7 +46,7 @@ def check_recorded(run: Run, rig: Rig | None, held_m: float, length_m: float) ->
     Parameters
     ----------
     run : pam_sim.run.Run
-        Its contraction is looked at where there is one.
+        Its contraction is looked at where there is one, without the zero of the sensor.
     rig : pam_sim.rig.Rig or None
         That of the recording; an isometric one may state its contraction.
     held_m : float
@@ -119,15 +119,13 @@ def _contradiction(found_m: float, held_m: float, who: str, other: str) -> str:
 
 def _recorded_m(run: Run, rig: Rig | None) -> tuple[float, float, float] | None:
     """Return (low, median, high) of the contraction [m], None where none is known."""
-    zero = 'contraction_zero_m'
-    if 'contraction' not in run or rig is not None and zero in rig.unknown:
+    if 'contraction' not in run or rig is not None and 'contraction_zero_m' in rig.unknown:
         return None
     contraction = np.asarray(run['contraction'].values['contraction_m'], dtype=float)
     contraction = contraction[np.isfinite(contraction)]
     if not contraction.size:
         return None
-    low, middle, high = np.percentile(contraction, [1.0, 50.0, 99.0]) - (
-        rig.parameters[zero] if rig is not None else 0.0)
+    low, middle, high = np.percentile(contraction, [1.0, 50.0, 99.0])
     return float(low), float(middle), float(high)
 
 

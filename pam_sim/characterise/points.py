@@ -107,8 +107,8 @@ def _levels(loads: Sequence[FixedLoad]) -> FloatArray:
         held = sum(one.is_held_at(level) for one in loads)
         if 2 * held >= len(loads) and np.abs(levels - level).min() > NEAR_PA:
             levels = np.append(levels, level)
-    levels = np.unique(levels[(levels >= low - EDGE_PA) & (levels <= high + EDGE_PA)])
-    levels = np.maximum(levels, 0.0)
+    levels = np.unique(np.maximum(
+        levels[(levels >= low - EDGE_PA) & (levels <= high + EDGE_PA)], 0.0))
     if levels.size < 3:
         raise InputError(
             f'{levels.size} pressure levels are common to all loads ({1e-3 * low:.0f} to '

@@ -165,6 +165,19 @@ def test_a_length_that_the_recording_contradicts_is_refused():
         characterise_held(recorded, swapped, size)
 
 
+def test_the_stated_zeros_are_taken_off_a_recording_at_a_held_length():
+    held = [LENGTH_M * strain for strain in HELD]
+    zeros = {'pressure_zero_pa': 12e3, 'contraction_zero_m': 5e-3, 'force_zero_n': 30.0}
+    text = load_rig('dmsp_5_300_isometric').with_(zeros).to_yaml()
+    runs = [with_contraction(pulses(strain, seed=k, zero_pa=12e3, zero_n=30.0), one + 5e-3)
+            for k, (strain, one) in enumerate(zip(HELD, held))]
+    for run in runs:
+        run.metadata = {'rig': text}
+    found = characterise_held(runs, held, Dimensions(LENGTH_M, BORE_M))
+    assert off_percent(found) < 1.5
+    assert any('`pressure_zero_pa`, 12 kPa, which was taken off' in one for one in found.remarks)
+
+
 def test_a_force_that_rises_with_contraction_is_told():
     runs = [pulses(strain, seed=k) for k, strain in enumerate(HELD)]
     found = characterise_held(runs, [LENGTH_M * HELD[k] for k in (0, 2, 3, 1)],

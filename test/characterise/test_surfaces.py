@@ -25,6 +25,7 @@ from pam_sim.characterise.points import load_grid, points_of, with_no_load
 from pam_sim.errors import InputError
 from pam_sim.joint import load_joint
 from pam_sim.muscle.registry import make_law
+from pam_sim.tolerance import UNKNOWN
 import pytest
 from stepped_runs import contraction_m, LENGTH_M, LEVELS_PA, series_of_runs, stepped_run
 
@@ -259,6 +260,50 @@ def test_bad_recordings_are_refused_in_one_sentence(runs, options, words):
     with pytest.raises(InputError, match=words) as mistake:
         characterise_runs(runs(), MUSCLE, **options)
     assert '\n' not in str(mistake.value)
+
+
+def with_zeros(run, pressure_zero_pa, contraction_zero_m, force_zero_n):
+    """Return a run whose sensors read other than 0 where nothing is measured."""
+    for topic, key, zero in (('pressure', 'pressure_pa', pressure_zero_pa),
+                             ('contraction', 'contraction_m', contraction_zero_m),
+                             ('force', 'force_n', force_zero_n)):
+        run[topic].values[key] = run[topic][key] + zero
+    return run
+
+
+def test_the_zeros_that_the_rig_states_are_no_part_of_the_muscle(found):
+    zeros = {'pressure_zero_pa': -30e3, 'contraction_zero_m': 5e-3, 'force_zero_n': -4.0}
+    runs = [with_zeros(run, **zeros)
+            for run in series_of_runs(metadata={'rig': rig_text(**zeros)})]
+    read_pa = runs[0]['pressure']['pressure_pa'].copy()
+    without = characterise_runs(runs)
+    assert without.surfaces.load_n.tolist() == found.surfaces.load_n.tolist()
+    assert without.surfaces.pressure_gauge_pa == pytest.approx(found.surfaces.pressure_gauge_pa)
+    assert without.surfaces.strain == pytest.approx(found.surfaces.strain, abs=1e-6)
+    for said in ('All recordings: the rig states `pressure_zero_pa`, -30 kPa, which was taken off',
+                 '`contraction_zero_m`, 5 mm', '`force_zero_n`, -4 N'):
+        assert any(said in one for one in without.remarks)
+    assert np.array_equal(runs[0]['pressure']['pressure_pa'], read_pa)
+    assert not any('states `' in one for one in found.remarks)
+
+
+def test_a_zero_that_nobody_knows_is_told():
+    unknown = load_rig('dmsp_5_300_hanging_mass').with_(
+        tolerance={'contraction_zero_m': UNKNOWN}).to_yaml()
+    runs = series_of_runs([0.0, 30.0, 60.0, 90.0])
+    runs[1].metadata = {'rig': unknown}
+    assert ('load 30: the rig does not know its `contraction_zero_m`, so the readings count as '
+            'they are.') in characterise_runs(runs, MUSCLE).remarks
+
+
+def test_a_sensor_that_reads_below_the_atmosphere_makes_a_table_that_says_so():
+    """Two levels below 0 kPa are one pressure of the table."""
+    levels_pa = np.arange(-30e3, 575e3, 20e3)
+    off = characterise_runs(series_of_runs(levels_pa=levels_pa), MUSCLE)
+    assert off.surfaces.pressure_gauge_pa == pytest.approx([0.0, *levels_pa[2:]])
+    assert np.isfinite(off.surfaces.strain).all()
+    assert any('the pressure stood still at -30.' in one and 'is not evacuated' in one
+               for one in off.remarks)
 
 
 def test_recordings_of_different_muscles_or_of_none_are_refused():
