@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from pam_sim.characterise.surfaces import Surfaces
 
 ISOBARS = 6                 # pressures in the figure of force against contraction
-HOLD_COLUMNS = ('load_n', 'load_u_n', 'branch', 'pressure_pa', 'pressure_u_pa',
+HOLD_COLUMNS = ('load_n', 'load_u_n', 'branch', 'pressure_gauge_pa', 'pressure_u_pa',
                 'contraction_m', 'contraction_u_m', 'drift_m')
 
 

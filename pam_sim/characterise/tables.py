@@ -36,6 +36,7 @@ from pam_sim.files import StrPath
 from pam_sim.muscle.force_maps import ForceMap
 from pam_sim.muscle.lookup_table import read_commented_csv
 from pam_sim.short_repr import short_repr
+from pam_sim.units import P_ATM_PA
 
 # Column name in lower case -> (quantity, factor to SI).
 COLUMNS = {
@@ -48,6 +49,8 @@ COLUMNS = {
     'contraction_u_m': ('contraction_u', 1.0), 'contraction_u_mm': ('contraction_u', 1e-3),
     'load_u_n': ('load_u', 1.0), 'drift_m': ('drift', 1.0), 'pressure_u_pa': ('pressure_u', 1.0),
 }
+# From about the atmosphere on, rows so close to the lowest pressure, moved by less than a share.
+NEAR_ATMOSPHERE_PA, LEVEL_PA, RESTS = 5e3, 3e3, 0.02
 RowsOf = Callable[[StrPath], tuple[list[list[str]], str]]
 
 
@@ -83,7 +86,7 @@ def read_measured_table(path: StrPath, rows_of: RowsOf = read_commented_csv) -> 
     ------
     InputError
         File missing, unknown or missing column, two of one quantity, a cell that is no
-        number, a negative pressure.
+        number, a negative pressure, pressures that seem absolute.
 
     """
     rows, source = rows_of(path)
@@ -131,7 +134,23 @@ def read_measured_table(path: StrPath, rows_of: RowsOf = read_commented_csv) -> 
             str(path))
     if np.any(columns['pressure'] < -1e3):
         raise InputError('has a negative pressure; pressures are gauge', str(path))
+    _check_gauge(columns, first['pressure'], str(path))
     return MeasuredTable(kind, columns, branch, source, str(path))
+
+
+def _check_gauge(columns: dict[str, FloatArray], name: str, path: str) -> None:
+    """Refuse pressures from the atmosphere on, at which nothing pulls, unless called gauge."""
+    pressure = columns['pressure']
+    lowest_pa = float(pressure.min())
+    if 'gauge' in name or abs(lowest_pa - P_ATM_PA) > NEAR_ATMOSPHERE_PA:
+        return
+    what = next(one for one in ('force', 'contraction', 'strain', 'length') if one in columns)
+    moved = columns[what].max() - columns[what] if what == 'length' else columns[what]
+    if moved[pressure <= lowest_pa + LEVEL_PA].max() < RESTS * moved.max():
+        raise InputError(
+            f'`{name}` begins at {1e-3 * lowest_pa:.4g} kPa, where the muscle does nothing, so it '
+            f'seems absolute; take {P_ATM_PA:g} Pa off, or call it '
+            f'`{name.replace("pressure", "pressure_gauge")}` if it is gauge', path)
 
 
 def strain_of(table: MeasuredTable, length_m: float) -> FloatArray:

@@ -176,6 +176,27 @@ def test_tables_that_say_too_little_are_refused(tmp_path, head, rows, words):
         write(tmp_path / 'bad.csv', head, rows)
 
 
+@pytest.mark.parametrize('unit, lowest', [('Pa', 101325.0), ('kPa', 101.3), ('kPa', 98.0)])
+@pytest.mark.parametrize('head, row', [
+    ('load_N,contraction_mm', lambda load, p: (load, 0.05 * p)),
+    ('load_N,length_m', lambda load, p: (load, 0.3 - 5e-5 * p)),
+    ('strain,force_N', lambda percent, p: (0.01 * percent, 0.1 * p))])
+def test_pressures_that_seem_absolute_are_refused(tmp_path, unit, lowest, head, row):
+    """Such as those of ``pam export``: at the lowest pressure nothing pulls or contracts."""
+    per_kpa = 1e3 if unit == 'Pa' else 1.0
+
+    def rows(at_lowest_kpa):
+        return [(lowest + per_kpa * p, *row(other, at_lowest_kpa + p))
+                for other in (0.0, 10.0, 20.0) for p in range(0, 601, 100)]
+
+    words = f'`pressure_{unit.lower()}` begins at {lowest / per_kpa:.4g} kPa.* seems absolute'
+    with pytest.raises(InputError, match=words):
+        write(tmp_path / 'bad.csv', f'pressure_{unit},{head}', rows(0.0))
+    write(tmp_path / 'said.csv', f'pressure_gauge_{unit},{head}', rows(0.0))
+    if 'length_m' not in head:          # without the length at rest nobody knows
+        write(tmp_path / 'pulls.csv', f'pressure_{unit},{head}', rows(100.0))
+
+
 def test_a_load_that_pushes_is_refused(contraction_table):
     columns = {**contraction_table.columns, 'load': contraction_table.columns['load'] - 5.0}
     with pytest.raises(InputError, match='table.csv: has a load of -5 N; .* 0 N or more'):
