@@ -26,6 +26,7 @@ from pam_sim.joint.model_file import joint_preset_names
 from pam_sim.located_yaml import load_yaml
 from pam_sim.model_file import preset_names
 from pam_sim.parameters import Parameter
+from pam_sim.units import gauge_kpa
 from pam_sim.valve import hsv, ppr
 
 if TYPE_CHECKING:
@@ -71,6 +72,8 @@ def _idle(data: Any, rig: 'Rig') -> Iterator[str]:
         why = _why_idle(get_effect(item['name']), item.get('parameters') or {}, rig, numbers)
         if why:
             yield f'effect {item["name"]} {why}'
+        else:
+            yield from _idle_compressor(item, rig)
     other = 'hsv' if rig.valve == 'ppr' else 'ppr'
     stated = data.get('parameters') or {}
     idle = [one.name for one in (hsv if other == 'hsv' else ppr).PARAMETERS
@@ -91,6 +94,19 @@ def _why_idle(effect: Effect, stated: Mapping[str, float], rig: 'Rig', numbers: 
     if effect.is_active(effect.values(stated), numbers) or not lacking:
         return ''
     return f'states no {" and no ".join(lacking)}'
+
+
+def _idle_compressor(item: Mapping[str, Any], rig: 'Rig') -> Iterator[str]:
+    """Give the compressor of a reservoir that begins to run below the atmosphere, in words."""
+    effect = get_effect(item['name'])
+    if not effect.fitting.reservoir:
+        return
+    values = effect.values(item.get('parameters') or {})
+    volume, band, flow = effect.fitting.reservoir
+    band_kpa, supply_kpa = 1e-3 * values[band], gauge_kpa(rig.parameters['supply_pa'])
+    if values[volume] > 0.0 and values[flow] > 0.0 and band_kpa >= supply_kpa:
+        yield (f'the compressor of effect {effect.name}, which never starts: `{band}` is '
+               f'{band_kpa:g} kPa, and the supply {supply_kpa:g} kPa gauge')
 
 
 def _is_read(parameter: Parameter, rig: 'Rig', numbers: Numbers) -> bool:

@@ -75,6 +75,10 @@ def test_numbers_of_the_other_valve_are_told_unless_an_effect_reads_them(effect,
     ('rig: dmsp_5_300_hanging_mass\nparameters: {K_m: 9e4}\n', 'hsv', 'K_m is a number of ppr'),
     ('rig: dmsp_5_300_driven\neffects: [{name: guide_friction}]\n', None,
      'effect guide_friction acts on a load that moves freely'),
+    ('rig: dmsp_5_300_hanging_mass\nvalve: hsv\nparameters: {supply_pa: 401325}\neffects: [{name: '
+     'supply_droop, parameters: {band_pa: 450000, reservoir_volume_m3: 0.001}}]\n', None,
+     'the compressor of effect supply_droop, which never starts: `band_pa` is 450 kPa, and the '
+     'supply 300 kPa gauge'),
     # Of the preset, and switched off on purpose.
     (f'rig: {REALISTIC}\n', None, ''),
     (f'rig: {REALISTIC}\neffects: [{{name: valve_dead_time, parameters: {{delay_s: 0}}}}]\n',
