@@ -42,5 +42,5 @@ def volume_m3(muscle: 'Muscle', contraction_m: Number, gauge_pa: Number | float)
 
 
 def least_volume_m3(muscle: 'Muscle') -> float:
-    """Return the volume at rest [m^3], the smallest one."""
-    return volume_of(0.0, *muscle.shape)
+    """Return the least volume [m^3] up to the stroke: at rest, or with a flat braid at its end."""
+    return min(volume_of(0.0, *muscle.shape), volume_of(muscle.stroke_m, *muscle.shape))

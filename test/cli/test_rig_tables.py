@@ -93,3 +93,17 @@ def test_a_table_beyond_25_percent_moves_the_end_of_the_muscle(folder, capsys):
     said = re.findall(r'The table goes to (.+) % contraction, but max_strain ends the muscle at '
                       r'(.+) %\.', capsys.readouterr().out)
     assert said == [said[0]] * 2 and 29.0 < float(said[0][0]) <= 30.1 and said[0][1] == '20'
+
+
+def test_a_braid_whose_volume_is_largest_before_the_end_is_told(folder, capsys):
+    text = 'load: hanging_mass\nmuscle: {like: dmsp_5_300, braid_angle_rad: 0.8'
+    told = ('With a braid angle of 45.8 degrees the volume is largest at 17.1 % contraction, and '
+            'max_strain is 25 %. Beyond that the simulated muscle pulls and compresses its air. '
+            'State max_strain: 0.171, or the right braid_angle_rad.')
+    for more, count in (('}', 1), (', max_strain: 0.171}', 0)):
+        (folder / 'flat.yaml').write_text(f'{text}{more}\n')
+        assert main(['rig', 'check', 'flat.yaml']) == 0
+        assert capsys.readouterr().out.count(told) == count
+    # A new file ends the muscle there.
+    new('--muscle', 'dmsp_5_300', '--angle-deg', '45.8')
+    assert 'With a braid angle' not in capsys.readouterr().out

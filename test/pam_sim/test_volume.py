@@ -65,6 +65,14 @@ def test_the_volume_of_the_bore_is_not_that_of_the_force_as_the_docs_say(muscle,
     assert work_over_air(load_rig(f'{muscle}_hanging_mass')) == pytest.approx(ratio, abs=0.006)
 
 
+def test_the_least_volume_of_a_flat_braid_is_that_at_its_end():
+    flat, steep = (replace(get_muscle('dmsp_5_300'), braid_angle_rad=rad) for rad in (0.9, 0.5))
+    for muscle in (flat, steep):
+        least = muscle.volume_m3(np.linspace(0.0, muscle.stroke_m, 101)).min()
+        assert muscle.least_volume_m3 == pytest.approx(least, rel=1e-12)
+    assert flat.least_volume_m3 < flat.volume_m3(0.0)
+
+
 def test_a_table_fills_through_the_valves_as_the_rig_it_was_made_of():
     rig = load_rig(RIG, valve='hsv')
     of_table = rig.with_(law='lookup', volume='law')
