@@ -106,8 +106,12 @@ def _check_told(rig: 'Rig', told: dict[str, float]) -> None:
     """
     Raise InputError where a number of the valves is beyond what the driver takes.
 
-    It names the number as the rig does. With a regulator it does not matter: it is not told.
+    It names the number as the rig does. With a regulator it does not matter: it is not told, nor
+    is what else belongs to on/off valves.
     """
+    if rig.valve == 'ppr':
+        for name in (told.keys() & _HSV.keys()) - _AS_STATED.keys():
+            del told[name]
     for name, of_rig in _AS_STATED.items():
         taken = _HSV[name]
         if taken.lower <= told[name] <= taken.upper:
@@ -140,7 +144,13 @@ def driver_loops(rig: 'Rig | JointRig',
 
 
 def _load(rig: 'Rig') -> dict[str, float]:
-    """Return volume and swing of the load on the muscle, from the statics of the rig."""
+    """
+    Return volume and swing of the load on the muscle, from the statics of the rig.
+
+    A regulator needs neither: nothing for its rig.
+    """
+    if rig.valve == 'ppr':
+        return {}
     if rig.is_driven:
         # The contraction is prescribed: nothing swings with the pressure.
         held_m = rig.parameters.get('contraction_m', 0.0)

@@ -93,7 +93,7 @@ class HsvConfig:
     volume_slope_m3_per_m: float = number(
         1.11e-4, 0.0, 1e-1, 'volume per contraction of the muscle at rest')
     contraction_at_600kpa_m: float = number(
-        0.0302, 1e-6, 0.3, 'contraction at 600 kPa gauge')
+        0.0302, 1e-6, 4.5, 'contraction at 600 kPa gauge')
     pulse_noise_pa: float = number(
         0.0, 0.0, 1e5, 'observer: error from which gain and offset of the pulses of each '
         'valve are found; 0 = never')

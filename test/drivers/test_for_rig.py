@@ -72,3 +72,20 @@ def test_no_duty_is_below_0():
     """A period of 2 ms and a closing time of 2.3 ms gave -0.15."""
     for opening in (0.01, 0.3, 0.6, 1.0):
         assert 0.0 <= duty_of_opening(opening, 0.2, 1.15, 0.05) <= 1.0
+
+
+@pytest.mark.parametrize('more', [
+    'muscle: {like: dmsp_20_300, length_m: 1.5}\nload: hanging_mass\n',
+    'rig: dmsp_5_300_hanging_mass\n'
+    'effects: [{name: valve_dead_time, parameters: {delay_s: 0.26}}]\n',
+    'rig: dmsp_5_300_hanging_mass\nparameters: {pwm_period_s: 0.002}\n'
+    'effects: [{name: valve_dead_time, parameters: {delay_s: 0.06}}]\n'])
+def test_a_regulator_is_not_refused_for_what_belongs_to_a_pair(more):
+    rig = load_rig(f'valve: ppr\n{more}')
+    delays = [one.parameters['delay_s'] for one in rig.effects]
+    assert driver_config(rig).ppr.dead_time_s == (delays[0] if delays else 0.0)
+
+
+def test_a_pair_drives_a_stroke_of_more_than_300_mm():
+    rig = load_rig('valve: hsv\nload: hanging_mass\nmuscle: {like: dmsp_20_300, length_m: 1.5}\n')
+    assert driver_config(rig).hsv.contraction_at_600kpa_m == pytest.approx(0.358, abs=1e-3)
