@@ -248,8 +248,9 @@ def _remarks(rig: 'Rig', path: str) -> list[str]:
     from pam_actuation.rig_files.effects import unstated_valve_data
     from pam_sim.idle import idle_remarks
     from pam_sim.muscle.muscle_remarks import muscle_remarks
-    return [*muscle_remarks(rig.muscle), *left_remarks(rig), *idle_remarks(path, rig),
-            *unstated_valve_data(rig), *driver_remarks(rig), *_zeros_known_relatively(rig)]
+    return [*muscle_remarks(rig.muscle, rig.parameters['force_map_gain']), *left_remarks(rig),
+            *idle_remarks(path, rig), *unstated_valve_data(rig), *driver_remarks(rig),
+            *_zeros_known_relatively(rig)]
 
 
 def _zeros_known_relatively(rig: 'Rig') -> list[str]:

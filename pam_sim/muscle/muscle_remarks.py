@@ -12,21 +12,48 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a reader should know of a muscle before it is simulated: its table, and its braid."""
+"""What a reader should know of a muscle before it is simulated: its force law and its braid."""
 
 import math
 
+import numpy as np
 from pam_sim.muscle.geometry import most_strain
+from pam_sim.muscle.lookup_table import LookupTable
 from pam_sim.muscle.muscle import Muscle
-from pam_sim.muscle.table_remarks import table_remarks
+from pam_sim.muscle.table_remarks import PULLS, table_remarks
 from pam_sim.volume import bore
 
 _WORTH_A_REMARK = 1e-3      # of contraction, beyond that of the largest volume
+_FILLED_PA = 600e3          # gauge; where the largest force is looked at
 
 
-def muscle_remarks(muscle: Muscle) -> list[str]:
-    """Return what a reader should know of a muscle, in sentences."""
-    return [*table_remarks(muscle), *_braid_remarks(muscle)]
+def muscle_remarks(muscle: Muscle, force_map_gain: float = 1.0) -> list[str]:
+    """
+    Return what a reader should know of a muscle, in sentences.
+
+    ``force_map_gain``: factor on its force, as the rig has it.
+    """
+    return [*table_remarks(muscle), *_vented_remarks(muscle, force_map_gain),
+            *_braid_remarks(muscle)]
+
+
+def _vented_remarks(muscle: Muscle, gain: float) -> list[str]:
+    """Return a sentence where a vented muscle would still pull by a formula."""
+    law = muscle.law.law
+    if isinstance(getattr(law, 'table', None), LookupTable):
+        return []               # of which table_remarks tell
+    strain = np.linspace(0.0, muscle.max_strain, 51)
+    pull_n = float(np.max(law.force_n(0.0, strain, 'allow')))
+    if pull_n <= PULLS * law.force_n(_FILLED_PA, 0.0, 'allow'):
+        return []
+    lowest_pa = law.validity.pressure_gauge_pa[0]
+    begins = (f', below the {1e-3 * lowest_pa:.0f} kPa at which its numbers begin'
+              if lowest_pa > 0.0 else '')
+    end = min(float(law.max_strain(0.0)), muscle.max_strain)
+    return [
+        f'Law `{law.NAME}` still pulls {gain * pull_n:.3g} N at 0 kPa{begins}. It lets go at '
+        f'{100.0 * end:.2g} % contraction. In simulation a vented muscle holds such a load up; a '
+        'real one lets it down.']
 
 
 def _braid_remarks(muscle: Muscle) -> list[str]:
@@ -37,6 +64,6 @@ def _braid_remarks(muscle: Muscle) -> list[str]:
     return [
         f'With a braid angle of {math.degrees(muscle.braid_angle_rad):.3g} degrees the volume is '
         f'largest at {100.0 * end:.3g} % contraction, and max_strain is '
-        f'{100.0 * muscle.max_strain:.4g} %. Beyond that the simulated muscle pulls and compresses '
-        f'its air. State max_strain: {math.floor(1e3 * end) / 1e3:g}, or the right '
+        f'{100.0 * muscle.max_strain:.4g} %. Beyond that the simulated muscle pulls and '
+        f'compresses its air. State max_strain: {math.floor(1e3 * end) / 1e3:g}, or the right '
         'braid_angle_rad.']

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 
 _END = next(one for one in DIMENSIONS if one.name == 'max_strain')
 _WORTH_A_REMARK = 1e-3      # of contraction, beyond the end of the muscle
-_PULLS = 0.01               # of the largest force; a vented muscle that pulls less is at rest
+PULLS = 0.01                # of the largest force; a vented muscle that pulls less is at rest
+_AT_REST = 0.02             # contraction up to which a muscle counts as at rest
 
 
 def max_strain_in(table: LookupTable) -> float:
@@ -35,16 +36,27 @@ def max_strain_in(table: LookupTable) -> float:
 
 
 def vented_remarks(law: 'MuscleLaw', table: LookupTable) -> list[str]:
-    """Return a sentence where a table begins so high that a vented muscle would still pull."""
+    """Return a sentence where a vented muscle would still pull by a table."""
     lowest_pa, highest_pa = table.pressure_gauge_pa[[0, -1]]
     if lowest_pa <= 0.0:
-        return []
+        return _pull_at_0_kpa(law, table, float(highest_pa))
     pull_n, most_n = law.force_n(np.array([lowest_pa, highest_pa]), 0.0, 'allow')
-    return [] if pull_n <= _PULLS * most_n else [
+    return [] if pull_n <= PULLS * most_n else [
         f'The table begins at {1e-3 * lowest_pa:.0f} kPa, and below that its edge is used: a '
         f'vented muscle would still pull {pull_n:.3g} N at rest. Measure at 0 kPa as well, or add '
         'rows of pressure 0 to the measured table: force 0 at every length, or contraction 0 '
         'under every load.']
+
+
+def _pull_at_0_kpa(law: 'MuscleLaw', table: LookupTable, highest_pa: float) -> list[str]:
+    """Return a sentence where a table that begins at 0 kPa pulls there."""
+    # What is about at rest is read between one or two points.
+    strain = np.linspace(_AT_REST, max(float(table.strain.max()), _AT_REST), 51)
+    pull_n = float(np.max(law.force_n(0.0, strain, 'allow')))
+    return [] if pull_n <= PULLS * law.force_n(highest_pa, 0.0, 'allow') else [
+        f'The table pulls up to {pull_n:.3g} N at 0 kPa beyond {100.0 * _AT_REST:g} % '
+        'contraction, so a vented muscle would hold a load up. A real one lets it down: look at '
+        'the zero of the pressure sensor, and at the rows of the lowest pressure.']
 
 
 def table_remarks(muscle: Muscle) -> list[str]:

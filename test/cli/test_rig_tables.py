@@ -107,3 +107,32 @@ def test_a_braid_whose_volume_is_largest_before_the_end_is_told(folder, capsys):
     # A new file ends the muscle there.
     new('--muscle', 'dmsp_5_300', '--angle-deg', '45.8')
     assert 'With a braid angle' not in capsys.readouterr().out
+
+
+def test_a_table_that_pulls_at_0_kpa_is_told(folder, capsys):
+    options = forces_of(folder)
+    new(*options)
+    assert 'at 0 kPa' not in capsys.readouterr().out
+    rows = [row.split(',') for row in (folder / 'forces.csv').read_text().splitlines()]
+    # The sensor read 0 kPa at 100 kPa.
+    (folder / 'forces.csv').write_text('\n'.join(
+        [','.join(rows[0])] + [f'{float(kpa) - 100.0:g},{length},{force}'
+                               for kpa, length, force in rows[1:] if kpa != '0']) + '\n')
+    new(*options, '--overwrite')
+    assert re.search(r'The table pulls up to 1[34]\d N at 0 kPa beyond 2 % contraction, so a '
+                     r'vented muscle would hold a load up\.', capsys.readouterr().out)
+
+
+@pytest.mark.parametrize('rig, said', [
+    ('rig: dmsp_5_300_hanging_mass\nlaw: repperger\n',
+     'Law `repperger` still pulls 179 N at 0 kPa, below the 207 kPa at which its numbers begin. '
+     'It lets go at 13 % contraction.'),
+    ('rig: dmsp_20_300_hanging_mass\nparameters: {force_map_gain: 2}\n',
+     'Law `sarosi` still pulls 222 N at 0 kPa, below the 35 kPa at which its numbers begin. It '
+     'lets go at 0.54 % contraction.'),
+    ('rig: dmsp_5_300_hanging_mass\n', ''), ('rig: dmsp_10_250_hanging_mass\n', '')])
+def test_a_law_that_pulls_in_a_vented_muscle_is_told(rig, said, folder, capsys):
+    (folder / 'rig.yaml').write_text(rig)
+    assert main(['rig', 'check', 'rig.yaml']) == 0
+    out = capsys.readouterr().out
+    assert out.count('at 0 kPa') == bool(said) and said in out
