@@ -18,8 +18,9 @@ The last word at a device: a small process that vents when the valve driver can 
 A device holds its last signal when the process that drives it is killed or stopped. The driver
 therefore starts this module as a separate process. It tells the process once which attributes to
 write to vent, and with every signal whether the muscle may be under pressure. The process knows
-nothing else, needs neither ROS nor a network, and ends when the driver has ended. A device that
-refuses to the end it vents after that, as soon as it takes the value.
+nothing else, needs neither ROS nor a network, and ends when the driver has ended. It says
+when it has read a signal. A device that refuses to the end it vents after that, as soon as it
+takes the value.
 
 What it can not cover is a computer that stands still or loses its power: see
 docs/explanation/safety.md.
@@ -40,9 +41,12 @@ from typing import IO
 from pam_actuation.hardware import sysfs
 from pam_actuation.hardware.sysfs import DeviceError
 
-AT_REST, IN_USE, READY, VENTED = b'0', b'1', b'r', b'v'
+AT_REST, IN_USE, READY, VENTED, READ = b'0', b'1', b'r', b'v', b'a'
 START_TIMEOUT_S = 10.0
 END_TIMEOUT_S = 1.0
+# Silence of the process that is a fault, and signals that it left unread meanwhile: where both
+# processes stood still, the driver may go on first.
+SILENCE_S, LEAST_UNREAD = 2.0, 20
 TRY_AGAIN_S = 0.01
 LONGEST_TRY_S = 60.0
 WHERE = 'watchdog of the device'
@@ -74,6 +78,7 @@ class DeviceWatchdog:
         self._order = json.dumps({
             'timeout_s': timeout_s, 'writes': [(str(path), value) for path, value in writes]})
         self._vents = 0
+        self._unread, self._unread_since_s = 0, 0.0
         self._start()
         self._wait_until_ready()
 
@@ -102,7 +107,7 @@ class DeviceWatchdog:
         Raises
         ------
         DeviceError
-            The process ended, and was started again, or does not read.
+            The process ended, and was started again, or does not read, as one that was stopped.
 
         """
         said = IN_USE if in_use else AT_REST
@@ -111,10 +116,27 @@ class DeviceWatchdog:
         except BrokenPipeError:
             ended = self._process       # kept where no other starts: it is tried again
             self._start(said)
+            self._unread = 0
             _end(ended)
             raise DeviceError('ended and was started again', WHERE) from None
-        if not taken:
+        if not taken or self._is_silent():
             raise DeviceError('does not read what it is told', WHERE)
+
+    def _is_silent(self) -> bool:
+        """Return whether the process has left what it was told unread for long."""
+        self._hear()
+        now_s = time.monotonic()
+        if self._unread == 0:
+            self._unread_since_s = now_s
+        self._unread += 1
+        return self._unread > LEAST_UNREAD and now_s - self._unread_since_s > SILENCE_S
+
+    def _hear(self) -> None:
+        """Note what the process said: that it vented, that it has read what it was told."""
+        said = _pipes(self._process)[1].read(4096) or b''
+        self._vents += said.count(VENTED)
+        if READ in said:
+            self._unread = 0
 
     @property
     def pid(self) -> int:
@@ -124,8 +146,7 @@ class DeviceWatchdog:
     @property
     def vents(self) -> int:
         """Return how often the process has vented while the driver was silent."""
-        said = _pipes(self._process)[1].read(4096) or b''
-        self._vents += said.count(VENTED)
+        self._hear()
         return self._vents
 
     def close(self, vented: bool) -> None:
@@ -178,6 +199,7 @@ class _LastWord:
             gone = heard == b''
             if heard:
                 self._in_use = heard.endswith(IN_USE)
+                self._say(READ)
                 told = False
             elif self._in_use:
                 # Again and again: a driver may have been stopped in the middle of a write.

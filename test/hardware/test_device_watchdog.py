@@ -167,6 +167,38 @@ def test_a_watchdog_that_was_killed_is_a_fault_and_comes_back(tmp_path):
     assert output.close() == '' and output.watchdog_vents is None
 
 
+def test_a_watchdog_that_is_stopped_is_a_fault_until_it_goes_on(tmp_path, monkeypatch):
+    path = tmp_path / 'volts'
+    put(path, 0)
+    watchdog = DeviceWatchdog([(path, 0)], 60.0)
+    output = GuardedOutput(OneAttribute(path), watchdog)
+    for _ in range(100):                        # with the period of a driver
+        assert output.send((3.0,)) == ''
+        time.sleep(0.005)
+    monkeypatch.setattr(device_watchdog, 'SILENCE_S', 0.2)
+    os.kill(watchdog.pid, signal.SIGSTOP)
+    soon(lambda: 'does not read what it is told' in output.send((3.0,)), 'noticed')
+    assert number_in(path) == 0
+    os.kill(watchdog.pid, signal.SIGCONT)
+    soon(lambda: output.send((3.0,)) == '', 'goes on')
+    assert number_in(path) == 3 and watchdog.vents == 0
+    assert output.close() == '' and number_in(path) == 0
+
+
+def test_a_driver_that_stood_still_is_no_fault_of_its_watchdog(tmp_path, monkeypatch):
+    """Both may have, and the driver goes on first."""
+    monkeypatch.setattr(device_watchdog, 'SILENCE_S', 0.05)
+    path = tmp_path / 'volts'
+    put(path, 0)
+    watchdog = DeviceWatchdog([(path, 0)], 60.0)
+    os.kill(watchdog.pid, signal.SIGSTOP)
+    watchdog.tell(True)
+    time.sleep(0.1)
+    watchdog.tell(True)
+    os.kill(watchdog.pid, signal.SIGCONT)
+    watchdog.close(vented=True)
+
+
 def test_one_that_is_started_again_knows_that_the_muscle_is_under_pressure(tmp_path):
     path = tmp_path / 'volts'
     put(path, 0)
