@@ -23,6 +23,7 @@ import math
 from typing import TYPE_CHECKING
 import xml.etree.ElementTree as ElementTree
 
+from pam_sim.load.registry import HANGING_MASS
 from pam_sim.units import P_ATM_PA
 
 if TYPE_CHECKING:
@@ -63,7 +64,7 @@ def muscle_urdf(rig: 'Rig', name: str, frames: str = '') -> str:
     base = ElementTree.SubElement(robot, 'link', name=f'{frames}_base')
     add_outer_tube(base, muscle, (0.0, 0.0, 0.0))
     end = ElementTree.SubElement(robot, 'link', name=f'{frames}_end')
-    if 'mass_kg' in rig.parameters:
+    if rig.load == HANGING_MASS:        # of another load it is an inertia, not a thing below
         _add_load(end, rig.parameters['mass_kg'])
     add_inner_tube(end, muscle)
     joint = add_muscle_joint(robot, name, f'{frames}_base', f'{frames}_end',

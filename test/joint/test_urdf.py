@@ -14,10 +14,11 @@
 
 """Test the robot descriptions: what they say is what joint and muscle are."""
 
+import copy
 import math
 import xml.etree.ElementTree as ElementTree
 
-from pam_sim import load_rig
+from pam_sim import load_rig, urdf
 from pam_sim.joint import load_joint
 from pam_sim.joint.parameters import SIDES
 from pam_sim.joint.statics import static_torque
@@ -142,3 +143,12 @@ def test_the_muscles_of_a_joint_shorten_as_the_pulleys_have_it(name):
         inner, = tubes(robot, f'knee_{side}')
         assert x == outer[side][1] == sign * joint.parameters[f'{side}_radius_m']
         check_shortens(outer[side], inner, low, muscle.stroke_m, muscle.length_m)
+
+
+def test_the_inertia_of_another_load_is_no_hanging_mass(monkeypatch):
+    monkeypatch.setattr(urdf, 'largest_force_n', lambda rig: 100.0)
+    rig = load_rig('dmsp_5_300_hanging_mass')
+    assert list(parsed(muscle_urdf(rig, 'biceps'))[0].iter('inertial'))
+    other = copy.copy(rig)
+    vars(other).update(load='pendulum')         # as of PAM_LOADS_PATH, with its own `mass_kg`
+    assert not list(parsed(muscle_urdf(other, 'biceps'))[0].iter('inertial'))
