@@ -193,8 +193,12 @@ def test_a_marker_reaches_the_recorder_and_every_page(domain, driver):
         answers = []
 
         def ready():
+            # A subscription may be known before the name of its node is.
+            names = [one.node_name for one in listener._node.get_subscriptions_info_by_topic(
+                '/muscle/marker')]
             return node.count_subscribers('/muscle/marker') == 3 and (
-                other.store.namespaces() and listener.store.namespaces())
+                'experiment_recorder' in names
+                and other.store.namespaces() and listener.store.namespaces())
 
         until(listener, executor, ready, send)
         listener.act(Request('mark', view='/muscle', text='valve open'), answers.append)
