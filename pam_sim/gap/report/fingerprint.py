@@ -75,8 +75,8 @@ def conditions_of(recording: Measured, subsystem: str, time_s: FloatArray
     grid = recording.grid_s
     level = {s: np.interp(grid, recording.time_s[s], recording.measured[s])
              for s in ('pressure', 'contraction')}
-    moves = np.ptp(level['contraction']) > CRITERIA.min_contraction_move_m
-    leading = 'pressure' if subsystem == 'valve' or not moves else 'contraction'
+    is_led = subsystem == 'valve' or hardly_moves(level['contraction'])
+    leading = 'pressure' if is_led else 'contraction'
     window = min(SMOOTH_STEPS, 2 * ((grid.size - 1) // 2) - 1)
     rate = savgol_filter(level[leading], window, 2, deriv=1, delta=GRID_S)
     motion = np.where(rate > REST[leading], 1, np.where(rate < -REST[leading], -1, 0))

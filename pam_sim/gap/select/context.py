@@ -31,6 +31,7 @@ from pam_sim.gap.select.reservoir import with_compressor
 from pam_sim.gap.select.rival import Rival
 from pam_sim.gap.select.screening import screen, Screened
 from pam_sim.gap.subsystems.problem import SubsystemProblem
+from pam_sim.gap.subsystems.recent import Recent
 from pam_sim.gap.subsystems.valve import ValveProblem
 
 
@@ -78,8 +79,8 @@ class SearchContext:
     out_of_time: Callable[[], bool]
     matters: Callable[[Fit, Fit], bool]
     left_out: tuple[str, ...] = ()
-    _last: list[tuple[Fit, tuple[Candidate, ...], list[Screened]]] = field(
-        default_factory=list, repr=False, compare=False)
+    _screened: Recent[list[Screened]] = field(
+        default_factory=lambda: Recent(1), repr=False, compare=False)
 
     @property
     def criteria(self) -> Criteria:
@@ -107,11 +108,8 @@ class SearchContext:
         """Return candidates as screened at a fit; those of the last one are kept."""
         if current is self.base:
             return self.screened
-        for fit, candidates_there, screened in self._last:
-            if fit is current and candidates_there == tuple(found):
-                return screened
-        self._last[:] = [(current, tuple(found), screen(self.estimator, current, found))]
-        return self._last[0][2]
+        return self._screened.get((id(current), tuple(found)), lambda: screen(
+            self.estimator, current, found), current)
 
     def explained(self, current: Fit) -> dict[str, float]:
         """Return the share of the gap that a fit explains, by subsystem with a gap."""
