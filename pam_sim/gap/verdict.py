@@ -214,7 +214,7 @@ def _is_left(result: GapResult, validation: Validation, least: float) -> bool:
     large = [name for name, s in result.signals.items()
              if left(name, s.noise_floor) > least and surely(name) > sure]
     # What the searched data show clearly is no doubt about numbers, however wide their priors.
-    if not large or _is_clear(validation):
+    if not large or is_clear(validation):
         return bool(large)
     spread = spread_of_numbers(validation)
     return any(surely(name, spread.get(name, 0.0)) > sure for name in large)
@@ -227,7 +227,7 @@ def given_suffices(result: GapResult, validation: Validation, materiality: float
     Few moves tell some numbers hardly, and noise alone then leads them away. An effect may make
     up for that. What the searched data show clearly is a gap all the same.
     """
-    if result.verdict == 'no_gap' or result.noticed or _is_clear(validation):
+    if result.verdict == 'no_gap' or result.noticed or is_clear(validation):
         return False
     least = max(materiality, 1.0)
     if result.effects:          # what has a name is more than a gap without one
@@ -236,7 +236,7 @@ def given_suffices(result: GapResult, validation: Validation, materiality: float
                for name, s in result.signals.items())
 
 
-def _is_clear(validation: Validation) -> bool:
+def is_clear(validation: Validation) -> bool:
     """Return whether calibration leaves a gap in the searched data that is clear without proof."""
     estimator, base = validation.estimator, validation.base
     return any(gap(p, base.errors[p.subsystem]) > estimator.criteria.clear_rest

@@ -42,7 +42,7 @@ from pam_sim.gap.select.refit import within_ranges
 from pam_sim.gap.select.search import search
 from pam_sim.gap.subsystems.problems import subsystem_problems
 from pam_sim.gap.subsystems.pulses_seen import shows_pulses
-from pam_sim.gap.verdict import decide
+from pam_sim.gap.verdict import decide, is_clear
 from pam_sim.gap.verify.confirmed import confirmed
 from pam_sim.gap.verify.materiality import materiality_on
 from pam_sim.gap.verify.validation import Validation
@@ -59,9 +59,14 @@ SAME_EDGES = (
     'and does not show that other steps are followed; record other steps and give them as '
     '--certify')
 
+PROOF_SEARCHED = (
+    'the searched recordings show no clear gap, the recording for the proof does; so that one was '
+    'searched as well, and the proof is on every fifth block of it; record that motion again and '
+    'give it as --certify for a proof on data of its own')
 CUT_SHORT = (' The search was cut short: its {:g} s ran out before all was tried, and more time '
              'may change this answer.')
 UNNAMED = ('term', 'surrogate')
+WANTING = ('unknown', 'partial')
 NOT_JUDGED = {'valve': 'the record has no valve command',
               'muscle': 'its contraction is given, and the record has no force'}
 
@@ -82,7 +87,8 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     rig : pam_sim.Rig
         The given model.
     certify : Run, optional
-        Recording for the validation; by default every fifth block of the first run.
+        Recording for the validation; by default every fifth block of the first run. If it alone
+        shows a gap, it is searched too, as the first run.
     effects : sequence of str, optional
         Names to try; all by default.
     seconds : float
@@ -113,7 +119,7 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
         No recording is given. Two of them, searched or for the validation, are the same one.
 
     """
-    started = time.perf_counter() - spent_s
+    started, given = time.perf_counter() - spent_s, rig
     checked = checked_runs(runs, certify, rig, criteria)
     if checked.refusals:
         text = '; '.join(checked.refusals)
@@ -182,6 +188,14 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     result.simulations = sum(
         one.simulations for one in (estimator, validation, own_runs))
     progress(0.96)
+    if certify and result.verdict in WANTING and not is_clear(validation):
+        searched = [runs] if isinstance(runs, Run) else runs
+        both = find_gap([certify, *searched], given, None, effects, seconds, materiality, seed,
+                        criteria=criteria, unnamed=(), spent_s=time.perf_counter() - started)
+        if (both.effects or both.parameters) and both.verdict not in WANTING:
+            both.remarks.insert(0, PROOF_SEARCHED)
+            progress(1.0)
+            return both
     if 'term' in unnamed:
         propose(result, validation, context.out_of_time)
     progress(0.98)

@@ -150,6 +150,8 @@ def _normal(columns: FloatArray) -> FloatArray:
 
 def _unit(values: FloatArray) -> FloatArray:
     """Return values about their mean, in their standard deviation."""
+    if not values.size:         # no span lies within the data of the proof
+        return values
     return (values - values.mean()) / max(float(values.std()), 1e-12)
 
 
