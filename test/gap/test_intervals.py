@@ -114,9 +114,13 @@ def test_where_the_slopes_tell_all_the_ends_are_those_of_the_covariance():
     (0.4, [[0.0, 0.1], [0.2, 0.9]], None),          # known no better together
     (0.4, [[0.099, 0.398], [0.101, 0.402]], None)])         # known alone
 def test_a_sum_or_a_product_is_told_where_neither_number_is_known(close, ends, text):
-    found = known_together({'open': (0.1, 's'), 'close': (close, 's')},
-                           [np.array([[0.5, 0.5], [0.5, 0.5]]) * 1e-8], np.array([ends]), 0.01)
+    values = {'open': (0.1, 's'), 'close': (close, 's')}
+    covariances = [np.array([[0.5, 0.5], [0.5, 0.5]]) * 1e-8]
+    found = known_together(values, np.eye(2), covariances, np.array([ends]), 0.01)
     assert [one.text() for one in found] == ([] if text is None else [text])
+    # Two quantities of one parameter are no two numbers.
+    one_parameter = np.array([[1.0, 0.0], [2.0, 0.0]])
+    assert known_together(values, one_parameter, covariances, np.array([ends]), 0.01) == []
 
 
 def switching(**effect):

@@ -24,6 +24,7 @@ from pam_sim.annotations import FloatArray
 
 WIDE = 0.25                  # half an interval, of the value: the number is not known alone
 BETTER = 5.0                 # times as well known together as alone
+SAME = 1e-6                  # numerics: slopes of two numbers that are one
 ROUND = 0.03                 # how near to a whole number a power is one
 
 
@@ -60,8 +61,9 @@ class Combination:
         return f'{terms} = {self.value:.4g} ± {self.half_width:.2g}'
 
 
-def known_together(values: Mapping[str, tuple[float, str]], covariances: Sequence[FloatArray],
-                   ends: FloatArray, least: float = 0.0) -> list[Combination]:
+def known_together(values: Mapping[str, tuple[float, str]], slopes: FloatArray,
+                   covariances: Sequence[FloatArray], ends: FloatArray, least: float = 0.0
+                   ) -> list[Combination]:
     """
     Return what is known of pairs of which neither number is known.
 
@@ -72,8 +74,10 @@ def known_together(values: Mapping[str, tuple[float, str]], covariances: Sequenc
     ----------
     values : dict of str -> (float, str)
         The Q numbers with their units.
-    covariances : sequence of numpy.ndarray, shape (Q, Q)
-        Each by itself possible.
+    slopes : numpy.ndarray, shape (Q, K)
+        Their slopes by the K parameters that were fitted.
+    covariances : sequence of numpy.ndarray, shape (K, K)
+        Of those parameters, each by itself possible.
     ends : numpy.ndarray, shape (P, 2, Q)
         The numbers at both ends of intervals.
     least : float
@@ -81,12 +85,15 @@ def known_together(values: Mapping[str, tuple[float, str]], covariances: Sequenc
 
     """
     found = []
+    own = [slopes @ one @ slopes.T for one in covariances]
     names, at = list(values), np.array([value for value, _ in values.values()])
     half = 0.5 * np.ptp(ends.reshape(-1, at.size), axis=0)
     for i, j in combinations(np.flatnonzero(half > WIDE * np.abs(at)), 2):
+        if np.linalg.matrix_rank(_unit_rows(slopes[[i, j]]), SAME) < 2:
+            continue            # two words for one parameter
         pair = [j, i] if at[j] > at[i] else [i, j]      # a difference above 0 reads best
         units = {list(values.values())[k][1] for k in pair}
-        tried = [_pair(at[pair], [c[np.ix_(pair, pair)] for c in covariances],
+        tried = [_pair(at[pair], [c[np.ix_(pair, pair)] for c in own],
                        ends[:, :, pair], product, product or len(units) == 1)
                  for product in (False, True)]
         best = max((one for one in tried if one is not None), key=lambda one: one[0],
@@ -97,6 +104,10 @@ def known_together(values: Mapping[str, tuple[float, str]], covariances: Sequenc
             found.append(Combination({names[pair[0]]: 1.0, names[pair[1]]: weight},
                                      value, width, product))
     return found
+
+
+def _unit_rows(rows: FloatArray) -> FloatArray:
+    return rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), 1e-300)
 
 
 def _pair(at: FloatArray, covariances: Sequence[FloatArray], ends: FloatArray, product: bool,

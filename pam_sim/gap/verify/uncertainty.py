@@ -123,7 +123,7 @@ def effect_numbers(rig: Rig, found: Fit, place: int, precision: Precision, named
     slopes = _slopes(reported, candidate, theta)
     return {'parameters': parameters, 'equivalent': equivalent, 'together': [
         one.text() for one in known_together(
-            usual, [slopes @ own @ slopes.T for own in spreads],
+            usual, slopes, spreads,
             np.array([[[value for value, _ in reported(end).values()] for end in pair]
                       for pair in ends]), LEAST)]}
 
