@@ -76,7 +76,7 @@ class Criteria:
         'Half.')
     close_share: float = _criterion(
         0.05, 'of the gap', 'common',
-        'Shares this near count as equal, and less of a gap as none.',
+        'Shares this near count as equal, and less as none: of a gap, the time, the moves.',
         'Simulated records.')
     min_duration_s: float = _criterion(
         5.0, 's', 'health',
@@ -94,10 +94,6 @@ class Criteria:
         0.05, 's', 'health',
         'Time without a message from which on it is a dropout.',
         'Design choice.')
-    max_lost_share: float = _criterion(
-        0.05, '-', 'health',
-        'Share of the time that dropouts may take, and the limit of the valve without a remark.',
-        'Design choice.')
     min_pressure_move_pa: float = _criterion(
         5000.0, 'Pa', 'health',
         'Range of the pressure below which the rig is at rest.',
@@ -106,10 +102,6 @@ class Criteria:
         0.0005, 'm', 'health',
         'Range of the contraction below which the rig is at rest.',
         'Design choice.')
-    even_share: float = _criterion(
-        0.05, 'of an even share', 'health',
-        'Moves, up or down, below which a part has none, so that edges are dealt out in pieces.',
-        'Recordings of an identification: the least is three times as much.')
     rest_stroke_share: float = _criterion(
         0.005, 'of the stroke', 'health',
         'Contraction up to which a load may rest on its stop.',
@@ -188,10 +180,6 @@ class Criteria:
         0.05, 'of the number', 'ranking',
         'Tolerance from which on a number of load or valve stands before a sensor error.',
         'More than twice the tolerance of a number from a data sheet; design choice.')
-    second_speed: float = _criterion(
-        2.0, 'times as quick', 'ranking',
-        'Strokes this much quicker than others are a second speed.',
-        'Design choice.')
     same_form_share: float = _criterion(
         0.002, 'of what the best adds', 'ranking',
         'Shares this near are equal: no formulation is that true.',
@@ -212,10 +200,6 @@ class Criteria:
         0.9, 'of the gap', 'plausibility',
         'Least to explain for a name, and for a simpler one to stand for its limit.',
         'No formulation is the muscle itself; simulated records.')
-    near_floor: float = _criterion(
-        0.25, 'floors squared', 'plausibility',
-        'Rest so small that it may be the error of the floor.',
-        'Half a floor.')
     partial_share: float = _criterion(
         0.3, 'of the gap', 'plausibility',
         'Rest on the certify data from which on what is named is a part only.',
@@ -236,6 +220,16 @@ class Criteria:
         0.9, '-', 'planning',
         'Cosine of two signatures from which on they look alike.',
         'Prototype.')
+
+    @property
+    def near_floor(self) -> float:
+        """Return the rest, in floors squared, that may be the error of the floor: half of it."""
+        return self.greater_part ** 2
+
+    @property
+    def second_speed(self) -> float:
+        """Return how many times as quick strokes are a second speed: others are half of them."""
+        return 1.0 / self.greater_part
 
     @property
     def certain_size(self) -> float:

@@ -218,7 +218,7 @@ def _check_stamps(run: Run, topic: str, health: Health, criteria: Criteria) -> N
         health.problems.append(missed)
     holes = periods[periods > max(criteria.max_hole_s, HOLE_PERIODS / rate_hz)]
     lost = float(holes.sum() / periods.sum())
-    if lost > criteria.max_lost_share:
+    if lost > criteria.close_share:
         health.problems.append(
             f'{topic} is missing for {100 * lost:.0f} % of the time')
     elif holes.size:
@@ -248,6 +248,6 @@ def _check_saturation(run: Run, health: Health, criteria: Criteria, highest_v: f
     if share > criteria.greater_part:
         health.problems.append(
             f'the valve signal is at its limit for {100 * share:.0f} % of the messages')
-    elif share > criteria.max_lost_share:
+    elif share > criteria.close_share:
         health.remarks.append(
             f'the valve signal is at its limit for {100 * share:.0f} % of the messages')

@@ -174,7 +174,7 @@ def has_few_moves(recording: Recording, split: Split, criteria: Criteria = CRITE
     """
     Return whether a part lacks moves of the pressure, up or down, that the recording has.
 
-    That is, it holds less than ``even_share`` of what its time would make of them.
+    That is, it holds less than ``close_share`` of what its time would make of them.
     """
     time_s, mean = _path(recording)
     part = split.part_of(time_s, 'pressure')[1:]
@@ -182,7 +182,7 @@ def has_few_moves(recording: Recording, split: Split, criteria: Criteria = CRITE
     for moved in (np.maximum(steps, 0.0), np.maximum(-steps, 0.0)):
         for one in set(split.pattern):
             fair = split.pattern.count(one) / len(split.pattern) * float(moved.sum())
-            if float(moved[part == one].sum()) < criteria.even_share * fair:
+            if float(moved[part == one].sum()) < criteria.close_share * fair:
                 return True
     return False
 
