@@ -53,11 +53,19 @@ def entry_remarks(short: str, topic: TopicData) -> list[str]:
     if most > 1:
         which = f' ({_listed(several)})' if several else ''
         remarks.append(f'{topic.name}: messages have {most} entries{which}, and the first one '
-                       'is read. Record each on a topic of its own.')
+                       f'is read. {_advice(short, topic, several)}')
     if len(first) > 1 and row.is_measured:
         remarks.append(f'{topic.name}: the first entry is {_listed(tuple(first))} in turn, and '
-                       'all are read as one signal. Record each on a topic of its own.')
+                       f'all are read as one signal. {_advice(short, topic, tuple(first))}')
     return remarks
+
+
+def _advice(short: str, topic: TopicData, names: tuple[str, ...]) -> str:
+    """Return what to do; a measured length can also be chosen by its name."""
+    other = names[-1] if short == 'contraction' and names else ''
+    choice = (f', or choose one, such as `pam import BAG --map {short}='
+              f'"{topic.recorded_name}.position[{shown(other)}]:m"`') if other else ''
+    return f'Record each on a topic of its own{choice}.'
 
 
 def _listed(names: tuple[str, ...]) -> str:

@@ -16,6 +16,7 @@
 
 from dataclasses import replace
 import json
+import shlex
 
 from mcap.writer import Writer
 import numpy as np
@@ -306,6 +307,17 @@ def test_entries_that_are_not_read_are_told(tmp_path, named, words):
         told = [one for one in remarks if 'entr' in one]
         assert len(told) == len(words)
         assert all(f'{CONTRACTION}: {text}' in one for text, one in zip(words, told))
+
+
+def test_what_the_remark_advises_reads_another_entry(tmp_path):
+    bag = bag_of_joint_states(tmp_path / 'bag', [('hip', 'slider')])
+    told, = (one for one in load_run(bag, topics={'contraction': '/joint_states'}).remarks
+             if 'entr' in one)
+    advised = shlex.split(told[told.index('`pam ') + 1:told.rindex('`')])
+    words = [str(bag) if word == 'BAG' else word for word in advised[1:]]
+    main([*words, '--out', str(tmp_path / 'run')])
+    contraction = load_run(tmp_path / 'run').topics['contraction'].values['contraction_m']
+    assert contraction == pytest.approx(0.02)
 
 
 def bag_of_a_joint(directory, odd):
