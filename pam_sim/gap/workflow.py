@@ -15,6 +15,7 @@
 """The whole workflow: health, subsystems, search, numbers, validation, verdict."""
 
 from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
 from datetime import datetime, timezone
 from pathlib import Path
 import time
@@ -36,7 +37,8 @@ from pam_sim.gap.report.fingerprint import fingerprint
 from pam_sim.gap.report.place import places
 from pam_sim.gap.report.reason import explain
 from pam_sim.gap.result import GapResult
-from pam_sim.gap.select.context import context_of
+from pam_sim.gap.select.beginnings import promise_of_more
+from pam_sim.gap.select.context import context_of, SearchContext
 from pam_sim.gap.select.memory import as_sets, memories
 from pam_sim.gap.select.refit import within_ranges
 from pam_sim.gap.select.search import search
@@ -69,12 +71,25 @@ UNNAMED = ('term', 'surrogate')
 WANTING = ('unknown', 'partial')
 NOT_JUDGED = {'valve': 'the record has no valve command',
               'muscle': 'its contraction is given, and the record has no force'}
+Progress = Callable[[float], object]
+
+
+@dataclass(frozen=True)
+class Options:
+    """What of a question holds for every search of it; ``started`` is on the steady clock."""
+
+    effects: Sequence[str] | None
+    seconds: float
+    materiality: float
+    seed: int
+    criteria: Criteria
+    started: float
 
 
 def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
              effects: Sequence[str] | None = None, seconds: float = 120.0,
              materiality: float = 1.0, seed: int = 0,
-             progress: Callable[[float], object] = lambda done: None,
+             progress: Progress = lambda done: None,
              criteria: Criteria = CRITERIA, unnamed: Collection[str] = UNNAMED,
              spent_s: float = 0.0) -> GapResult:
     """
@@ -119,12 +134,48 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
         No recording is given. Two of them, searched or for the validation, are the same one.
 
     """
-    started, given = time.perf_counter() - spent_s, rig
+    started = time.perf_counter() - spent_s
+    options = Options(effects, seconds, materiality, seed, criteria, started)
+    result, found = _answered(runs, rig, certify, options, progress)
+    if found is None:
+        return result
+    context, validation = found
+    if certify and result.verdict in WANTING and not is_clear(validation):
+        searched = [runs] if isinstance(runs, Run) else runs
+        both, _ = _answered([certify, *searched], rig, None, options, only_singly=True)
+        result.simulations = both.simulations = result.simulations + both.simulations
+        if (both.effects or both.parameters) and both.verdict not in WANTING:
+            both.remarks.insert(0, PROOF_SEARCHED)
+            return _ended(both, options, progress)
+    if 'term' in unnamed:
+        propose(result, validation, context.out_of_time)
+    progress(0.98)
+    if 'surrogate' in unnamed:
+        add_surrogate(result, context, validation)
+    return _ended(result, options, progress)
+
+
+def _ended(result: GapResult, options: Options, progress: Progress) -> GapResult:
+    progress(1.0)
+    result.runtime_s = time.perf_counter() - options.started
+    return result
+
+
+def _answered(runs: Run | Sequence[Run], rig: Rig, certify: Run | None, options: Options,
+              progress: Progress = lambda done: None, only_singly: bool = False
+              ) -> tuple[GapResult, tuple[SearchContext, Validation] | None]:
+    """
+    Return (what names of effects and numbers explain, what it rests on; None if refused).
+
+    ``only_singly`` as of ``search``. Where no effect or number promises anything by itself then,
+    there is nothing named, and None beside it.
+    """
+    criteria, materiality, started = options.criteria, options.materiality, options.started
     checked = checked_runs(runs, certify, rig, criteria)
     if checked.refusals:
         text = '; '.join(checked.refusals)
         return GapResult('refused', text[:1].upper() + text[1:] + '.', remarks=checked.remarks,
-                         runtime_s=time.perf_counter() - started, model_yaml=rig.to_yaml())
+                         runtime_s=time.perf_counter() - started, model_yaml=rig.to_yaml()), None
     is_certify = checked.certify is not None
     recordings = [recording_of(run, rig, criteria) for run in checked.runs]
     result = GapResult('unknown', '', remarks=checked.remarks, recorded=_recorded(checked.runs))
@@ -135,10 +186,10 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
         rig = rig.with_(fidelity='switching')
         result.remarks.append(PULSES)
     estimator = Estimator(rig, subsystem_problems(
-        rig, recordings, checked.certify_runs, seed, criteria), criteria=criteria)
+        rig, recordings, checked.certify_runs, options.seed, criteria), criteria=criteria)
     result.not_judged = _not_judged(estimator)
     progress(0.1)
-    deadline = started + seconds
+    deadline = started + options.seconds
     # Its input alone: what else was measured on it stays untouched until the validation.
     held_out = recording_of(checked.certify, rig, criteria) if checked.certify else recordings[0]
     first_problem = estimator.problems[0]
@@ -146,11 +197,15 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
         result.remarks.append((SHORT_STRETCHES if is_certify else SAME_EDGES).format(
             first_problem.block_s))
     context = context_of(
-        estimator, criteria.seen_gap, criteria.least_gap * min(materiality, 1.0), effects,
+        estimator, criteria.seen_gap, criteria.least_gap * min(materiality, 1.0), options.effects,
         lambda: time.perf_counter() > deadline,
         materiality_on(held_out, is_certify, estimator, materiality))
     result.remarks += context.left_out
-    outcome = search(context)
+    if only_singly and not any(context.is_open(p, context.base) and promise_of_more(
+            context, context.base, p) > criteria.close_share for p in context.problems):
+        result.simulations = estimator.simulations
+        return result, None
+    outcome = search(context, only_singly)
     progress(0.8)
     estimator.use = (FIT, SELECT)
     # What a fit does not touch stays as calibrated now.
@@ -166,7 +221,8 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     if one_speed and not same_speed:
         outcome.named = as_sets(context, outcome.named, final)
     outcome.named, validation, harms, unconfirmed = confirmed(
-        outcome.named, Validation(held_out, is_certify, estimator, base, final, seed))
+        outcome.named, Validation(
+            held_out, is_certify, estimator, base, final, options.seed))
     result.remarks += unconfirmed
     progress(0.92)
     if same_speed:
@@ -184,26 +240,11 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
         outcome.screened, rig, [s for p in estimator.problems for s in p.signals], materiality)
     result.reason = explain(result, outcome, harms)
     if not outcome.complete:
-        result.reason += CUT_SHORT.format(seconds)
+        result.reason += CUT_SHORT.format(options.seconds)
     result.simulations = sum(
         one.simulations for one in (estimator, validation, own_runs))
     progress(0.96)
-    if certify and result.verdict in WANTING and not is_clear(validation):
-        searched = [runs] if isinstance(runs, Run) else runs
-        both = find_gap([certify, *searched], given, None, effects, seconds, materiality, seed,
-                        criteria=criteria, unnamed=(), spent_s=time.perf_counter() - started)
-        if (both.effects or both.parameters) and both.verdict not in WANTING:
-            both.remarks.insert(0, PROOF_SEARCHED)
-            progress(1.0)
-            return both
-    if 'term' in unnamed:
-        propose(result, validation, context.out_of_time)
-    progress(0.98)
-    if 'surrogate' in unnamed:
-        add_surrogate(result, context, validation)
-    progress(1.0)
-    result.runtime_s = time.perf_counter() - started
-    return result
+    return result, (context, validation)
 
 
 def _recorded(runs: Sequence[Run]) -> dict[str, Any]:

@@ -64,8 +64,13 @@ class Outcome:
     mistaken: dict[str, str] = field(default_factory=dict)
 
 
-def search(context: SearchContext) -> Outcome:
-    """Search for the missing effects and return the Outcome."""
+def search(context: SearchContext, only_singly: bool = False) -> Outcome:
+    """
+    Search for the missing effects and return the Outcome.
+
+    ``only_singly``: effects that explain nothing one by one are not tried together, nor is
+    another beginning.
+    """
     every = context
     current, added = forward_selection(context, context.base, [])
     first, selected = added, backward_elimination(context, current, added)
@@ -76,11 +81,12 @@ def search(context: SearchContext) -> Outcome:
         again, added = forward_selection(context, selected.fit, selected.named)
         if len(added) > len(selected.named):
             selected = backward_elimination(context, again, added)
-    selected = _paired(context, selected)
-    # What did not hold alone may hold in its group; long recordings had their chance.
-    few = any(p.is_dealt_short for p in context.problems)
-    selected = _grouped(every if few else context, selected)
-    selected = begun_otherwise(every, selected, first)
+    if not only_singly:
+        selected = _paired(context, selected)
+        # What did not hold alone may hold in its group; long recordings had their chance.
+        few = any(p.is_dealt_short for p in context.problems)
+        selected = _grouped(every if few else context, selected)
+        selected = begun_otherwise(every, selected, first)
     fit, named, explained = with_wrong_numbers(
         context, selected.fit, selected.named, selected.explained)
     return Outcome(context.base, fit, named, explained, not context.out_of_time(),
