@@ -63,7 +63,7 @@ EFFECT = Effect(
              'opening of each valve)',
     parameters=(
         *_SIBLING.parameters,
-        Parameter('second_stage_share', '1', 0.2, 0.0, 0.5,
+        Parameter('second_stage_share', '-', 0.2, 0.0, 0.5,
                   description='Share s of the second stage in the extra time constant.'),
     ),
     amplitude=_SIBLING.amplitude,
