@@ -47,7 +47,7 @@ class Validity:
     Parameters
     ----------
     pressure_gauge_pa, strain : tuple of float
-        Lower and upper end, inclusive.
+        Lower and upper end, inclusive: Pa, and share of the length at rest.
 
     """
 

@@ -23,13 +23,14 @@ from typing import Any
 import numpy as np
 from pam_sim.errors import InputError
 from pam_sim.muscle.law import MuscleLaw
-from pam_sim.muscle.rules import at, check_rules, formula_at, grid
+from pam_sim.muscle.rules import at, check_rules, formula_at, grid, MAX_STRAIN, MIN_STRAIN
 from pam_sim.plugins import check_name, formula, pick, plugin_files, plugin_module, told_with_place
 
 VARIABLE = 'PAM_MUSCLE_LAWS_PATH'       # folders with laws of others
 _OWN_FOLDER = Path(__file__).parent / 'laws'
 _POINT = 'gauge_pa', 'strain', 'par'
 _ALIKE = 1e-9               # of the largest force: what two ways to calculate differ by
+_LEAST_PA = 1e3             # of the highest pressure of a range; less is one in kPa or bar
 _SIZE_IN_NAME = re.compile(r'dmsp_(\d+)(?:_|$)')
 
 
@@ -47,8 +48,9 @@ def laws() -> dict[str, type[MuscleLaw]]:
     ------
     InputError
         A file without ``LAW`` or ``tension_n``, a name that is taken, a formula that is not
-        compiled or has other arguments, a set named after a size without its bore, or one with
-        which the law breaks a rule it claims.
+        compiled or has other arguments, a set named after a size without its bore, one whose
+        range is not in Pa and shares of the length, or one with which the law breaks a rule it
+        claims.
 
     """
     found: dict[str, type[MuscleLaw]] = {}
@@ -91,9 +93,26 @@ def _check_sets(law: type[MuscleLaw], path: Path) -> None:
     if law.__init__ is MuscleLaw.__init__:      # a law of another making may need a table
         for name in law.SETS:
             with told_with_place(path, f'law `{law.NAME}` (set `{name}`) cannot be used'):
+                _check_validity(law, name, path)
                 one = law(None, name, str(path))
                 check_rules(one, str(path))
                 _check_array(one, path)
+
+
+def _check_validity(law: type[MuscleLaw], name: str, path: Path) -> None:
+    """Refuse a set whose range cannot be one in Pa and in shares of the length at rest."""
+    low_pa, high_pa = law.SETS[name].validity.pressure_gauge_pa
+    low, high = law.SETS[name].validity.strain
+    told = f'law `{law.NAME}` (set `{name}`) is valid'
+    if not (low_pa < high_pa and high_pa >= _LEAST_PA):
+        raise InputError(
+            f'{told} from {low_pa:g} to {high_pa:g} Pa; write gauge pressures in Pa that rise to '
+            f'{_LEAST_PA:g} or more, such as (0.0, 600e3)', str(path))
+    if not MIN_STRAIN <= low < high <= MAX_STRAIN:
+        raise InputError(
+            f'{told} for contractions from {low:g} to {high:g}; write shares of the length at '
+            f'rest that rise within {MIN_STRAIN:g} to {MAX_STRAIN:g}, such as (0.0, 0.25)',
+            str(path))
 
 
 def _check_array(law: MuscleLaw, path: Path) -> None:
