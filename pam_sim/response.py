@@ -36,6 +36,8 @@ class Response:
     """
     Signals of a simulated run, each an ndarray of shape (N + 1,), row 0 the start.
 
+    Of a batch only the signals and rows that were kept.
+
     Attributes
     ----------
     time_s : ndarray
@@ -61,19 +63,22 @@ class Response:
         self._columns = columns     # name -> column of what was kept
 
     def __len__(self) -> int:
-        """Return the number of samples, N + 1."""
+        """Return the number of samples: N + 1, or those that were kept."""
         return len(self.outputs)
 
     def __repr__(self) -> str:
         """Return length and names in one line."""
-        return (f'{type(self).__name__}({len(self)} samples, {brief_span(self.time_s)}: '
+        span = f', {brief_span(self.time_s)}' if 'time_s' in self._columns else ''
+        return (f'{type(self).__name__}({len(self)} samples{span}: '
                 f'{", ".join(self._columns)})')
 
     def __getattr__(self, name: str) -> FloatArray:
         """Return a signal by name."""
         if name != '_columns' and name in self._columns:
             return self.outputs[:, self._columns[name]]
-        raise AttributeError(name)
+        if name in COLUMNS:
+            raise AttributeError(f'`{name}` was not kept; kept: {", ".join(self._columns)}')
+        raise AttributeError(f'`{name}` is no signal; known: {", ".join(COLUMNS)}')
 
     def __dir__(self) -> list[str]:
         """List the signals too."""

@@ -437,7 +437,8 @@ class Rig:
         Raises
         ------
         InputError
-            Wrong shape, number not finite, or the contraction of a driven load missing.
+            Wrong shape, no numbers, one that is not finite or out of range, the contraction of a
+            driven load missing, or a simulation that leaves what is physical.
 
         """
         from pam_sim.rollout.simulate import simulate_rig

@@ -120,15 +120,15 @@ def simulate_batch(rigs: 'Rig | list[Rig] | tuple[Rig, ...]',
     ------
     InputError
         As of ``Rig.simulate``, with the number of the run, counted from 0; numbers of
-        rigs and records that do not fit; an unknown signal.
+        rigs and records that do not fit; an unknown signal; ``every`` or ``workers`` that is
+        no whole number from 1 on.
 
     """
     names = tuple(COLUMNS) if keep is None else tuple(keep)
     for name in names:
         if name not in COLUMNS:
             raise InputError(f'`{name}` is no signal; allowed: {", ".join(COLUMNS)}', 'keep')
-    if every < 1:
-        raise InputError(f'is {every}; at least 1 is needed', 'every')
+    _check_count(every, 'every')
     places = {name: place for place, name in enumerate(names)}
     if spread is not None:
         pairs = _pairs(rigs, records)
@@ -230,6 +230,12 @@ def default_workers() -> int:
     return os.cpu_count() or 1
 
 
+def _check_count(count: int, name: str) -> None:
+    """Refuse what is no whole number from 1 on."""
+    if not isinstance(count, (int, np.integer)) or count < 1:
+        raise InputError(f'is {count!r}; a whole number, 1 or more, is needed', name)
+
+
 def _pairs(
         rigs: 'Rig | list[Rig] | tuple[Rig, ...]',
         records: Record | list[Record] | tuple[Record, ...]) -> 'list[tuple[Rig, Record]]':
@@ -255,7 +261,7 @@ def _placed(measured: AllMeasured, pairs: 'list[tuple[Rig, Record]]') -> list[li
     known: dict[tuple[int, int, float], list[Placed]] = {}
     placed = []
     for index, ((_, record), signals) in enumerate(zip(pairs, of_runs)):
-        key = (id(signals), len(np.asarray(record.valve_signal)), record.dt_s)
+        key = (id(signals), len(np.atleast_1d(np.asarray(record.valve_signal))), record.dt_s)
         if key not in known:
             try:
                 known[key] = [Placed(one, *key[1:]) for one in signals]
@@ -269,8 +275,7 @@ def _run_all(pairs: 'list[tuple[Rig, Record]]', finish: Callable[[int, FloatArra
              workers: int | None) -> list[Any]:
     """Return ``finish(index, outputs)`` of every run, in order."""
     workers = default_workers() if workers is None else workers
-    if workers < 1:
-        raise InputError(f'is {workers}; at least 1 is needed', 'workers')
+    _check_count(workers, 'workers')
     workers = min(workers, len(pairs))
     results: list[Any] = [None] * len(pairs)
     errors: dict[int, InputError] = {}

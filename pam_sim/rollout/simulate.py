@@ -20,6 +20,7 @@ import warnings
 import numpy as np
 from numpy.typing import ArrayLike
 from pam_sim.annotations import FloatArray
+from pam_sim.declared import shown
 from pam_sim.errors import InputError
 from pam_sim.load import LOADS
 from pam_sim.muscle.law import ExtrapolationWarning
@@ -103,7 +104,7 @@ def input_array(rig: 'Rig', valve_signal: ArrayLike,
         missing.
 
     """
-    signal = np.asarray(valve_signal, dtype=float)
+    signal = _numbers(valve_signal, 'valve_signal')
     wanted = len(rig.signal_names)
     if signal.ndim == 1 and wanted == 1:
         signal = signal[:, np.newaxis]
@@ -150,8 +151,16 @@ def _check_range(values: FloatArray, lower: float, upper: float, unit: str, name
                      name)
 
 
+def _numbers(values: ArrayLike, name: str) -> FloatArray:
+    """Return an array of floats; refuse what is none."""
+    try:
+        return np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f'is no array of numbers: {shown(values)}', name) from None
+
+
 def _sized(values: ArrayLike, lengths: tuple[int, ...], name: str) -> FloatArray:
-    array = np.asarray(values, dtype=float)
+    array = _numbers(values, name)
     if array.ndim == 0 or (array.ndim == 1 and len(array) in lengths):
         return array
     raise InputError(f'has shape {array.shape}; one number or {lengths[-1]} expected', name)

@@ -89,8 +89,10 @@ def test_only_what_is_asked_for_is_kept():
     frame = response.to_dataframe()
     assert set(frame.columns) == {'force_n', 'time_s'} and len(frame) == len(response)
     assert np.array_equal(frame['force_n'], response.force_n)
-    with pytest.raises(AttributeError):
+    with pytest.raises(AttributeError, match='`pressure_pa` was not kept; kept: force_n, time_s'):
         response.pressure_pa
+    few, = simulate_batch(rig, record, keep=('force_n',), every=7)
+    assert repr(few) == f'Response({STEPS // 7 + 1} samples: force_n)'
 
 
 def measured_signals():
@@ -143,6 +145,9 @@ def test_a_mistake_names_its_run_whatever_the_workers():
     (lambda: simulate_batch(rigs(), ppr_records(), keep=('speed',)), '`speed` is no signal'),
     (lambda: simulate_batch(rigs(), ppr_records(), every=0), 'every: is 0'),
     (lambda: simulate_batch(rigs(), ppr_records(), workers=0), 'workers: is 0'),
+    (lambda: simulate_batch(rigs(), ppr_records(), every=1.5), 'every: is 1.5; a whole number'),
+    (lambda: simulate_batch(rigs(), ppr_records(), workers=1.5),
+     'workers: is 1.5; a whole number'),
     (lambda: residual_sums(rigs(), ppr_records(), []), 'measured: is empty'),
     (lambda: residual_sums(rigs(), ppr_records(), [measured_signals()]), '1 entries for 3 runs'),
     (lambda: residual_sums(rigs(), ppr_records(), [Measured('speed', [0.0], [0.0])]),

@@ -36,6 +36,8 @@ RIG = 'dmsp_5_300_hanging_mass'
     ('hsv', [[0.0, 0.0], [0.5, 1.01]], 'vent_duty: is 1.01 at sample 1; allowed 0 to 1'),
     ('hsv', [[-0.2, 0.0]], 'fill_duty: is -0.2 at sample 0; allowed 0 to 1'),
     ('hsv', [[np.nan, 0.0]], 'fill_duty: is nan'),
+    ('ppr', 'abc', "valve_signal: is no array of numbers: 'abc'"),
+    ('hsv', [[0.0, 0.0], [0.0]], 'valve_signal: is no array of numbers: [[0.0, 0.0], [0.0]]'),
 ])
 def test_signals_out_of_range_are_refused_by_name_and_range(valve, signal, words):
     with pytest.raises(InputError) as caught:
@@ -52,6 +54,7 @@ def test_a_saturated_voltage_is_no_mistake():
 @pytest.mark.parametrize('given_inputs, words', [
     ({'external_force_n': [1.0, np.nan]}, 'external_force_n: is nan at sample 1'),
     ({'external_force_n': 1e7}, 'external_force_n: is 1e+07 at sample 0; allowed -100000'),
+    ({'external_force_n': 'x'}, "external_force_n: is no array of numbers: 'x'"),
     ({'initial_pressure_pa': np.nan}, 'initial_pressure_pa` is nan; allowed'),
     ({'initial_pressure_pa': 400.0}, 'initial_pressure_pa` is 400; allowed 50662.5 to 2e'),
     ({'initial_contraction_m': 0.2}, 'initial_contraction_m` is 0.2; allowed 0 to 0.075 m'),
