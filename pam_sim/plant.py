@@ -26,6 +26,7 @@ from pam_sim.errors import InputError
 from pam_sim.records import cells, fields, zeros
 from pam_sim.rollout import kernel
 from pam_sim.rollout.layout import INPUT, OUTPUT, PARAMETERS, STATE
+from pam_sim.rollout.simulate import told_by_own_effect
 
 if TYPE_CHECKING:
     from pam_sim.rig import Rig
@@ -142,9 +143,10 @@ class Plant:
     def _check(self) -> None:
         """Refuse outputs that are not finite."""
         if not all_finite(self._out):
-            raise InputError(f'the simulation is not finite from {self.time_s:g} s on; the '
-                             'numbers of the model make no rig that can be stepped',
-                             f'rig {self.rig.name}')
+            raise InputError(
+                f'the simulation is not finite from {self.time_s:g} s on; ' + (
+                    told_by_own_effect(self.rig, rolled=False) or 'the numbers of the model make '
+                    'no rig that can be stepped'), f'rig {self.rig.name}')
 
     @property
     def time_s(self) -> float:

@@ -40,6 +40,7 @@ from pam_sim.declared import shown
 from pam_sim.errors import did_you_mean, InputError
 
 T = TypeVar('T')
+_PACKAGE = Path(__file__).parent
 
 
 def plugin_files(own_folder: Path, variable: str, not_plugins: tuple[str, ...] = ()) -> list[Path]:
@@ -129,6 +130,38 @@ def told_with_place(path: str | Path, problem: str) -> Iterator[None]:
             raise InputError(f'is not valid Python: {error.msg}',
                              f'{error.filename}:{error.lineno}') from error
         raise InputError(f'{problem}: {type(error).__name__}: {error}', place) from error
+
+
+def file_of_user(function: Callable[..., Any]) -> Path | None:
+    """Return the file of a function, None of one of this package or without a file."""
+    code = getattr(interpreted(function), '__code__', None)
+    if code is None or Path(code.co_filename).is_relative_to(_PACKAGE):
+        return None
+    return Path(code.co_filename)
+
+
+def raise_with_file(file: Path | None, problem: str, error: Exception) -> None:
+    """
+    Raise an error in one sentence with file and line.
+
+    Parameters
+    ----------
+    file : Path or None
+        Of a plug-in of the user; None of a part of this package, whose errors stay as they are.
+    problem : str
+        What failed.
+    error : Exception
+        What the function of the plug-in raised.
+
+    Raises
+    ------
+    InputError
+        Where there is a file.
+
+    """
+    if file is not None:
+        with told_with_place(file, problem):
+            raise error
 
 
 def check_name(what: str, name: str, path: Path, taken: Mapping[str, Path]) -> None:

@@ -198,10 +198,22 @@ def put(array: FloatArray, dtype: np.dtype[Any], values: Mapping[str, Any],
 
 def put_some(array: FloatArray, dtype: np.dtype[Any], values: Mapping[str, Any],
              place: int = 0) -> None:
-    """Write the fields a mapping names into an array, from ``place`` on; others stay."""
+    """
+    Write the fields a mapping names into an array, from ``place`` on; others stay.
+
+    Raises
+    ------
+    ValueError
+        There is no field of a name.
+
+    """
     spans = _spans(dtype)
     for name, value in values.items():
-        begin, end = spans[name]
+        try:
+            begin, end = spans[name]
+        except KeyError:
+            raise ValueError(
+                f'there is no field `{name}`; allowed: {", ".join(spans)}') from None
         if end == begin + 1:
             array[place + begin] = value
         else:

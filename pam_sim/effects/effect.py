@@ -24,6 +24,7 @@ from pam_sim.effects.declaration import check_declaration
 from pam_sim.effects.fitting import Fitting, FreeParameter
 from pam_sim.errors import InputError
 from pam_sim.parameters import check_parameters, Parameter
+from pam_sim.plugins import file_of_user, raise_with_file
 from pam_sim.records import put, put_some, record
 from pam_sim.valve import VALVES
 
@@ -265,8 +266,22 @@ class Effect:
         Return reported name -> (value, unit) for a rig; all of them without one.
 
         Where nothing is declared, the amplitudes tell the size.
+
+        Raises
+        ------
+        InputError
+            A function of a file of the user fails.
+
         """
-        found = {item.name: (item.function(values, rig), item.unit) for item in self.reported
-                 if rig is None or rig.valve in item.valves}
+        found = {}
+        for item in self.reported:
+            if rig is not None and rig.valve not in item.valves:
+                continue
+            try:
+                found[item.name] = float(item.function(values, rig)), item.unit
+            except Exception as error:      # whatever the functions of somebody else raise
+                raise_with_file(file_of_user(item.function),
+                                f'`{item.name}` that effect `{self.name}` reports fails', error)
+                raise
         return found or {p.name: (float(values[p.name]), p.unit) for p in self.parameters
                          if p.name in self.amplitude}

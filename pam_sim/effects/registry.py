@@ -42,6 +42,11 @@ def effect_files() -> list[Path]:
     return plugin_files(_OWN_FOLDER, VARIABLE, _NOT_EFFECTS)
 
 
+def own_files() -> dict[str, Path]:
+    """Return the files of the effects that do not ship with this package, by name."""
+    return {path.stem: path for path in effect_files() if path.parent != _OWN_FOLDER}
+
+
 def _term_files() -> list[Path]:
     """Return the source files of the stand-ins for terms that have no name."""
     return plugin_files(_UNNAMED_FOLDER, '', _NOT_TERMS)

@@ -22,10 +22,11 @@ from numpy.typing import ArrayLike
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import interpreted
 from pam_sim.effects.effect import Numbers
-from pam_sim.effects.registry import all_effects
+from pam_sim.effects.registry import all_effects, own_files
 from pam_sim.errors import InputError
 from pam_sim.load import LOADS
 from pam_sim.load.registry import has_force, packed_of, steepest
+from pam_sim.plugins import raise_with_file
 from pam_sim.records import put, put_some, size_of
 from pam_sim.rollout import kernel, layout
 from pam_sim.rollout.places import (
@@ -75,7 +76,13 @@ def _pack_effects(rig: 'Rig', numbers: Numbers, state: FloatArray, par: FloatArr
     for setting in rig.effects:
         effect = all_effects()[setting.name]
         place, state_place = PLACES[setting.name]
-        if effect.pack_into(setting.parameters, numbers, par, place, state, state_place):
+        try:
+            acts = effect.pack_into(setting.parameters, numbers, par, place, state, state_place)
+        except Exception as error:      # whatever the functions of somebody else raise
+            problem = f'`pack`, `initial` or `active` of effect `{setting.name}` fails'
+            raise_with_file(own_files().get(setting.name), problem, error)
+            raise
+        if acts:
             for flag in FLAGS[setting.name]:
                 par[flag] = 1.0
             par[BEYOND_PLACE] = max(par[BEYOND_PLACE], BEYOND[setting.name])

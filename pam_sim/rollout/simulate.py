@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pam_sim.annotations import FloatArray
 from pam_sim.declared import shown
+from pam_sim.effects.registry import own_files
 from pam_sim.errors import InputError
 from pam_sim.load import LOADS
 from pam_sim.muscle.law import ExtrapolationWarning
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
 MAX_FORCE_N = 1e5
 # Of the length at rest: a sensor may read a little below zero.
 STRAIN_RANGE = (-0.05, 0.5)
+_TRIED = 600                # steps of a trial: up, and down again
 
 
 def simulate_rig(rig: 'Rig', valve_signal: ArrayLike,
@@ -77,9 +79,9 @@ def check_outputs(rig: 'Rig', outputs: FloatArray, unphysical: int) -> None:
     """
     if unphysical >= 0:
         raise InputError(
-            f'the simulation leaves what is physical at step {unphysical}: these numbers cannot '
-            'be stepped so coarsely; use a smaller `dt_s`, or less extreme numbers',
-            f'rig {rig.name}')
+            f'the simulation leaves what is physical at step {unphysical}: ' + (
+                told_by_own_effect(rig) or 'these numbers cannot be stepped so coarsely; use a '
+                'smaller `dt_s`, or less extreme numbers'), f'rig {rig.name}')
     law = rig.muscle.law.law
     if not law.EXTRAPOLATES:
         seen = columns(outputs, OUTPUT)
@@ -89,6 +91,54 @@ def check_outputs(rig: 'Rig', outputs: FloatArray, unphysical: int) -> None:
             warnings.warn(
                 f'{100.0 * beyond.mean():.3g} % of the simulation lies '
                 f'{law.outside_table_text()}', ExtrapolationWarning, stacklevel=4)
+
+
+def told_by_own_effect(rig: 'Rig', rolled: bool = True) -> str:
+    """
+    Return which effect of a file of the user keeps a rig from being stepped, empty if none does.
+
+    A short motion is tried with each of them left out, and with all of them.
+
+    Parameters
+    ----------
+    rig : Rig
+        One that could not be stepped.
+    rolled : bool
+        Whether its rollout is compiled; else it is tried step by step, as a plant is.
+
+    """
+    own = {name: file for name, file in own_files().items() if rig.effect(name) is not None}
+    if not own or _can_be_stepped(rig, rolled):
+        return ''
+    for names in dict.fromkeys([*((name,) for name in own), tuple(own)]):
+        rest = [setting for setting in rig.effects if setting.name not in names]
+        if _can_be_stepped(rig.with_(effects=rest), rolled):
+            told = ' and '.join(f'effect `{name}` of {own[name]}' for name in names)
+            return f'the rig can be stepped without {told}; look at the numbers and functions there'
+    return ''
+
+
+def _can_be_stepped(rig: 'Rig', rolled: bool) -> bool:
+    """Return whether a pressure that rises and falls, or a motion there and back, is physical."""
+    half = _TRIED // 2
+    on_off = [(0.5 * rig.signal_range[1], 0.0), (0.0, 0.5)]     # fills, then vents
+    signal = [row[:len(rig.signal_names)] for row in on_off for _ in range(half)]
+    there_m = np.linspace(0.0, 0.2 * rig.muscle.stroke_m, half)
+    path_m = [*there_m, *there_m[::-1]] if LOADS[rig.load].NEEDS_CONTRACTION else None
+    try:
+        state, par, inputs = prepare(rig, signal, None, path_m, 1e-3, {})
+    except InputError:
+        return False
+    entries = kernel.entries_for(par)
+    if rolled:
+        outputs = np.empty((len(inputs) + 1, size_of(OUTPUT)))
+        return bool(entries.rollout(state, par, inputs, outputs) < 0)
+    seen = np.zeros(size_of(OUTPUT))
+    for given in inputs:
+        entries.step(state, par, given, seen)
+        if not np.isfinite(seen).all():
+            return False
+    return True
 
 
 def input_array(rig: 'Rig', valve_signal: ArrayLike,

@@ -18,11 +18,14 @@ from dataclasses import replace
 
 from gap_runs import nominal, recorded, voltages
 import numpy as np
+from pam_sim.errors import InputError
 from pam_sim.gap.criteria import CRITERIA
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.plan.detectable import BEYOND_RANGE, NOT_SEEN, sizes_or_reasons
+from pam_sim.gap.select import screening
 from pam_sim.gap.select.candidates import candidates
+from pam_sim.gap.select.context import context_of
 from pam_sim.gap.select.screening import screen, Screened
 from pam_sim.gap.subsystems.problems import subsystem_problems
 import pytest
@@ -97,3 +100,20 @@ def test_what_is_missing_takes_force_and_gives_none(name):
     for candidate in candidates(nominal(), ('pressure', 'contraction')):
         if candidate.name == name:
             assert candidate.amplitudes[0].value(-1.0) == 0.0
+
+
+def test_a_candidate_that_cannot_be_simulated_is_told(monkeypatch):
+    """It promises nothing, as one that explains nothing; nobody would know why."""
+    change = screening._change
+
+    def changed(estimator, near, candidate, values, problem):
+        if candidate.effect == 'creep':
+            raise InputError('the simulation leaves what is physical at step 3', 'rig r')
+        return change(estimator, near, candidate, values, problem)
+
+    monkeypatch.setattr(screening, '_change', changed)
+    problems = subsystem_problems(nominal(), [Recording(recorded(
+        nominal(), voltages(12.0)), 'ppr')])
+    context = context_of(Estimator(nominal(), problems), 0.05, 0.01, ['creep', 'tube_lag'])
+    assert context.left_out == (
+        '`creep` is not tried: the simulation leaves what is physical at step 3.',)

@@ -133,3 +133,71 @@ def test_a_simulation_ends_with_this_sentence(tmp_path):
 
 def test_what_ships_has_no_mistake(each):
     assert each[1][-1] == '[]'
+
+
+KEEPS = """
+from pam_sim.compiled import compiled
+from pam_sim.effects.effect import Effect, Reported
+from pam_sim.parameters import Parameter
+from pam_sim.records import record
+EFFECT = Effect(name="soft", family="static_map", subsystem="muscle", sentence="Soft.",
+    source="test", parameters=(Parameter("share", "-", 0.1, 0.0, 1.0),), amplitude=("share",),
+    states=record("anchor_m"), initial=lambda values, numbers: {"anchor_m": 0.0},
+    reported=(Reported("share", "-", lambda values, rig: values["share"]),))
+@compiled
+def map_output(tension_n, pressure_pa, contraction_m, par):
+    return tension_n * (1.0 - par.share)
+"""
+USED = """
+from pam_sim import InputError, load_rig
+from pam_sim.effects.registry import effects
+rig = load_rig('rig: dmsp_5_300_hanging_mass\\neffects: [{name: soft}]\\n')
+for use in (rig.pack, lambda: effects()['soft'].report({'share': 0.1}, rig)):
+    try:
+        use()
+    except InputError as error:
+        print(error)
+"""
+NO_NUMBERS = """
+import numpy as np
+from pam_sim import InputError, load_rig
+for effects in ('[{name: creep}, {name: soft}]', '[{name: creep}]'):
+    rig = load_rig('rig: dmsp_5_300_hanging_mass\\neffects: ' + effects + '\\n')
+    for run in (lambda: rig.simulate(np.full(9, 4.0)), lambda: rig.plant().step(4.0),
+                lambda: rig.with_(load='driven').simulate(np.full(9, 4.0), contraction_m=0.01)):
+        try:
+            run()
+            print('is stepped')
+        except InputError as error:
+            print(error)
+"""
+
+
+@pytest.mark.parametrize('old, new, line, sentence', [
+    ('{"anchor_m": 0.0}', '{"anchor": 0.0}', '', '`pack`, `initial` or `active` of effect `soft` '
+     'fails: ValueError: there is no field `anchor`; allowed: anchor_m'),
+    ('{"anchor_m": 0.0}', '{"anchor_m": 1.0 / 0.0}', ':8', '`pack`, `initial` or `active` of '
+     'effect `soft` fails: ZeroDivisionError: float division by zero'),
+    ('amplitude=("share",),', 'amplitude=("share",), pack=lambda values, numbers: {},', '',
+     "`pack`, `initial` or `active` of effect `soft` fails: ValueError: fields ['share'] are "
+     'missing or unknown'),
+    ('rig: values["share"]', 'rig: values["shar"]', ':9',
+     "`share` that effect `soft` reports fails: KeyError: 'shar'")])
+def test_a_mistake_in_what_python_calls_of_an_effect_is_told_with_its_file(
+        tmp_path, monkeypatch, old, new, line, sentence):
+    monkeypatch.setenv('NUMBA_DISABLE_JIT', '1')
+    assert old in KEEPS
+    assert told(tmp_path, 'soft', KEEPS.replace(old, new), USED) == (
+        f'{tmp_path / "soft.py"}{line}: {sentence}')
+
+
+def test_an_effect_that_gives_no_numbers_is_told_with_its_file(tmp_path, monkeypatch):
+    monkeypatch.setenv('NUMBA_DISABLE_JIT', '1')
+    text = KEEPS.replace('(1.0 - par.share)', 'par.share * float("nan")')
+    blamed = (f'the rig can be stepped without effect `soft` of {tmp_path / "soft.py"}; look at '
+              'the numbers and functions there')
+    named = 'rig dmsp_5_300_hanging_mass: '
+    physical = f'{named}the simulation leaves what is physical at step 0: {blamed}'
+    assert told(tmp_path, 'soft', text, NO_NUMBERS).split('\n') == [
+        physical, f'{named}the simulation is not finite from 0.001 s on; {blamed}', physical,
+        *['is stepped'] * 3]

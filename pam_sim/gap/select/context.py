@@ -63,7 +63,8 @@ class SearchContext:
         ``matters(with, without)``: whether two fits differ by enough for a name, in a free
         run; asked of every effect once there are several.
     left_out : tuple of str
-        A sentence for every name asked for that is not tried, and for a compressor that is alone.
+        A sentence for every name asked for that is not tried, for a formulation that cannot be
+        simulated, and for a compressor that is alone.
 
     """
 
@@ -166,6 +167,8 @@ def context_of(estimator: Estimator, seen_gap: float, least_gap: float,
         estimator, Ranking(estimator, base, seen_gap), base, tuple(pool), outputs,
         tuple(screened), first_gap, seen_gap, least_gap, out_of_time, matters,
         (*left_out(only, pool, estimator.rig, outputs, stands), *(
+            f'`{s.candidate.effect}` is not tried: {s.refused}.'
+            for s in screened if s.refused), *(
             [compressor] if compressor and first_gap['valve'] > seen_gap else [])))
 
 

@@ -50,6 +50,7 @@ class Screened:
     for ``size``, the parameters that were tried first. ``flat`` is the same with all errors at
     full weight: a misfit that lasts has little weight left, and what explains it promises
     nothing.
+    ``refused`` is why it could not be simulated from any start, empty where it could.
     """
 
     candidate: Candidate
@@ -58,6 +59,7 @@ class Screened:
     seen: float = 0.0
     size: Mapping[str, float] = field(default_factory=dict)
     flat: 'Screened | None' = None
+    refused: str = ''
 
 
 class ErrorSpace:
@@ -157,6 +159,7 @@ def _screened(estimator: Estimator, near: Fit, candidate: Candidate,
               spaces: Mapping[str, ErrorSpace], flat: Mapping[str, ErrorSpace]) -> Screened:
     """Return a Screened; each start is simulated once for both weights."""
     changes: list[tuple[Mapping[str, float], dict[str, FloatArray]]] = []
+    refusals: list[str] = []
     for values in candidate.starts():
         changes.append((values, {}))
         for problem in estimator.problems:
@@ -164,10 +167,12 @@ def _screened(estimator: Estimator, near: Fit, candidate: Candidate,
                 try:
                     changes[-1][1][problem.subsystem] = _change(
                         estimator, near, candidate, values, problem)
-                except InputError:
-                    continue
+                except InputError as error:
+                    refusals.append(error.problem)
+    none_ran = not any(by_subsystem for _, by_subsystem in changes)
     return replace(_best_start(candidate, changes, spaces),
-                   flat=_best_start(candidate, changes, flat))
+                   flat=_best_start(candidate, changes, flat),
+                   refused=refusals[0] if refusals and none_ran else '')
 
 
 def _best_start(candidate: Candidate, changes: Changes, spaces: Mapping[str, ErrorSpace]
