@@ -52,6 +52,8 @@ def check_names(effect: 'Effect', found: Mapping[str, 'Effect'], of_rig: Collect
     """
     Refuse an effect that names other effects, or numbers of a rig, that there are not.
 
+    So is a formulation that acts elsewhere than its effect, or reports less.
+
     Parameters
     ----------
     effect : Effect
@@ -88,6 +90,27 @@ def check_names(effect: 'Effect', found: Mapping[str, 'Effect'], of_rig: Collect
         raise InputError(
             f'effect `{effect.name}` is a formulation of `{effect.variant_of}`, which states the '
             '`limits`; leave them out', where)
+    if effect.variant_of:
+        _check_formulation(effect, found[effect.variant_of], where)
+
+
+def _check_formulation(effect: 'Effect', main: 'Effect', where: str) -> None:
+    """Refuse a formulation of which results could not say what they say of its effect."""
+    told = f'effect `{effect.name}` is a formulation of `{main.name}`'
+    places = [(one.subsystem, one.fitting.sensor_signal, one.fitting.sensor_change)
+              for one in (effect, main)]
+    if places[0] != places[1]:
+        own, its = (' '.join(filter(None, place)) for place in places)
+        raise InputError(f'{told} and acts on another place, {own} instead of {its}; leave '
+                         '`variant_of` out', where)
+    # What declares nothing reports its amplitudes.
+    reports = tuple(one.name for one in effect.reported) or effect.amplitude
+    for item in main.reported:
+        if {*item.valves} & {*effect.valves} and item.name not in reports:
+            raise InputError(
+                f'{told} and does not report `{item.name}`, as that does; add '
+                f"Reported('{item.name}', '{item.unit}', lambda values, rig: ...) to `reported`",
+                where)
 
 
 def _problems(effect: 'Effect') -> Iterator[str]:

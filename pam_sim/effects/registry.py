@@ -14,6 +14,7 @@
 
 """Find the effects: every module of this folder, and of ``PAM_EFFECTS_PATH``."""
 
+from dataclasses import replace
 from difflib import get_close_matches
 from functools import lru_cache
 from pathlib import Path
@@ -25,7 +26,7 @@ from pam_sim.effects.effect import Effect
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.parameters import Parameter
 from pam_sim.plugins import check_name, pick, plugin_files, plugin_module
-from pam_sim.rollout.hooks import check_hook, HOOKS
+from pam_sim.rollout.hooks import check_hook, check_subsystem, HOOKS, valves_of
 
 VARIABLE = 'PAM_EFFECTS_PATH'       # folders with effects of others
 _OWN_FOLDER = Path(__file__).parent
@@ -61,7 +62,7 @@ def effects() -> dict[str, Effect]:
     ------
     InputError
         A file without ``EFFECT`` or without a hook, a name that is taken or unknown, a hook that
-        is misspelt, not compiled or names what it has not.
+        is misspelt, not compiled or names what it has not, no hook in the subsystem of the effect.
 
     """
     found: dict[str, Effect] = {}
@@ -104,7 +105,7 @@ def all_effects() -> dict[str, Effect]:
 
 
 def _with_hooks(effect: Effect, module: ModuleType, path: Path) -> Effect:
-    """Return an effect with the functions of its file by which it acts."""
+    """Return an effect with the functions by which it acts; valves where none does are dropped."""
     effect.hooks.update({hook: getattr(module, hook) for hook in HOOKS if hasattr(module, hook)})
     for name, value in vars(module).items():
         if name not in HOOKS and _is_own_function(name, value, module):
@@ -117,7 +118,13 @@ def _with_hooks(effect: Effect, module: ModuleType, path: Path) -> Effect:
                          f'{", ".join(HOOKS)}', str(path))
     for hook, function in effect.hooks.items():
         check_hook(hook, function, effect.packed, effect.states, path)
-    return effect
+    check_subsystem(effect.name, effect.subsystem, effect.hooks, path)
+    valves = tuple(valve for valve in effect.valves if valve in valves_of(effect.hooks))
+    if not valves:
+        raise InputError(
+            f'effect `{effect.name}` has valves={effect.valves}, behind which none of its hooks '
+            f'is called; write valves={valves_of(effect.hooks)}', str(path))
+    return effect if valves == effect.valves else replace(effect, valves=valves)
 
 
 def _is_own_function(name: str, value: object, module: ModuleType) -> bool:

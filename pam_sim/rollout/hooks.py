@@ -29,7 +29,7 @@ and advanced once, in ``commit``. A hook that advances something, and is called 
 returns its mean over that step. Half the step then gives the same motion within 1e-3 of its range.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -38,6 +38,7 @@ import numpy as np
 from pam_sim.compiled import is_compiled, named_arguments
 from pam_sim.errors import InputError
 from pam_sim.plugins import check_function
+from pam_sim.valve import VALVES
 
 
 @dataclass(frozen=True)
@@ -130,6 +131,55 @@ HOOKS = {
     'sensor': Hook(
         'What the sensors read: pressure [Pa absolute], contraction [m], force [N].', _READINGS),
 }
+
+# What the hooks of an effect change; ``commit`` serves the others.
+SUBSYSTEM_OF = {
+    **dict.fromkeys((
+        'command', 'clock_shift', 'set_point', 'pressure_rate', 'opening', 'switch_times',
+        'flow_opening', 'supply', 'valve_flow', 'mass_flow', 'volume', 'air_rt'), 'valve'),
+    **dict.fromkeys(('map_input', 'map_output', 'muscle_force', 'muscle_friction'), 'muscle'),
+    **dict.fromkeys(('load_force', 'load_friction'), 'load'),
+    **dict.fromkeys(('sensor', 'sensor_commit'), 'sensor')}
+# Those that are called behind one type of valve alone.
+_VALVE_OF = {
+    **dict.fromkeys(('set_point', 'pressure_rate'), 'ppr'),
+    **dict.fromkeys((
+        'clock_shift', 'opening', 'switch_times', 'flow_opening', 'valve_flow', 'mass_flow',
+        'air_rt'), 'hsv')}
+
+
+def valves_of(hooks: Iterable[str]) -> tuple[str, ...]:
+    """Return the types of valve behind which a hook of an effect is called."""
+    acting = [hook for hook in hooks if hook in SUBSYSTEM_OF]
+    return tuple(valve for valve in VALVES if not acting or any(
+        _VALVE_OF.get(hook, valve) == valve for hook in acting))
+
+
+def check_subsystem(name: str, subsystem: str, hooks: Iterable[str], path: str | Path) -> None:
+    """
+    Refuse an effect none of whose hooks acts in its subsystem: a search would try it elsewhere.
+
+    Parameters
+    ----------
+    name, subsystem : str
+        Of the effect.
+    hooks : iterable of str
+        Names of its hooks.
+    path : Path
+        Its file.
+
+    Raises
+    ------
+    InputError
+        The sentence names the subsystem in which they act.
+
+    """
+    acting = [hook for hook in hooks if hook in SUBSYSTEM_OF]
+    if acting and all(SUBSYSTEM_OF[hook] != subsystem for hook in acting):
+        right = SUBSYSTEM_OF[acting[0]]
+        raise InputError(
+            f'effect `{name}` has the subsystem `{subsystem}`, but its hook `{acting[0]}` acts on '
+            f"the {right}; write subsystem='{right}'", str(path))
 
 
 def check_hook(name: str, function: Callable[..., Any], packed: np.dtype[Any],

@@ -62,6 +62,18 @@ MISTAKES = (
      "hook `flow_opening` names `state`, which this effect has not; write states=record('"),
     ('own_three_two_valve', "amplitude=('share',)", "amplitude=('share')",
      "effect `own_three_two_valve` has amplitude = 'share'; write a tuple, amplitude=('x',) or"),
+    ('own_three_two_valve', "subsystem='valve'", "subsystem='muscle'",
+     'effect `own_three_two_valve` has the subsystem `muscle`, but its hook `flow_opening` acts '
+     "on the valve; write subsystem='valve'"),
+    ('own_three_two_valve', 'order=10', "order=10, variant_of='creep'",
+     'effect `own_three_two_valve` is a formulation of `creep` and acts on another place, valve '
+     'instead of muscle; leave `variant_of` out'),
+    ('own_three_two_valve', 'order=10', "order=10, variant_of='leakage'",
+     'effect `own_three_two_valve` is a formulation of `leakage` and does not report '
+     "`conductance_m3_per_s_pa`, as that does; add Reported('conductance_m3_per_s_pa', 'm3/(s"),
+    ('own_three_two_valve', "valves=('hsv',)", "valves=('ppr',)",
+     "effect `own_three_two_valve` has valves=('ppr',), behind which none of its hooks is called; "
+     "write valves=('hsv',)"),
     ('own_three_two_valve', "valves=('hsv',)", "relative_of=('creep')",
      "effect `own_three_two_valve` has relative_of = 'creep'; write a tuple, relative_of=('x',)"),
     ('own_three_two_valve', "valves=('hsv',)", "relative_of=('own_three_two_valve',)",
@@ -146,6 +158,14 @@ def test_a_mistake_in_a_file_is_told_when_it_is_read(
 @pytest.mark.parametrize('name', READ)
 def test_the_right_file_is_read(folder, monkeypatch, name):
     assert name in read(folder, monkeypatch, name, FILES[name])
+
+
+def test_an_effect_acts_behind_the_valves_that_call_its_hooks(folder, monkeypatch):
+    text = FILES['own_three_two_valve'].replace("valves=('hsv',), ", '')
+    assert 'valves=' not in text
+    found = read(folder, monkeypatch, 'own_three_two_valve', text)
+    assert found['own_three_two_valve'].valves == ('hsv',)
+    assert found['creep'].valves == ('ppr', 'hsv')
 
 
 def test_a_line_is_told_where_there_is_one(folder, monkeypatch):
