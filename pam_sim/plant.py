@@ -26,7 +26,7 @@ from pam_sim.errors import InputError
 from pam_sim.records import cells, fields, zeros
 from pam_sim.rollout import kernel
 from pam_sim.rollout.layout import INPUT, OUTPUT, PARAMETERS, STATE
-from pam_sim.rollout.simulate import told_by_own_effect
+from pam_sim.rollout.simulate import told_by_own_file
 
 if TYPE_CHECKING:
     from pam_sim.rig import Rig
@@ -145,7 +145,7 @@ class Plant:
         if not all_finite(self._out):
             raise InputError(
                 f'the simulation is not finite from {self.time_s:g} s on; ' + (
-                    told_by_own_effect(self.rig, rolled=False) or 'the numbers of the model make '
+                    told_by_own_file(self.rig, rolled=False) or 'the numbers of the model make '
                     'no rig that can be stepped'), f'rig {self.rig.name}')
 
     @property

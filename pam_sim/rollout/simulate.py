@@ -25,6 +25,8 @@ from pam_sim.effects.registry import own_files
 from pam_sim.errors import InputError
 from pam_sim.load import LOADS
 from pam_sim.muscle.law import ExtrapolationWarning
+from pam_sim.muscle.muscle import LawChoice
+from pam_sim.plugins import file_of_user
 from pam_sim.records import columns, fields, size_of
 from pam_sim.response import Response
 from pam_sim.rollout import kernel
@@ -80,7 +82,7 @@ def check_outputs(rig: 'Rig', outputs: FloatArray, unphysical: int) -> None:
     if unphysical >= 0:
         raise InputError(
             f'the simulation leaves what is physical at step {unphysical}: ' + (
-                told_by_own_effect(rig) or 'these numbers cannot be stepped so coarsely; use a '
+                told_by_own_file(rig) or 'these numbers cannot be stepped so coarsely; use a '
                 'smaller `dt_s`, or less extreme numbers'), f'rig {rig.name}')
     law = rig.muscle.law.law
     if not law.EXTRAPOLATES:
@@ -93,11 +95,12 @@ def check_outputs(rig: 'Rig', outputs: FloatArray, unphysical: int) -> None:
                 f'{law.outside_table_text()}', ExtrapolationWarning, stacklevel=4)
 
 
-def told_by_own_effect(rig: 'Rig', rolled: bool = True) -> str:
+def told_by_own_file(rig: 'Rig', rolled: bool = True) -> str:
     """
-    Return which effect of a file of the user keeps a rig from being stepped, empty if none does.
+    Return which file of the user keeps a rig from being stepped, empty if none does.
 
-    A short motion is tried with each of them left out, and with all of them.
+    A short motion is tried without each of its effects, without all of them, and with another
+    force law.
 
     Parameters
     ----------
@@ -108,13 +111,19 @@ def told_by_own_effect(rig: 'Rig', rolled: bool = True) -> str:
 
     """
     own = {name: file for name, file in own_files().items() if rig.effect(name) is not None}
-    if not own or _can_be_stepped(rig, rolled):
+    of_law = file_of_user(type(rig.muscle.law.law).COMPILED)
+    if not (own or of_law) or _can_be_stepped(rig, rolled):
         return ''
-    for names in dict.fromkeys([*((name,) for name in own), tuple(own)]):
+    tried = [tuple(own), *((name,) for name in own)] if own else []
+    for names in reversed(tried):
         rest = [setting for setting in rig.effects if setting.name not in names]
         if _can_be_stepped(rig.with_(effects=rest), rolled):
             told = ' and '.join(f'effect `{name}` of {own[name]}' for name in names)
-            return f'the rig can be stepped without {told}; look at the numbers and functions there'
+            return (f'the rig can be stepped without {told}; look at the numbers and functions '
+                    'there')
+    if of_law and _can_be_stepped(rig.with_(law=LawChoice(), volume='bore'), rolled):
+        return (f'the rig can be stepped with another force law than `{rig.muscle.law.name}` of '
+                f'{of_law}; look at its force, also beyond the range of its set')
     return ''
 
 

@@ -201,3 +201,14 @@ def test_an_effect_that_gives_no_numbers_is_told_with_its_file(tmp_path, monkeyp
     assert told(tmp_path, 'soft', text, NO_NUMBERS).split('\n') == [
         physical, f'{named}the simulation is not finite from 0.001 s on; {blamed}', physical,
         *['is stepped'] * 3]
+
+
+def test_a_law_without_force_near_the_atmosphere_is_told_with_its_file(tmp_path, monkeypatch):
+    monkeypatch.setenv('NUMBA_DISABLE_JIT', '1')
+    text = LAW.replace('par.area_m2 * gauge_pa', 'par.area_m2 * (gauge_pa - 1e3 if gauge_pa > 1e3 '
+                       'else float("nan"))')
+    script = RUN.replace('simulate(', "with_(law='line').simulate(")
+    assert told(tmp_path, 'line', text, script) == (
+        'rig dmsp_5_300_hanging_mass: the simulation leaves what is physical at step 0: the rig '
+        f'can be stepped with another force law than `line` of {tmp_path / "line.py"}; look at '
+        'its force, also beyond the range of its set')
