@@ -33,6 +33,7 @@ from pam_actuation.tuning.closed_loop import ClosedLoop, Course
 from pam_actuation.tuning.loop_parts import DISTURBANCE, READINGS, WANTED
 from pam_actuation.tuning.loop_setup import learning_mask, Learns, PHYSICS_S
 from pam_sim.annotations import FloatArray
+from pam_sim.declared import shown
 from pam_sim.errors import InputError
 from pam_sim.records import cells, size_of
 
@@ -40,6 +41,8 @@ if TYPE_CHECKING:
     from pam_actuation.control.compiled_controller import CompiledController
     from pam_actuation.experiments.experiment import Experiment
     from pam_sim.rig import Rig
+
+_NUMBERS = 'dt_s', 'supply_pa', 'pressure_pa', 'contraction_m', 'force_n'
 
 
 class ForeignPlant(Protocol):
@@ -89,14 +92,17 @@ class ForeignLoop(ClosedLoop):
     Raises
     ------
     InputError
-        As of ``ClosedLoop``; from ``run``, where the plant has another step or becomes
-        something that is not finite.
+        As of ``ClosedLoop``, or a plant instead of what returns one; from ``run``, as of
+        ``check_plant``, or where the plant becomes something that is not finite.
 
     """
 
     def __init__(self, plant: Callable[[], ForeignPlant], rig: 'Rig', experiment: 'Experiment',
                  supply_pa: Course | None = None, **more: Any) -> None:
         super().__init__(rig, experiment, supply_pa=supply_pa, **more)
+        if not callable(plant):
+            raise InputError('cannot be called; give what returns a plant at its start, '
+                             'such as `rig.plant`', 'plant')
         self._plant = plant
         self._own_supply = supply_pa is None
         self._remade = (plant, rig, experiment, supply_pa, more)
@@ -110,8 +116,7 @@ class ForeignLoop(ClosedLoop):
         """Return a ``LOG`` of ``rollouts`` for every tick, shape (ticks,)."""
         from pam_actuation.tuning.rollouts import LOG
         plant = self._plant()
-        if plant.dt_s != PHYSICS_S:
-            raise InputError(f'steps by {plant.dt_s:g} s, allowed is {PHYSICS_S:g} s', 'plant')
+        check_plant(plant)
         controller.pause()
         log = np.empty(self.ticks * size_of(LOG))
         rows = log.reshape(self.ticks, size_of(LOG))
@@ -150,6 +155,29 @@ class ForeignLoop(ClosedLoop):
         if not np.all(np.isfinite(rows)):
             raise InputError('becomes something that is not finite', 'plant')
         return log.view(LOG)
+
+
+def check_plant(plant: ForeignPlant) -> None:
+    """
+    Refuse an object that cannot stand for a plant.
+
+    Raises
+    ------
+    InputError
+        A reading is no number, the method `step` is missing, or the step is another one.
+
+    """
+    for name in _NUMBERS:
+        value = getattr(plant, name, None)
+        try:
+            float(value)    # type: ignore[arg-type]  # None is no number
+        except (TypeError, ValueError):
+            raise InputError(f'has {name} = {shown(value)}; a number is needed', 'plant') from None
+    if not callable(getattr(plant, 'step', None)):
+        raise InputError('has no method `step`; write `step(signal, external_force_n=0.0, *, '
+                         'steps=1)`', 'plant')
+    if plant.dt_s != PHYSICS_S:
+        raise InputError(f'steps by {plant.dt_s:g} s, allowed is {PHYSICS_S:g} s', 'plant')
 
 
 def _made(plant: Callable[[], ForeignPlant], rig: 'Rig', experiment: 'Experiment',

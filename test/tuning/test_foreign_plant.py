@@ -145,3 +145,19 @@ def test_a_plant_that_does_not_fit_is_refused(rig):
     coarse = type('Coarse', (Broken,), {'dt_s': 2e-3})
     with pytest.raises(InputError, match='steps by 0.002 s, allowed is 0.001 s'):
         ForeignLoop(coarse, rig, MOTION).run(controller)
+
+
+@pytest.mark.parametrize('name, value, sentence', [
+    ('force_n', None, 'plant: has force_n = None; a number is needed'),
+    ('supply_pa', 'high', "plant: has supply_pa = 'high'; a number is needed"),
+    ('step', None, 'plant: has no method `step`; write `step(signal, external_force_n=0.0, *, ')])
+def test_an_object_that_is_no_plant_is_refused(rig, name, value, sentence):
+    kind = type('Other', (Broken,), {name: value})
+    with pytest.raises(InputError) as caught:
+        ForeignLoop(kind, rig, MOTION).run(load_controller('pid', rig))
+    assert str(caught.value).startswith(sentence)
+
+
+def test_a_plant_instead_of_what_makes_one_is_refused(rig):
+    with pytest.raises(InputError, match='give what returns a plant at its start, such as `rig.p'):
+        ForeignLoop(rig.plant(), rig, MOTION)
