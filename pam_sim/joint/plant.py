@@ -24,6 +24,7 @@ from pam_sim.errors import InputError
 from pam_sim.joint import kernel, layout
 from pam_sim.joint.packing import pack_joint
 from pam_sim.joint.parameters import SIDES
+from pam_sim.joint.statics import told_by_own_file_of
 from pam_sim.joint.step import Arrays
 from pam_sim.plant import all_finite, Plant
 from pam_sim.records import cells, zeros
@@ -142,9 +143,10 @@ class JointPlant:
         for _ in range(steps):
             kernel.joint_step(*arrays)
         if not all(all_finite(out) for *_, out in arrays):
-            raise InputError(f'the simulation is not finite from {self.time_s:g} s on; the '
-                             'numbers of the model make no joint that can be stepped',
-                             f'joint {self.joint.name}')
+            raise InputError(
+                f'the simulation is not finite from {self.time_s:g} s on; ' + (
+                    told_by_own_file_of(self.joint) or 'the numbers of the model make no joint '
+                    'that can be stepped'), f'joint {self.joint.name}')
 
     @property
     def time_s(self) -> float:

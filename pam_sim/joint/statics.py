@@ -18,8 +18,10 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
+from pam_sim.errors import InputError
 from pam_sim.records import fields
 from pam_sim.rollout.layout import PARAMETERS, STATE
+from pam_sim.rollout.simulate import told_by_own_file
 
 if TYPE_CHECKING:
     from pam_sim.joint.rig import JointRig
@@ -50,6 +52,12 @@ def _static_force(rig: 'Rig', pressure: float, contraction: float) -> float:
     return max(fields(state, STATE).muscle_force_n, 0.0)
 
 
+def told_by_own_file_of(joint: 'JointRig') -> str:
+    """Return which file of the user keeps a muscle of a joint from being stepped, or nothing."""
+    sides = (told_by_own_file(rig, rolled=False) for rig in (joint.flexor, joint.extensor))
+    return next(filter(None, sides), '')
+
+
 def largest_torque_n_m(joint: 'JointRig', pressure_pa: float) -> float:
     """Return the largest torque [N m] of either muscle alone, over the range, at a pressure."""
     arms = (joint.parameters['flexor_radius_m'], joint.parameters['extensor_radius_m'])
@@ -76,6 +84,10 @@ def static_angle(joint: 'JointRig', pressures_pa: tuple[float, float], external_
         return near_rad
     angles = np.linspace(lower, upper, _SCAN)
     torques = [torque(angle) for angle in angles]
+    if not np.isfinite(torques).all():
+        raise InputError('the torque at rest is not finite; ' + (
+            told_by_own_file_of(joint) or 'the numbers of the model make no joint that can rest'),
+            f'joint {joint.name}')
     found = [brentq(torque, a, b, xtol=1e-13) for a, b, left, right in
              zip(angles, angles[1:], torques, torques[1:]) if left > 0.0 >= right]
     if torques[0] <= 0.0:

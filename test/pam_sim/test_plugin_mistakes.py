@@ -212,3 +212,25 @@ def test_a_law_without_force_near_the_atmosphere_is_told_with_its_file(tmp_path,
         'rig dmsp_5_300_hanging_mass: the simulation leaves what is physical at step 0: the rig '
         f'can be stepped with another force law than `line` of {tmp_path / "line.py"}; look at '
         'its force, also beyond the range of its set')
+
+
+JOINT = """
+from pam_sim import InputError, load_joint
+muscle = '{rig: dmsp_5_300_driven, valve: ppr'
+joint = load_joint(f'load: antagonistic_joint\\nflexor: {muscle}}}\\n'
+                   f'extensor: {muscle}, effects: [{{name: soft}}]}}\\n')
+for run in (lambda: joint.plant().step(2.0, 2.0), lambda: joint.simulate([2.0] * 9, [2.0] * 9)):
+    try:
+        run()
+    except InputError as error:
+        print(error)
+"""
+
+
+def test_an_effect_of_a_joint_that_gives_no_numbers_is_told_with_its_file(tmp_path, monkeypatch):
+    monkeypatch.setenv('NUMBA_DISABLE_JIT', '1')
+    text = KEEPS.replace('(1.0 - par.share)', 'par.share * float("nan")')
+    found = told(tmp_path, 'soft', text, JOINT).split('\n')
+    assert len(found) == 2 and all(one.endswith(
+        f'the rig can be stepped without effect `soft` of {tmp_path / "soft.py"}; look at the '
+        'numbers and functions there') for one in found), found
