@@ -113,7 +113,8 @@ class MuscleLoop:
         From the measurement to the new valve signal, below one period (transport and
         scheduling of the live nodes).
     external_force_n : callable or None
-        Force [N] against contraction as a function of time [s].
+        Force [N] against contraction as a function of time [s]; by default the disturbance of
+        the experiment.
     supply_pa : callable or None
         Supply pressure [absolute Pa] as a function of time [s]; that of the rig by default.
     driver : DriverConfig, optional
@@ -162,6 +163,8 @@ class MuscleLoop:
         self._disturbance = np.zeros(self.ticks * size_of(DISTURBANCE))
         disturbances = self._disturbance.view(DISTURBANCE)
         disturbances['supply_pa'] = rig.parameters['supply_pa']
+        if external_force_n is None and experiment.disturbance:
+            external_force_n = experiment.external_force_n
         for name, course in (('external_force_n', external_force_n), ('supply_pa', supply_pa)):
             if course is not None:
                 disturbances[name] = [course(k * (1.0 / rate_hz)) for k in range(self.ticks)]

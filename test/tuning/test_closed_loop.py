@@ -14,6 +14,8 @@
 
 """The compiled closed loop on the realistic rig: learning halves the error, frozen does not."""
 
+import pickle
+
 import numpy as np
 from pam_actuation.bags.load import load_run
 from pam_actuation.control.config import load_controller
@@ -41,6 +43,15 @@ segments:
   - rest: {duration_s: 0.2}
   - step: {to_m: 0.008, duration_s: 2.0}
   - step: {to_m: 0.014, duration_s: 1.5}
+"""
+PUSHED = """
+name: pushed
+segments:
+  - ramp: {to_m: 0.014, duration_s: 1.0}
+  - hold: {duration_s: 4.0}
+disturbance:
+  - rest: {duration_s: 3.5}
+  - pulses: {height_n: 8.0, width_s: 0.5, every_s: 1.0, count: 1}
 """
 
 
@@ -139,6 +150,17 @@ def test_tuning_starts_slowly_where_the_cost_counts_the_start(loop):
     loops, _ = loops_of([loop.rig], experiments, 1, controller_of(loop), loop.rig)
     assert [one.slow_start for one in loops] == [False, True]
     assert [one.start_tick > 0 for one in loops] == [True, False]
+
+
+def test_tuning_pushes_on_the_load_as_the_experiment_says(loop):
+    """It left the disturbance out; a loop that went to another process has it too."""
+    hold = load_experiment(PUSHED[:PUSHED.index('disturbance')])
+    loops, _ = loops_of([loop.rig], [hold, load_experiment(PUSHED)], 1, controller_of(loop),
+                        loop.rig)
+    calm, pushed = (one.cost(load_controller('pid', loop.rig)) for one in loops)
+    assert pushed > calm + 0.1
+    again = pickle.loads(pickle.dumps(loops[1]))
+    assert again.cost(load_controller('pid', loop.rig)) == pushed
 
 
 def test_what_cannot_be_run_is_refused(loop):
