@@ -72,7 +72,8 @@ def add_arguments(parser: Parser) -> None:
                         help='tune on so many random rigs beside the model (default: 0)')
     parser.add_argument('--preview', type=number(0.0, 10.0), default=None, metavar='SECONDS',
                         help='how far ahead the controller is told the reference; 0 for motions '
-                        'nobody announces (default: without limit)')
+                        'nobody announces (default: the least that simulated bags say, without '
+                        'one no limit)')
     parser.add_argument('--patience', type=count(0), default=30, metavar='N',
                         help='stop after so many generations without progress, 0 = never '
                         '(default: %(default)s)')
@@ -115,8 +116,10 @@ def run(args: argparse.Namespace) -> int | None:
         check_kind(runs, rig)
         controller = _controller(args, runs, rig)
     experiments, check = _experiments(args, runs, rig)
+    preview_s, told = _preview(args, runs)
     controller, ranges = with_own_range(controller, rig, [*experiments, *check])
-    say_remarks(args, [*unknown_remarks(rig), *ranges])
+    said = [*unknown_remarks(rig), *ranges, *told]
+    say_remarks(args, said)
     rigs = [rig, *random_rigs(rig, args.randomise, args.seed)]
     others = [rig, *random_rigs(rig, args.randomise, args.seed + HELD_OUT_SEED)]
     with progress(args, args.rollouts, ' rollouts', 'tuning') as bar:
@@ -125,8 +128,7 @@ def run(args: argparse.Namespace) -> int | None:
             progress=lambda done: bar.update(max(done - bar.n, 0)), held_out=check,
             held_out_rigs=others, patience=args.patience, cluster=args.cluster,
             population=args.population or None,
-            learn_rules=not args.freeze,
-            preview_s=math.inf if args.preview is None else args.preview)
+            learn_rules=not args.freeze, preview_s=preview_s)
     recordings = check_recordings(runs, rig, result.controller)
     if result.controller.rules is None:
         del written['rules']
@@ -136,7 +138,7 @@ def run(args: argparse.Namespace) -> int | None:
         tuning_report(files['report'], result, recordings, rig, experiments, runs)
     emit(args, {**{key: os.fspath(path) for key, path in written.items()}, **result.to_dict(),
                 'recordings': [one.to_dict() for one in recordings],
-                'remarks': recording_remarks(runs)},
+                'remarks': [*said, *recording_remarks(runs)]},
          '\n'.join([result.text(), *(f'  {text}' for one in recordings for text in one.lines()),
                     *(f'{key}: {path}' for key, path in written.items())]))
     wrong = any(one.model is not None and one.model.verdict == 'wrong' for one in recordings)
@@ -220,3 +222,20 @@ def _experiments(args: argparse.Namespace, runs: 'list[RecordedRun]', rig: 'Rig 
     if args.check:
         return search, [load_experiment(one) for one in args.check]
     return search, [load_experiment(checked), *search]
+
+
+def _preview(args: argparse.Namespace, runs: 'list[RecordedRun]') -> tuple[float, list[str]]:
+    """Return how far ahead [s] the controller is told the reference, and a remark on it."""
+    if args.preview is not None:
+        return float(args.preview), []
+    told = []
+    for run in runs:
+        try:
+            told.append((float(run.metadata.get('preview_s') or math.inf), str(run.path)))
+        except ValueError:      # of another program
+            continue
+    least_s, bag = min(told, default=(math.inf, ''))
+    if not 0.0 <= least_s < math.inf:
+        return math.inf, []
+    return least_s, [f'the controller is told the reference {least_s:g} s ahead, as in {bag}; '
+                     '--preview gives another time']

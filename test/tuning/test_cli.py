@@ -66,3 +66,18 @@ def test_mistakes_get_one_sentence_and_nothing_is_written(tmp_path, capsys, opti
 def test_without_bag_and_model_there_is_nothing_to_tune_on(tmp_path, capsys):
     assert main(['tune', '--out', str(tmp_path / 'tuned.yaml')]) == 2
     assert '--model' in capsys.readouterr().err
+
+
+def test_a_bag_of_a_motion_nobody_announced_is_tuned_for_one(tmp_path, capsys):
+    """It was tuned as if the reference had been told ahead, without a word."""
+    bag, costs = str(tmp_path / 'bag'), {}
+    assert main(['simulate', 'short_sine', '--controller', 'pid', '--preview', '0',
+                 '--out', bag]) == 0
+    capsys.readouterr()
+    for stated in ((), ('--preview', '0'), ('--preview', '0.6')):
+        main(['tune', bag, '--check', 'short_sine', '--rollouts', '10', '--json', *stated,
+              '--out', str(tmp_path / f'tuned{"".join(stated)}.yaml')])
+        found = json.loads(capsys.readouterr().out)
+        costs[stated] = found['cost_before_mm']
+        assert ('told the reference 0 s ahead' in str(found['remarks'])) == (stated == ())
+    assert costs[()] == costs['--preview', '0'] != costs['--preview', '0.6']
