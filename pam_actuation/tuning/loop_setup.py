@@ -58,8 +58,11 @@ def steps_per_tick(rate_hz: float) -> int:
     """
     steps = round(1.0 / (rate_hz * PHYSICS_S))
     if steps < 1 or abs(steps * PHYSICS_S * rate_hz - 1.0) > 1e-9:
+        second = round(1.0 / PHYSICS_S)
+        rates = [rate for rate in range(20, second + 1) if second % rate == 0]
         raise InputError(
-            f'{rate_hz:g} Hz is no whole number of {PHYSICS_S * 1e3:g} ms steps per period')
+            f'is {rate_hz:g} Hz; a rollout needs a whole number of {PHYSICS_S * 1e3:g} ms steps '
+            f'in a period, such as {", ".join(map(str, rates))} Hz', 'rate_hz')
     return steps
 
 
