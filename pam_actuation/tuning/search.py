@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 SMALLEST = 5                    # members differential evolution needs
 MEMBERS = 24                    # fewer settle too early, also with few settings
 BUDGET_USED = 'budget used up'
+ALL_ALIKE = 'all points of a generation cost the same'
 _NEAR = 0.12                    # spread of the cloud about the start, in widths of the box
 
 
@@ -78,13 +79,14 @@ def minimise(costs_of: Callable[..., Any], start: FloatArray, members: int, gene
     Found
 
     """
-    best = {'cost': np.inf, 'since': 0}
+    best = {'cost': np.inf, 'since': 0, 'generations': 0}
 
     def mapped(_: '_FunctionWrapper', points: FloatArray) -> list[float]:
         """Evaluate a whole generation; ``differential_evolution`` calls it as ``map``."""
         costs = costs_of([np.array(point) for point in points])
         best['since'] = 0 if min(costs) < best['cost'] else best['since'] + 1
         best['cost'] = min(best['cost'], min(costs))
+        best['generations'] += 1
         return costs
 
     # A Generator works under the present and the former name of the argument.
@@ -94,8 +96,10 @@ def minimise(costs_of: Callable[..., Any], start: FloatArray, members: int, gene
         seed=np.random.default_rng(seed), tol=0.0, polish=False, mutation=(0.4, 0.9),
         recombination=0.8, callback=lambda *_, **__: bool(patience) and best['since'] >= patience)
     stopped = bool(patience) and best['since'] >= patience
-    return Found(found.x, float(found.fun),
-                 f'no progress in {patience} generations' if stopped else BUDGET_USED)
+    reason = BUDGET_USED if best['generations'] >= generations else ALL_ALIKE
+    if stopped:
+        reason = f'no progress in {patience} generations'
+    return Found(found.x, float(found.fun), reason)
 
 
 def _first_generation(start: FloatArray, members: int, seed: int) -> FloatArray:

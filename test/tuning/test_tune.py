@@ -145,6 +145,14 @@ def test_same_seed_same_result_with_any_number_of_jobs(rig):
     assert one.history == two.history
 
 
+def test_a_search_that_ends_because_nothing_matters_says_so(rig):
+    """A muscle at rest tells no controllers apart; it said that the budget was used up."""
+    rest = load_experiment('name: at_rest\nsegments:\n  - rest: {duration_s: 2.0}\n')
+    result = tune(rig, load_controller('controller: pid\n', rig), rest, budget=60, axes=AXES[1:])
+    assert not result.improved and result.rollouts < 30
+    assert 'cost the same' in result.ended and '--rollouts' not in result.text()
+
+
 def test_axes_are_clipped_scaled_and_checked(rig):
     settings = {axis.name: axis.upper * 10 for axis in SOFC_AXES}
     point = to_unit(SOFC_AXES, settings)
