@@ -71,7 +71,8 @@ SETTINGS = (
     setting('start_time_s', 's', 0.25, 0.01, 10.0, 'decay of the bumpless start offset'),
 )
 PARAMETERS = parameter_record(SETTINGS)
-MEMORY_SIZE = 5000                          # remembered
+MEMORY_S = 25.0                       # of the motion, remembered at any rate of the controller
+LEAST_MEMORY_SIZE = 5000              # ticks, so longer below 200 Hz
 _MINIMA_SIZE = 16                          # of the reference, remembered
 _SHORTEST_S = 0.2                     # of a cycle
 _ALIKE_M = 1e-4
@@ -101,7 +102,12 @@ OUTPUT = record(
     'command_pa', 'error_m', 'change_of_error_m_per_s', 'inverse_pa', 'proportional_pa',
     'integral_pa', 'derivative_pa', 'learned_pa', 'cycle_s', 'unlimited_command_pa',
     'saturated_low', 'saturated_high', 'slew_limited', 'start_offset_m')
-_LEARNS, _OFF, _NO_CYCLE = 'learning', 'learning is off', 'the reference does not repeat'
+_LEARNS, _OFF = 'learning', 'learning is off'
+
+
+def memory_size(rate_hz: float) -> int:
+    """Return how many ticks are remembered at a rate [Hz]; a cycle may last half of them."""
+    return max(LEAST_MEMORY_SIZE, int(math.ceil(MEMORY_S * rate_hz)))
 
 
 @compiled
@@ -129,17 +135,18 @@ def _at(row: FloatArray, tick: float) -> float:
     """Return a remembered value at a time in ticks, linear in between."""
     whole = int(math.floor(tick))
     share = tick - whole
-    return (1.0 - share) * row[whole % MEMORY_SIZE] + share * row[(whole + 1) % MEMORY_SIZE]
+    return (1.0 - share) * row[whole % row.shape[0]] + share * row[(whole + 1) % row.shape[0]]
 
 
 @compiled
 def _alike(references: FloatArray, tick: int, cycle: float) -> bool:
     """Tell whether the last cycle of the reference is that before it."""
-    if 2.0 * cycle + 2.0 > min(tick, MEMORY_SIZE - 2):
+    size = references.shape[0]
+    if 2.0 * cycle + 2.0 > min(tick, size - 2):
         return False
     for ago in range(int(cycle) + 1):
         now = tick - ago
-        if abs(references[now % MEMORY_SIZE] - _at(references, now - cycle)) > _ALIKE_M:
+        if abs(references[now % size] - _at(references, now - cycle)) > _ALIKE_M:
             return False
     return True
 
@@ -151,11 +158,12 @@ def _find_cycle(par: np.record, references: FloatArray, st: np.record) -> None:
     cycle: float = st.cycle_ticks
     if tick < 1:
         return
-    now = references[tick % MEMORY_SIZE]
+    size = references.shape[0]
+    now = references[tick % size]
     if cycle > 0.0 and abs(now - _at(references, tick - cycle)) > _ALIKE_M:
         st.cycle_ticks = 0.0
     former: float = st.way_m
-    way = now - references[(tick - 1) % MEMORY_SIZE]
+    way = now - references[(tick - 1) % size]
     st.way_m = way
     if way < 0.0:
         st.falls = 1.0
@@ -201,10 +209,11 @@ def _learned_pa(par: np.record, errors: FloatArray, taught: FloatArray, st: np.r
 def _apart(par: np.record, commands: FloatArray, st: np.record, inp: np.record) -> bool:
     """Tell whether the measured pressure is beyond all commands of late; NaN is not."""
     tick = int(st.ticks)
-    lowest = commands[tick % MEMORY_SIZE]
+    size = commands.shape[0]
+    lowest = commands[tick % size]
     highest = lowest
     for ago in range(1, min(int(_ANSWER_S * par.rate_hz), tick) + 1):
-        command = commands[(tick - ago) % MEMORY_SIZE]
+        command = commands[(tick - ago) % size]
         lowest = min(lowest, command)
         highest = max(highest, command)
     pressure = inp.pressure_pa
@@ -240,7 +249,7 @@ def _tick(par: np.record, inverse: FloatArray, memory: FloatArray, st: np.record
     if st.started < 0.5:
         _start(par, st, inp)
     error, offset = tracking_error(par, st, inp, st.ticks > 0.0)
-    place = int(st.ticks) % MEMORY_SIZE
+    place = int(st.ticks) % memory.shape[1]
     references, errors, taught, commands = memory[0], memory[1], memory[2], memory[3]
     references[place] = _reference_now_m(par, inp)
     _find_cycle(par, references, st)
@@ -274,7 +283,7 @@ def _entry(key: int) -> Compiled[..., float]:
         Run one tick; return the pressure command [absolute Pa].
 
         ``par``, ``st``, ``inp`` and ``out`` are arrays of ``PARAMETERS``, ``STATE``,
-        ``inputs.INPUT`` and ``OUTPUT``; ``memory`` has rows of ``MEMORY_SIZE`` for reference,
+        ``inputs.INPUT`` and ``OUTPUT``; ``memory`` has rows of ``memory_size`` for reference,
         counted error, what was learned and command. All but ``par``, ``inp`` and the static
         inverse are written.
         """
@@ -318,7 +327,10 @@ class IlcController(FixedLawController):
                  rig_name: str = '', where: Callable[[str], str] | None = None) -> None:
         checked = checked_settings(SETTINGS, settings, where)
         self.static_inverse = np.ascontiguousarray(static_inverse, dtype=float)
-        self._memory = np.zeros((4, MEMORY_SIZE))
+        size = memory_size(checked['rate_hz'])
+        self._memory = np.zeros((4, size))
+        self._no_cycle = ('the reference does not repeat within '
+                          f'{int((0.5 * size - 2.0) / checked["rate_hz"])} s')
         super().__init__(ilc_step, checked, self.static_inverse, PARAMETERS, STATE, rig_name,
                          self._memory)
 
@@ -331,7 +343,8 @@ class IlcController(FixedLawController):
         """Return in words whether the last tick learned, or why not."""
         if self.freeze_learning or not fields(self._inputs, INPUT).learning:
             return _OFF
-        return _LEARNS if self._outputs[self.state_names.index('cycle_s')] > 0.0 else _NO_CYCLE
+        cycle_s = self._outputs[self.state_names.index('cycle_s')]
+        return _LEARNS if cycle_s > 0.0 else self._no_cycle
 
     def pause(self) -> None:
         """Forget the motion, and with it what was learned for its cycle."""

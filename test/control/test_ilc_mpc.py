@@ -138,7 +138,7 @@ def test_an_ilc_that_may_not_learn_or_has_no_cycle_learns_nothing():
         muscle.step(controller.step(muscle.contraction_m, value, rate, value, rate))
         learned.append(controller.state_values()[controller.state_names.index('learned_pa')])
     assert not np.any(learned)
-    assert controller.learning_reason() == 'the reference does not repeat'
+    assert controller.learning_reason() == 'the reference does not repeat within 12 s'
 
 
 def learned_pa(controller, muscle, ticks, begin=0, learn=True, measured=lambda command: command):
@@ -195,6 +195,17 @@ def test_an_ilc_finds_a_cycle_whatever_the_age_of_the_readings():
         controller.step(0.014, now, rate, *lead, age_s=age_s)
         found_s.append(controller.state_values()[cycle])
     assert found_s[560:] == pytest.approx([1.0] * 440, abs=2e-3)     # two cycles after a minimum
+
+
+@pytest.mark.parametrize('rate_hz, cycle_s', [(200.0, 4.0), (1000.0, 4.0), (1000.0, 12.0)])
+def test_an_ilc_finds_a_cycle_up_to_twelve_seconds_at_any_rate(rate_hz, cycle_s):
+    """It remembered 5000 ticks, so at 1000 Hz it found none beyond 2.5 s."""
+    controller = ilc(rate_hz=rate_hz)
+    for k in range(int(3.0 * cycle_s * rate_hz)):
+        wanted = sine(1.0 / cycle_s)(k / rate_hz)
+        controller.step(0.014, *wanted, *wanted)
+    found = controller.state_values()[controller.state_names.index('cycle_s')]
+    assert found == pytest.approx(cycle_s, abs=1e-3)
 
 
 def test_an_ilc_of_steps_finds_their_cycle_and_forgets_in_a_pause():
