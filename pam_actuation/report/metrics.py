@@ -47,6 +47,7 @@ STEP_MIN_M = 1.5e-3          # a reference jump this large within 30 ms counts a
 STEP_WITHIN_S = 0.03
 SETTLING_BAND = 0.05         # of the step, the usual 5 % band
 SETTLING_BAND_MIN_M = 0.3e-3  # below this a band would test the sensor, not the loop
+REST_S = 0.5                 # a reference that stays in the band for so long rests after its step
 
 
 @dataclass(frozen=True)
@@ -141,7 +142,9 @@ def step_responses(run: 'Run') -> tuple[StepResponse, ...]:
     Return a StepResponse for every step of the reference.
 
     Settled means that the error stays within 5 % of the step (at least 0.3 mm)
-    until the next step or the end; ``settling_s`` is None if it never does.
+    until the next step or the end; ``settling_s`` is None if it never does. A reference that
+    rests after its step and then moves on, as in a ramp, ends it too: what follows is no answer
+    to the step.
     """
     reference, tracked = signals.series(run, 'reference'), tracking_error(run)
     if reference is None or tracked is None:
@@ -170,16 +173,38 @@ def step_responses(run: 'Run') -> tuple[StepResponse, ...]:
     ends = [start for start, _ in steps[1:]] + [float(te[-1])]
     found = []
     for (start, size), end in zip(steps, ends):
+        end = _rests_until(tr, r, start, size, end)
         inside = (te >= start) & (te < end - 2.0 * STEP_WITHIN_S)
         found.append(_step_response(te[inside], error[inside], start, size))
     return tuple(found)
+
+
+def _band(size_m: float) -> float:
+    """Return how far from its end a step counts as settled [m]."""
+    return max(SETTLING_BAND * abs(size_m), SETTLING_BAND_MIN_M)
+
+
+def _rests_until(time_s: FloatArray, reference_m: FloatArray, start_s: float, size_m: float,
+                 end_s: float) -> float:
+    """Return when a reference that rests after a step moves on, ``end_s`` if it does neither."""
+    later = (time_s >= start_s + STEP_WITHIN_S) & (time_s < end_s - STEP_WITHIN_S)
+    if not later.any():
+        return end_s
+    times = time_s[later]
+    away = np.abs(reference_m[later] - reference_m[later][0])
+    gone = np.flatnonzero(away > _band(size_m))
+    if not gone.size:
+        return end_s
+    near = np.flatnonzero(away[:gone[0]] <= 0.1 * _band(size_m))
+    left_s = float(times[near[-1]])
+    return left_s if left_s - start_s >= REST_S else end_s
 
 
 def _step_response(time_s: FloatArray, error: FloatArray, start_s: float, size_m: float
                    ) -> StepResponse:
     if not time_s.size:
         return StepResponse(start_s, size_m, None, 0.0)
-    band = max(SETTLING_BAND * abs(size_m), SETTLING_BAND_MIN_M)
+    band = _band(size_m)
     outside = np.flatnonzero(np.abs(error) > band)
     overshoot = max(float(np.max(-np.sign(size_m) * error)), 0.0)
     if not outside.size:

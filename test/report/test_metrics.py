@@ -95,6 +95,19 @@ def test_settling_time_of_a_first_order_lag():
     assert step.overshoot_m == pytest.approx(0.0, abs=1e-9)
 
 
+def test_what_follows_a_rest_after_a_step_is_no_answer_to_it():
+    """The reference goes back from 5 s on, and the muscle follows 0.2 s, 1 mm, behind."""
+    run = step_run(gain_per_s=10.0)
+    begin_ns = run.topics['reference'].stamp_ns[0]
+    for topic, from_s in (('reference', 5.0), ('contraction', 5.2)):
+        series = run.topics[topic]
+        series.values['contraction_m'] -= 5e-3 * np.clip(
+            series.time_s(begin_ns) - from_s, 0.0, 2.0)
+    (step,) = metrics.step_responses(run)
+    assert step.settling_s == pytest.approx(np.log(20) / 10.0, abs=0.012)
+    assert step.overshoot_m == pytest.approx(0.0, abs=1e-9)
+
+
 def test_plain_data_assign_settling_and_overshoot_to_their_steps():
     run = step_run(gain_per_s=10.0)
     found = metrics.run_metrics(run)
