@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from pam_actuation.bags.load_joint import MEASURED
+from pam_actuation.control.sent_reference import SILENT_S, wanted_at
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.run import Run
 
@@ -76,7 +77,7 @@ def tracking(run: Run, stamp_ns: Mapping[str, IntArray], recorded: Mapping[str, 
         if values is None or len(values) < 2:
             continue
         at = stamp_ns[name]
-        asked = np.interp(at, wanted.stamp_ns, values)
+        asked = wanted_at(at, wanted.stamp_ns, values, 1e9 * SILENT_S)
         inside = (at >= wanted.stamp_ns[0]) & (at <= wanted.stamp_ns[-1]) & np.isfinite(
             asked + recorded[name] + replayed[name])
         if inside.any():

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pam_actuation.control.sent_reference import wanted_at
 from pam_actuation.report import signals
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
@@ -46,7 +47,7 @@ def difference(reference: Signal | None, measured: Signal | None) -> Signal | No
     inside = (tx >= tr[0]) & (tx <= tr[-1])
     if not inside.any():
         return None
-    return tx[inside], np.interp(tx[inside], tr, r) - x[inside]
+    return tx[inside], wanted_at(tx[inside], tr, r) - x[inside]
 
 
 def split_rmse(time_s: ArrayLike, error: ArrayLike, period_s: float, start_s: float,

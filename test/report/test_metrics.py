@@ -108,6 +108,17 @@ def test_what_follows_a_rest_after_a_step_is_no_answer_to_it():
     assert step.overshoot_m == pytest.approx(0.0, abs=1e-9)
 
 
+def test_a_reference_that_is_sent_when_it_changes_holds_until_then():
+    """As a controller takes it; between messages that come quickly it moves."""
+    time_s = np.linspace(0.0, 6.0, 601)
+    measured = np.where(time_s < 3.0, 0.004, 0.01)
+    sent = np.array([0.0, 3.0, 6.0]), np.array([0.004, 0.01, 0.01])
+    assert not errors.difference(sent, (time_s, measured))[1].any()
+    quick = np.array([0.0, 0.1, 0.2]), np.array([0.0, 0.001, 0.0])
+    at, error = errors.difference(quick, (time_s[:21], np.zeros(21)))
+    assert error == pytest.approx(np.interp(at, *quick))
+
+
 def test_plain_data_assign_settling_and_overshoot_to_their_steps():
     run = step_run(gain_per_s=10.0)
     found = metrics.run_metrics(run)
