@@ -253,6 +253,7 @@ def test_the_table_of_figures_has_loops_saturation_and_air(tmp_path):
                  'Driver loop'):
         assert name in table
     assert found['air_fed_kg'] > 0.0 and found['air_use_kg'] > 0.0
+    assert f'{1e3 * found["air_use_kg"]:.3g} g (' in table      # a small muscle: below 0.1 g
     pages.bag_report([step_run()], tmp_path / 'step.html')
     assert 'Settling into 5 % after a step' in (tmp_path / 'step.html').read_text()
 

@@ -128,7 +128,7 @@ def told_of_learning(named: 'Sequence[tuple[str, RunMetrics | JointMetrics]]') -
 def _air(value: float | None) -> str | None:
     if value is None:
         return None
-    return f'{value * 1e3:.2f} g ({value / RHO_REFERENCE * 1e3:.2f} l)'
+    return f'{value * 1e3:.3g} g ({value / RHO_REFERENCE * 1e3:.3g} l)'
 
 
 def _loop(m: 'RunMetrics', topic: str) -> str | None:
