@@ -109,6 +109,7 @@ class RunMetrics:
                 'cycle_rmse_n': [float(v) for v in self.cycle_rmse_n],
                 'cycle_parts': parts_as_data(self.cycle_parts),
                 'settling_s': [s.settling_s for s in self.steps],
+                'overshoot_m': [s.overshoot_m for s in self.steps],
                 'steps': [asdict(step) for step in self.steps],
                 'command_variation_pa_per_s': self.command_variation_pa_per_s,
                 'interruptions': self.interruptions and self.interruptions[0],

@@ -205,6 +205,8 @@ def test_runs_of_several_seeds_have_mean_and_standard_deviation(tmp_path):
     assert lqi['tracking_rmse_m'] == {
         'mean': pytest.approx(np.mean(rmse_m)), 'std': pytest.approx(np.std(rmse_m, ddof=1))}
     assert lqi['cycle_rmse_m']['mean'] == pytest.approx([3e-3 / np.sqrt(2)] * 2, rel=2e-3)
+    assert pid['mean_error_m']['mean'] == pytest.approx(np.mean(
+        [found[title]['mean_error_m'] for title in titles[:3]]))
     body = markup(tmp_path / 'page.html')[0].partition('id="over-seeds"')[2]
     assert '2.000 ± 1.000 mm' in body.partition('</section>')[0]
 
@@ -232,6 +234,20 @@ def test_runs_whose_learning_is_frozen_are_counted_apart(tmp_path):
     found = pages.bag_report(runs, tmp_path / 'page.html', ['l1', 'l2', 'f3', 'f4'])
     assert set(found['over_seeds']) == {'pid: l1, l2', 'pid: f3, f4'}
     assert 'over_seeds' not in pages.bag_report(runs[1:3], tmp_path / 'two.html')
+
+
+def test_overshoot_and_air_have_a_spread_over_seeds(tmp_path):
+    rig = load_rig('dmsp_5_300_realistic').to_yaml()
+    runs = [step_run(late_m=late_m) for late_m in (-1e-3, -2e-3)]
+    for seed, run in enumerate(runs):
+        stamp_ns = run['contraction'].stamp_ns
+        run.topics['pressure'] = Series(
+            stamp_ns, {'pressure_pa': 2e5 + (1.0 + seed) * np.linspace(0.0, 1e5, len(stamp_ns))})
+        run.metadata.update(seed=str(seed), rig=rig, controller='controller: pid\n')
+    spread, = pages.bag_report(runs, tmp_path / 'page.html')['over_seeds'].values()
+    assert spread['overshoot_m']['mean'] == pytest.approx([1.5e-3], abs=1e-5)
+    assert spread['air_use_kg']['std'] > 0.0
+    assert ' mg<' in (tmp_path / 'page.html').read_text()
 
 
 def test_repeated_runs_of_one_seed_and_other_references_are_no_seeds(tmp_path):

@@ -36,6 +36,7 @@ _SAME = ('experiment', 'experiment_name', 'rig', 'valve', 'controller', 'preview
 _MEASURED = (*MEASURED_TOPICS, 'joint_state')      # of a joint in the place of each muscle
 _FIGURES = (
     ('Tracking RMSE', 'tracking_rmse_m', 1e3, 'mm'), ('Largest error', 'max_error_m', 1e3, 'mm'),
+    ('Mean error (reference − contraction)', 'mean_error_m', 1e3, 'mm'),
     ('Force tracking RMSE', 'tracking_rmse_n', 1.0, 'N'),
     ('Largest force error', 'max_error_n', 1.0, 'N'),
     ('RMSE of each cycle', 'cycle_rmse_m', 1e3, 'mm'),
@@ -45,7 +46,10 @@ _FIGURES = (
     ('RMSE of each cycle', 'cycle_rmse_rad', math.degrees(1.0), '°'),
     ('Mean pressure of both muscles', 'co_contraction_pa', 1e-3, 'kPa'),
     ('Settling of each step', 'settling_s', 1.0, 's'),
-    ('Total variation of the command', 'command_variation_pa_per_s', 1e-3, 'kPa/s'))
+    ('Overshoot of each step', 'overshoot_m', 1e3, 'mm'),
+    ('Total variation of the command', 'command_variation_pa_per_s', 1e-3, 'kPa/s'),
+    ('Air filled into the muscle', 'air_use_kg', 1e6, 'mg'),
+    ('Air through the fill valve', 'air_fed_kg', 1e6, 'mg'))
 
 
 def over_seeds(measured: 'Sequence[Measured]') -> dict[str, dict[str, Any]]:
