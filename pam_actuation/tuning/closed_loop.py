@@ -232,10 +232,6 @@ class ClosedLoop(MuscleLoop):
             The controller runs at another rate.
 
         """
-        if controller.rate_hz != self.rate_hz:
-            raise InputError(
-                f'the controller runs at {controller.rate_hz:g} Hz, this loop at '
-                f'{self.rate_hz:g} Hz')
         log = self.run_raw(controller, learn)
         n = self.ticks
         return LoopResult(
@@ -243,6 +239,13 @@ class ClosedLoop(MuscleLoop):
             log['pressure_pa'], log['command_pa'], log['force_n'],
             np.column_stack([log[name] for name in ('signal_0', 'signal_1')[:1 + self.hsv]]),
             self.experiment.cycles, controller)
+
+    def check_rate(self, controller: 'CompiledController') -> None:
+        """Raise InputError for a controller that runs at another rate."""
+        if controller.rate_hz != self.rate_hz:
+            raise InputError(
+                f'the controller runs at {controller.rate_hz:g} Hz, this loop at '
+                f'{self.rate_hz:g} Hz')
 
     def tracked(self, controller: 'CompiledController'
                 ) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -258,6 +261,7 @@ class ClosedLoop(MuscleLoop):
     def run_raw(self, controller: 'CompiledController',
                 learn: Learns = True) -> npt.NDArray[np.void]:
         """Return a ``LOG`` of ``rollouts`` for every tick, shape (ticks,)."""
+        self.check_rate(controller)
         from pam_actuation.tuning.rollouts import LOG       # brings the compiler with it
         controller.pause()
         log = np.empty(self.ticks * size_of(LOG))

@@ -164,10 +164,17 @@ def from_unit(axes: tuple[Axis, ...], point: FloatArray) -> dict[str, float]:
 
 
 def check_axes(axes: tuple[Axis, ...], settings: dict[str, float]) -> None:
-    """Raise InputError for an axis that is no setting of the controller or is empty."""
-    for axis in axes:
+    """Raise InputError for no axes, a name twice, one that is no setting, or an empty range."""
+    if not axes:
+        raise InputError('nothing to tune: give one axis or more', 'axes')
+    for k, axis in enumerate(axes):
+        if axis.name in [one.name for one in axes[:k]]:
+            raise InputError(f'cannot tune {axis.name} twice; give it one axis', 'axes')
+        if axis.name == 'rate_hz':
+            raise InputError('cannot tune rate_hz: closed loops run at the rate of the controller '
+                             'that is given; tune one controller for each rate', 'axes')
         if axis.name not in settings:
             raise InputError(f'cannot tune {axis.name}: the controller has no such setting')
-        if not axis.lower < axis.upper or (axis.log and axis.lower <= 0.0):
+        if not -math.inf < axis.lower < axis.upper < math.inf or (axis.log and axis.lower <= 0.0):
             raise InputError(
                 f'cannot tune {axis.name} between {axis.lower:g} and {axis.upper:g}')

@@ -164,8 +164,11 @@ def test_tuning_pushes_on_the_load_as_the_experiment_says(loop):
 
 
 def test_what_cannot_be_run_is_refused(loop):
-    with pytest.raises(InputError, match='Hz'):
-        loop.run(load_controller('controller: sofc\nsettings: {rate_hz: 100}\n', loop.rig))
+    slower = load_controller('controller: sofc\nsettings: {rate_hz: 100}\n', loop.rig)
+    other = ForeignLoop(loop.rig.plant, loop.rig, loop.experiment)
+    for tried in (loop.run, loop.cost, other.cost):
+        with pytest.raises(InputError, match='100 Hz'):
+            tried(slower)
     with pytest.raises(InputError, match='rate_hz: is 170 Hz.*whole number.*100, 125, 200'):
         ClosedLoop(loop.rig, loop.experiment, rate_hz=170.0)
     with pytest.raises(InputError, match='contraction'):

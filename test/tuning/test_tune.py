@@ -15,6 +15,7 @@
 """Offline tuning: improves on runs it did not see, same seed same result."""
 
 from dataclasses import replace
+import math
 
 import numpy as np
 from pam_actuation.control.config import load_controller
@@ -164,6 +165,16 @@ def test_axes_are_clipped_scaled_and_checked(rig):
         tune(rig, untuned(rig), load_experiment(SHORT_SINE), axes=(Axis('speed', 1.0, 2.0),))
     with pytest.raises(InputError, match='too small'):
         tune(rig, untuned(rig), load_experiment(SHORT_SINE), budget=3)
+
+
+@pytest.mark.parametrize('axes, says', [
+    ((), 'nothing to tune'), ((AXES[0], AXES[0]), 'twice'),
+    ((Axis('rate_hz', 100.0, 200.0),), 'for each rate'),
+    ((Axis('lead_s', 0.0, math.inf, log=False),), 'between 0 and inf')])
+def test_axes_that_no_search_can_follow_are_refused(rig, axes, says):
+    """A rate other than that of the loops gave a 'better' controller that nobody had tried."""
+    with pytest.raises(InputError, match=says):
+        tune(rig, untuned(rig), load_experiment(SHORT_SINE), budget=20, axes=axes)
 
 
 @pytest.mark.parametrize('name, load', [
