@@ -15,6 +15,7 @@
 """The error of a reference that was tracked, over a run and over the cycles in it."""
 
 from collections.abc import Sequence
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,14 +23,20 @@ from numpy.typing import ArrayLike
 
 from pam_actuation.control.sent_reference import wanted_at
 from pam_actuation.report import signals
+from pam_actuation.report.begun import begun_s
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 
 if TYPE_CHECKING:
+    from pam_actuation.experiments.experiment import Experiment
     from pam_sim.run import Run
 
 Signal = tuple[FloatArray, FloatArray]          # time [s], values
 Cycles = tuple[float, float, int]               # start [s], period [s], count
+# By the domain of an experiment: topic and field of its reference, and of what follows it.
+_ASKED = {'contraction': ('reference', 'contraction_m', 'contraction', 'contraction_m'),
+          'force': ('reference', 'force_n', 'force', 'force_n'),
+          'joint_angle': ('joint_reference', 'angle_rad', 'joint_state', 'angle_rad')}
 
 
 def rmse(error: ArrayLike) -> float | None:
@@ -84,19 +91,39 @@ def find_parts(run: 'Run') -> tuple[Cycles, ...]:
     """
     Return (start_s, period_s, count) of every part of the reference that repeats itself.
 
-    Read from the experiment in the bag's metadata. A foreign bag is searched for equally spaced
-    rising crossings of the reference's middle value, which give one part.
+    Read from the experiment in the bag's metadata, without the cycles that had begun before the
+    first messages. A foreign bag is searched for equally spaced rising crossings of the
+    reference's middle value, which give one part.
     """
     text = run.metadata.get('experiment') if run.metadata else None
     if text:
         from pam_actuation.experiments import load_experiment
         try:
-            return load_experiment(text).periodic_parts
+            experiment = load_experiment(text)
         except InputError:
-            pass
+            experiment = None
+        if experiment is not None:
+            return _recorded(run, experiment)
     reference = signals.series(run, 'reference')
     found = None if reference is None else cycles_of_signal(*reference)
     return () if found is None else (found,)
+
+
+def _recorded(run: 'Run', experiment: 'Experiment') -> tuple[Cycles, ...]:
+    """Return the cycles of an experiment that begin after the first messages of a run."""
+    topic, field, followed, read = _ASKED.get(experiment.domain, ('', '', '', ''))
+    reference, measured = signals.series(run, topic, field), signals.series(run, followed, read)
+    if reference is None or measured is None:
+        return experiment.periodic_parts
+    begun = begun_s(experiment, *reference)
+    first_s, left = max(float(measured[0][0]), 0.0), []
+    for start_s, period_s, count in experiment.periodic_parts:
+        start_s -= begun
+        # As at the end, where the last sample lies up to one sample before that of the cycle.
+        over = max(math.ceil((first_s - start_s) / period_s - 0.02), 0)
+        if over < count or not over:
+            left.append((start_s + over * period_s, period_s, count - over))
+    return tuple(left)
 
 
 def cycles_of_signal(time_s: ArrayLike, value: ArrayLike) -> Cycles | None:

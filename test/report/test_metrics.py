@@ -17,6 +17,7 @@
 import json
 
 import numpy as np
+from pam_actuation.experiments import load_experiment
 from pam_actuation.report import errors, metrics
 from pam_actuation.report.decimate import decimate_min_max, decimate_steps
 from pam_actuation.report.sections import metrics_table
@@ -54,6 +55,42 @@ def test_cycles_come_from_the_recorded_experiment():
             '  - sine: {center_m: 0.014, amplitude_m: 0.008, frequency_hz: 0.25, cycles: 3}\n')
     run = tracking_run(AMPLITUDES, metadata={'experiment': text})
     assert errors.find_parts(run) == ((1.0, 4.0, 3),)
+
+
+ONE_SINE = ('name: sines\nsegments:\n  - rest: {duration_s: 1.0}\n'
+             '  - ramp: {to_m: 0.006, duration_s: 2.0}\n'
+             '  - sine: {center_m: 0.014, amplitude_m: 0.008, frequency_hz: 0.25, cycles: 3}\n'
+             '  - hold: {duration_s: 0.5}\n')
+
+
+@pytest.mark.parametrize('late_s, left', [(0.0, 3), (2.0, 3), (3.5, 2), (8.0, 1)])
+def test_cycles_of_a_recording_that_began_late_are_those_of_the_experiment(late_s, left):
+    """They were counted from the first message, as if the experiment began there."""
+    experiment = load_experiment(ONE_SINE)
+    run = tracking_run(AMPLITUDES, metadata={'experiment': ONE_SINE})
+    reference = run.topics['reference']
+    time_s = reference.time_s(reference.stamp_ns[0])
+    begin_ns = int(reference.stamp_ns[0] + late_s * 1e9)
+    reference.values['contraction_m'] = np.array([experiment.at(t)[0] for t in time_s])
+    for series in run.topics.values():
+        kept = series.stamp_ns >= begin_ns
+        series.stamp_ns = series.stamp_ns[kept]
+        series.values = {name: values[kept] for name, values in series.values.items()}
+    ((start_s, period_s, count),) = errors.find_parts(run)
+    assert count == left and period_s == 4.0
+    assert start_s == pytest.approx(3.0 + 4.0 * (3 - left) - late_s, abs=0.011)
+
+
+def test_cycles_of_which_the_start_was_not_measured_are_left_out():
+    text = ONE_SINE.replace('ramp: {to_m', 'step: {to_m')
+    run = tracking_run(AMPLITUDES, metadata={'experiment': text})
+    measured = run.topics['contraction']
+    kept = measured.time_s(measured.stamp_ns[0]) > 5.0
+    measured.stamp_ns = measured.stamp_ns[kept]
+    measured.values['contraction_m'] = measured.values['contraction_m'][kept]
+    found = metrics.run_metrics(run)
+    assert found.cycle_parts == ((7.0, 4.0, 2),)
+    assert found.cycle_rmse_m == pytest.approx(np.array(AMPLITUDES[1:]) / np.sqrt(2), rel=5e-3)
 
 
 def test_each_part_of_an_experiment_has_its_own_cycles():
