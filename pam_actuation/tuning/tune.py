@@ -186,7 +186,12 @@ class TuneResult:
     def text(self) -> str:
         """Return the outcome for people."""
         shown = SHOWN_UNIT[self.unit]
+        searched = set() if self.problem is None else {
+            loop.experiment.name for loop in self.problem.loops}
+        others = [one for one in self.held_out_runs if one.experiment not in searched]
         verdict = f'-> {self.held_out_after:.3f}{shown}, better'
+        if sum(one.after - one.before for one in others) > 0.0:
+            verdict += ' on what was searched, worse on what was not'
         if not self.improved:
             verdict = (f'before, {self.held_out_found:.3f}{shown} with what was found, '
                        'not better: settings left as they were')
@@ -202,7 +207,8 @@ class TuneResult:
             before, after = (np.mean([
                 (one.before, one.after) for one in self.held_out_runs
                 if one.experiment == name], axis=0))
-            lines.append(f'  held-out {name}: {before:.3f} -> {after:.3f}{shown}')
+            also = '' if name in searched else ', not searched'
+            lines.append(f'  held-out {name}{also}: {before:.3f} -> {after:.3f}{shown}')
         if self.rules:
             lines.append(f'  initial rules: {self.rules}')
         if self.left_out:

@@ -211,3 +211,18 @@ def test_cost_weighs_late_errors_and_refuses_runaways():
     late = early[::-1]
     assert tracking_cost(late) > 2.0 * tracking_cost(early)
     assert tracking_cost(np.r_[early, np.nan]) == 1e3
+
+
+def test_what_is_better_only_where_it_was_searched_is_told(rig):
+    """The mean over all held-out runs hides a motion that became worse."""
+    search, other = load_experiment(SHORT_SINE), load_experiment(HOLD)
+    result = tune(rig, untuned(rig), search, budget=20, seed=3, axes=AXES,
+                  held_out=[search, other])
+    assert [line.partition(':')[0].strip() for line in result.text().splitlines()
+            if line.startswith('  held-out')] == [
+                'held-out short_sine', 'held-out hold, not searched']
+    better, worse = (replace(result, improved=True, held_out_runs=[
+        replace(result.held_out_runs[0], before=2.0, after=1.0),
+        replace(result.held_out_runs[1], before=0.1, after=after)]) for after in (0.05, 0.2))
+    assert 'worse on what was not' in worse.text()
+    assert ', better\n' in better.text() and 'worse' not in better.text()
