@@ -341,11 +341,13 @@ def tune(rig: 'Rig | JointRig | Sequence[Rig | JointRig]', controller: 'Law',
     changed = {name: (value, tuned.settings[name]) for name, value in before.items()
                if tuned.settings[name] != value}
     rollouts = done[0] + len(train) + 2 * len(test) + extra
-    mean_s = sum(loop.experiment.duration_s for loop in train) / len(train)
+    train_s, test_s = (
+        sum(loop.experiment.duration_s for loop in loops) for loops in (train, test))
+    simulated_s = (rollouts - 2 * len(test)) * (train_s / len(train)) + 2 * test_s
     numbers = {id(one): k for k, one in enumerate(tested)}
     return TuneResult(
         tuned, changed, history, cost_before, cost_after, held_before, held_after, improved,
-        rollouts, rollouts * mean_s, time.perf_counter() - began, found.reason, rules, left_out,
+        rollouts, simulated_s, time.perf_counter() - began, found.reason, rules, left_out,
         axes, controller, problem, check, 'deg' if tracked_by(controller) == JOINT else 'mm',
         held_found, [
             HeldOutRun(loop.experiment.name, numbers[id(loop.rig)], seed + HELD_OUT_SEED, *costs)

@@ -218,6 +218,8 @@ def test_what_is_better_only_where_it_was_searched_is_told(rig):
     search, other = load_experiment(SHORT_SINE), load_experiment(HOLD)
     result = tune(rig, untuned(rig), search, budget=20, seed=3, axes=AXES,
                   held_out=[search, other])
+    assert result.simulated_s == pytest.approx(
+        (result.rollouts - 2) * search.duration_s + 2 * other.duration_s)
     assert [line.partition(':')[0].strip() for line in result.text().splitlines()
             if line.startswith('  held-out')] == [
                 'held-out short_sine', 'held-out hold, not searched']
