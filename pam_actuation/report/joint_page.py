@@ -34,6 +34,7 @@ from pam_actuation.report.sections.over_seeds import over_seeds, seeds_section
 from pam_actuation.report.sections.overlaid import lines, read_topic, together
 from pam_actuation.report.sections.provenance import provenance
 from pam_actuation.report.sections.timing import timing
+from pam_actuation.report.steps import ANGLE, Answer, answers, as_data, settling_text
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.files import write_text
@@ -55,7 +56,7 @@ class JointMetrics:
     ``cycle_rmse_rad`` has one number per complete cycle of the experiment, those of its
     ``cycle_parts`` one after another; ``co_contraction_pa`` is the mean gauge pressure of both
     muscles; ``interruptions`` are number and seconds of the stretches in which the controller
-    vented for want of input.
+    vented for want of input; ``steps`` are in rad.
     """
 
     duration_s: float
@@ -68,6 +69,7 @@ class JointMetrics:
     cycle_parts: tuple[errors.Cycles, ...] = ()
     times_rolled_back: int | None = None
     learned_worse: tuple[str, ...] = ()
+    steps: tuple[Answer, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Return the main numbers as plain data."""
@@ -79,6 +81,9 @@ class JointMetrics:
                 'interruptions': self.interruptions and self.interruptions[0],
                 'times_rolled_back': self.times_rolled_back,
                 'learned_worse': list(self.learned_worse),
+                'settling_s': [step.settling_s for step in self.steps],
+                'overshoot_rad': [step.overshoot for step in self.steps],
+                'steps': as_data(self.steps, ANGLE),
                 'loop_period_s': {one.topic: one.median_s for one in self.timing},
                 'loop_jitter_s': {one.topic: one.jitter_s for one in self.timing}}
 
@@ -107,7 +112,8 @@ def joint_metrics(run: Run) -> JointMetrics:
         tuple(found for topic in run.topics
               if (found := metrics.loop_timing(run, topic)) is not None),
         errors.counted(parts, cycles), times_rolled_back(run),
-        learned_worse(run, np.degrees(errors.joined(cycles)), errors.counted(parts, cycles), '°'))
+        learned_worse(run, np.degrees(errors.joined(cycles)), errors.counted(parts, cycles), '°'),
+        answers(signals.series(run, 'joint_reference', 'angle_rad'), error, ANGLE))
 
 
 def joint_report(runs: Sequence[Run], out_path: str | os.PathLike[str],
@@ -172,6 +178,10 @@ def _merits(named: Sequence[tuple[str, JointMetrics]]) -> Section:
             m.cycle_rmse_rad, m.cycle_parts, lambda cycles: _degrees(cycles[0])))),
         ('RMSE of the last cycle', cells(lambda m: each_part(
             m.cycle_rmse_rad, m.cycle_parts, lambda cycles: _degrees(cycles[-1])))),
+        ('Settling into 5 % after a step', cells(lambda m: settling_text(
+            [step.settling_s for step in m.steps]))),
+        ('Overshoot of steps', cells(lambda m: _degrees(
+            max((step.overshoot for step in m.steps), default=None)))),
         ('Mean pressure of both muscles', cells(lambda m: (
             None if m.co_contraction_pa is None else f'{m.co_contraction_pa * 1e-3:.1f} kPa'))),
         ('Vented for missing or old input', cells(interrupted_text)),

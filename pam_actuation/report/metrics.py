@@ -33,6 +33,7 @@ from pam_actuation.report.command_path import command_path
 from pam_actuation.report.errors import (
     counted, Cycles, difference, find_parts, joined, part_rmse, parts_as_data, rmse, Signal)
 from pam_actuation.report.learning import learned_worse, times_rolled_back
+from pam_actuation.report.steps import Answer, answers, as_data, CONTRACTION, FORCE
 from pam_sim.annotations import FloatArray
 from pam_sim.short_repr import short_repr
 from pam_sim.units import (
@@ -42,12 +43,6 @@ if TYPE_CHECKING:
     from pam_actuation.control.delay_estimate import PathEstimate
     from pam_sim.rig import Rig
     from pam_sim.run import Run
-
-STEP_MIN_M = 1.5e-3          # a reference jump this large within 30 ms counts as a step
-STEP_WITHIN_S = 0.03
-SETTLING_BAND = 0.05         # of the step, the usual 5 % band
-SETTLING_BAND_MIN_M = 0.3e-3  # below this a band would test the sensor, not the loop
-REST_S = 0.5                 # a reference that stays in the band for so long rests after its step
 
 
 @dataclass(frozen=True)
@@ -99,6 +94,7 @@ class RunMetrics:
     cycle_parts: tuple[Cycles, ...] = ()     # whose cycles follow one another above
     times_rolled_back: int | None = None
     learned_worse: tuple[str, ...] = ()      # sentences
+    force_steps: tuple[Answer, ...] = ()     # in N
 
     def to_dict(self) -> dict[str, Any]:
         """Return the main numbers as plain data, SI."""
@@ -111,6 +107,7 @@ class RunMetrics:
                 'settling_s': [s.settling_s for s in self.steps],
                 'overshoot_m': [s.overshoot_m for s in self.steps],
                 'steps': [asdict(step) for step in self.steps],
+                'force_steps': as_data(self.force_steps, FORCE),
                 'command_variation_pa_per_s': self.command_variation_pa_per_s,
                 'interruptions': self.interruptions and self.interruptions[0],
                 'times_rolled_back': self.times_rolled_back,
@@ -139,81 +136,16 @@ def force_error(run: 'Run') -> Signal | None:
 
 
 def step_responses(run: 'Run') -> tuple[StepResponse, ...]:
-    """
-    Return a StepResponse for every step of the reference.
-
-    Settled means that the error stays within 5 % of the step (at least 0.3 mm)
-    until the next step or the end; ``settling_s`` is None if it never does. A reference that
-    rests after its step and then moves on, as in a ramp, ends it too: what follows is no answer
-    to the step.
-    """
-    reference, tracked = signals.series(run, 'reference'), tracking_error(run)
-    if reference is None or tracked is None:
-        return ()
-    tr, r = reference
-    te, error = tracked
-    period = max(float(np.median(np.diff(tr))), 1e-6)
-    lag = max(int(round(STEP_WITHIN_S / period)), 1)
-    if r.size <= lag:
-        return ()
-    jump = r[lag:] - r[:-lag]
-    large = np.flatnonzero(np.abs(jump) >= STEP_MIN_M)
-    if not large.size:
-        return ()
-    groups = np.split(large, np.flatnonzero(np.diff(large) > lag) + 1)
-    # A ramp also moves far in 30 ms if it is long enough; a step is over at once.
-    groups = [g for g in groups if g.size <= 2 * lag]
-    # A quick sine moves as far in the 30 ms before and after.
-    padded = np.pad(jump, lag)
-    steps = []
-    for g in groups:
-        size = float(jump[g][np.argmax(np.abs(jump[g]))])
-        before, after = float(padded[g[0]]), float(padded[g[-1] + 2 * lag])
-        if max(abs(before), abs(after)) <= 0.5 * abs(size):
-            steps.append((float(tr[g[0] + lag]), size - 0.5 * (before + after)))
-    ends = [start for start, _ in steps[1:]] + [float(te[-1])]
-    found = []
-    for (start, size), end in zip(steps, ends):
-        end = _rests_until(tr, r, start, size, end)
-        inside = (te >= start) & (te < end - 2.0 * STEP_WITHIN_S)
-        found.append(_step_response(te[inside], error[inside], start, size))
-    return tuple(found)
+    """Return a StepResponse for every step of the wanted contraction; see ``steps.answers``."""
+    found = answers(signals.series(run, 'reference', 'contraction_m'), tracking_error(run),
+                    CONTRACTION)
+    return tuple(StepResponse(one.start_s, one.size, one.settling_s, one.overshoot)
+                 for one in found)
 
 
-def _band(size_m: float) -> float:
-    """Return how far from its end a step counts as settled [m]."""
-    return max(SETTLING_BAND * abs(size_m), SETTLING_BAND_MIN_M)
-
-
-def _rests_until(time_s: FloatArray, reference_m: FloatArray, start_s: float, size_m: float,
-                 end_s: float) -> float:
-    """Return when a reference that rests after a step moves on, ``end_s`` if it does neither."""
-    later = (time_s >= start_s + STEP_WITHIN_S) & (time_s < end_s - STEP_WITHIN_S)
-    if not later.any():
-        return end_s
-    times = time_s[later]
-    away = np.abs(reference_m[later] - reference_m[later][0])
-    gone = np.flatnonzero(away > _band(size_m))
-    if not gone.size:
-        return end_s
-    near = np.flatnonzero(away[:gone[0]] <= 0.1 * _band(size_m))
-    left_s = float(times[near[-1]])
-    return left_s if left_s - start_s >= REST_S else end_s
-
-
-def _step_response(time_s: FloatArray, error: FloatArray, start_s: float, size_m: float
-                   ) -> StepResponse:
-    if not time_s.size:
-        return StepResponse(start_s, size_m, None, 0.0)
-    band = _band(size_m)
-    outside = np.flatnonzero(np.abs(error) > band)
-    overshoot = max(float(np.max(-np.sign(size_m) * error)), 0.0)
-    if not outside.size:
-        return StepResponse(start_s, size_m, 0.0, overshoot)
-    if outside[-1] + 1 >= time_s.size:
-        return StepResponse(start_s, size_m, None, overshoot)
-    return StepResponse(
-        start_s, size_m, float(time_s[outside[-1] + 1] - start_s), overshoot)
+def force_steps(run: 'Run') -> tuple[Answer, ...]:
+    """Return an Answer for every step of the wanted force [N]; see ``steps.answers``."""
+    return answers(signals.series(run, 'reference', 'force_n'), force_error(run), FORCE)
 
 
 def saturation_share(run: 'Run', rig: 'Rig | None' = None) -> tuple[float | None, float] | None:
@@ -377,7 +309,7 @@ def run_metrics(run: 'Run', rig: 'Rig | None' = None) -> RunMetrics:
         max_error_m=None if error is None else float(np.max(np.abs(error))),
         mean_error_m=None if error is None else float(np.mean(error)),
         cycle_rmse_m=joined(cycles_m),
-        steps=step_responses(run),
+        steps=step_responses(run), force_steps=force_steps(run),
         saturation_low=saturation[0], saturation_high=saturation[1],
         air_use_kg=used, timing=tuple(t for t in timing if t is not None),
         interruptions=interruptions(run),

@@ -18,11 +18,11 @@ import json
 
 import numpy as np
 from pam_actuation.experiments import load_experiment
-from pam_actuation.report import errors, metrics
+from pam_actuation.report import errors, joint_page, metrics
 from pam_actuation.report.decimate import decimate_min_max, decimate_steps
 from pam_actuation.report.sections import metrics_table
 from pam_sim import load_rig
-from pam_sim.run import Series
+from pam_sim.run import Run, Series
 from pam_sim.units import P_ATM_PA
 import pytest
 
@@ -58,9 +58,9 @@ def test_cycles_come_from_the_recorded_experiment():
 
 
 ONE_SINE = ('name: sines\nsegments:\n  - rest: {duration_s: 1.0}\n'
-             '  - ramp: {to_m: 0.006, duration_s: 2.0}\n'
-             '  - sine: {center_m: 0.014, amplitude_m: 0.008, frequency_hz: 0.25, cycles: 3}\n'
-             '  - hold: {duration_s: 0.5}\n')
+            '  - ramp: {to_m: 0.006, duration_s: 2.0}\n'
+            '  - sine: {center_m: 0.014, amplitude_m: 0.008, frequency_hz: 0.25, cycles: 3}\n'
+            '  - hold: {duration_s: 0.5}\n')
 
 
 @pytest.mark.parametrize('late_s, left', [(0.0, 3), (2.0, 3), (3.5, 2), (8.0, 1)])
@@ -154,6 +154,30 @@ def test_a_reference_that_is_sent_when_it_changes_holds_until_then():
     quick = np.array([0.0, 0.1, 0.2]), np.array([0.0, 0.001, 0.0])
     at, error = errors.difference(quick, (time_s[:21], np.zeros(21)))
     assert error == pytest.approx(np.interp(at, *quick))
+
+
+def test_steps_of_a_force_and_of_an_angle_have_settling_and_overshoot():
+    """Only those of a contraction had."""
+    run = step_run(gain_per_s=10.0, late_m=-4e-4)          # goes too far by 4 %
+    wanted, reached = (run.topics[name] for name in ('reference', 'contraction'))
+    for factor, run_of in ((4e3, 'force'), (50.0, 'joint')):
+        topics = {name: Series(one.stamp_ns, {field: factor * one.values['contraction_m']})
+                  for name, one, field in (
+                      ('reference', wanted, 'force_n'), ('force', reached, 'force_n'),
+                      ('joint_reference', wanted, 'angle_rad'),
+                      ('joint_state', reached, 'angle_rad'))
+                  if ('joint' in name) == (run_of == 'joint')}
+        made = Run(topics, {}, '/muscle', 'synthetic')
+        if run_of == 'force':
+            found = metrics.run_metrics(made)
+            (step,), unit = found.to_dict()['force_steps'], 'n'
+            assert found.steps == () and '1.600 N' in metrics_table.metrics([('run', found)]).body
+        else:
+            (step,), unit = joint_page.joint_metrics(made).to_dict()['steps'], 'rad'
+        assert step['start_s'] == pytest.approx(2.0)
+        assert step[f'size_{unit}'] == pytest.approx(0.01 * factor)
+        assert step[f'overshoot_{unit}'] == pytest.approx(4e-4 * factor, rel=1e-3)
+        assert step['settling_s'] == pytest.approx(np.log(104.0 / 9.0) / 10.0, abs=0.012)
 
 
 def test_plain_data_assign_settling_and_overshoot_to_their_steps():

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 
 from pam_actuation.report.errors import by_part
 from pam_actuation.report.page import paragraph, Section, signed, table
+from pam_actuation.report.steps import settling_text
 from pam_sim.annotations import FloatArray
 from pam_sim.units import RHO_REFERENCE
 
@@ -99,10 +100,15 @@ def _variation(m: 'RunMetrics') -> str | None:
 
 
 def _settling(m: 'RunMetrics') -> str | None:
-    if not m.steps:
-        return None
-    return ', '.join('not settled' if s.settling_s is None else f'{s.settling_s:.2f} s'
-                     for s in m.steps)
+    return settling_text([*(step.settling_s for step in m.steps),
+                          *(step.settling_s for step in m.force_steps)])
+
+
+def _overshoot(m: 'RunMetrics') -> str | None:
+    """Return the largest overshoot; a run tracks a contraction or a force."""
+    if m.force_steps and not m.steps:
+        return _n(max(step.overshoot for step in m.force_steps))
+    return _mm(max((step.overshoot_m for step in m.steps), default=None))
 
 
 def interrupted_text(m: 'RunMetrics | JointMetrics') -> str | None:
@@ -154,7 +160,7 @@ _ROWS: 'tuple[tuple[str, Callable[[RunMetrics], str | int | None]], ...]' = (
     ('Force RMSE of the last cycle', lambda m: _cycle(m.cycle_rmse_n, m, -1, 'N')),
     ('Cycles', _count),
     ('Settling into 5 % after a step', _settling),
-    ('Overshoot of steps', lambda m: _mm(max((s.overshoot_m for s in m.steps), default=None))),
+    ('Overshoot of steps', _overshoot),
     ('Total variation of the command', _variation),
     ('Valve at its upper limit', lambda m: _percent(m.saturation_high)),
     ('Valve at its lower limit', lambda m: _percent(m.saturation_low)),

@@ -47,6 +47,7 @@ _FIGURES = (
     ('Mean pressure of both muscles', 'co_contraction_pa', 1e-3, 'kPa'),
     ('Settling of each step', 'settling_s', 1.0, 's'),
     ('Overshoot of each step', 'overshoot_m', 1e3, 'mm'),
+    ('Overshoot of each step', 'overshoot_rad', math.degrees(1.0), '°'),
     ('Total variation of the command', 'command_variation_pa_per_s', 1e-3, 'kPa/s'),
     ('Air filled into the muscle', 'air_use_kg', 1e6, 'mg'),
     ('Air through the fill valve', 'air_fed_kg', 1e6, 'mg'))
