@@ -48,7 +48,7 @@ COMMON_PARAMETERS = (         # of every node
         'await_timeout_s', 30.0, 'How long activation waits for await_subscriber [s].',
         0.1, 600.0),
     node_parameter(
-        'diagnostics_period_s', 0.5, 'Time between two diagnostic messages [s].', 0.05, 10.0),
+        'diagnostics_period_s', 0.5, 'Time between two diagnostic messages [s].', 0.05, 1.0),
     node_parameter(
         'realtime_priority', 0, 'Real-time priority (Linux, SCHED_RR), the same for all nodes of '
         'a rig; 0: none. What must be on time comes first: watchdog and driver add 3 to it, plant '

@@ -24,10 +24,11 @@ pytest.importorskip('rclpy')
 
 from pam_actuation.hardware.device_watchdog import OPENED                   # noqa: E402, I100
 from pam_actuation.messages import START_NS, Status                         # noqa: E402
+from pam_actuation.nodes.parameters import COMMON_PARAMETERS                # noqa: E402
 from pam_actuation.rigging.client import MOST_CHANGES, MOST_FAULTS, RigClient   # noqa: E402
 from pam_actuation.rigging.domain import DomainLock                         # noqa: E402
 from pam_actuation.rigging.node_spec import NodeSpec                        # noqa: E402
-from pam_actuation.rigging.supervisor import Supervisor                     # noqa: E402
+from pam_actuation.rigging.supervisor import HEARD_S, SILENT_S, Supervisor  # noqa: E402
 from pam_actuation.topics import codec                                      # noqa: E402
 
 pytestmark = [pytest.mark.ros, pytest.mark.shared]
@@ -209,3 +210,8 @@ def test_the_recorder_is_told_why_the_rig_failed(rig, monkeypatch, failure, refe
     assert found == ({'ended.json': {'ended': told, 'because': failure}} if told else {})
     rig.supervisor.__exit__()
     assert not notes.exists()
+
+
+def test_a_node_whose_statuses_are_as_rare_as_allowed_is_not_silent():
+    longest_s = next(one.upper for one in COMMON_PARAMETERS if one.name == 'diagnostics_period_s')
+    assert longest_s < HEARD_S and 2.0 * longest_s < SILENT_S       # one may be lost
