@@ -433,6 +433,7 @@ class ManagedNode(LifecycleNode):
         remarks = [] if count < 2 else [
             f'{count} nodes are named {self.get_fully_qualified_name()}, end all but one']
         remarks += [text for one in self.subscriptions_polled for text in one.remarks()]
+        remarks += self.simulated_time.remarks() if self.simulated_time is not None else []
         self.diagnostics.remark = '; '.join(remarks)
         self.diagnostics.send()
 

@@ -40,6 +40,7 @@ from rosgraph_msgs.msg import Clock
 CLOCK_TOPIC = '/clock'
 LONGEST_WAIT_S = 0.1                        # how soon a waiting node notices that it is to end
 FALLEN_BEHIND_S = 0.1                       # later than this, the rate counts from now on anew
+STANDS_STILL_S = 2.0                        # without a message: told in the diagnostics
 
 
 def leave_clock_to_node(node: Node) -> None:
@@ -76,11 +77,13 @@ class FollowedTime:
         self._subscription: PolledSubscription | None = None
         self._now_ns = 0
         self._pending_ns: int | None = None
+        self._heard_s = time.monotonic()    # when the last message came, or it began to listen
 
     def begin(self) -> None:
         """Subscribe to the clock: the plant then knows that this node is ready."""
         self.end()
         self._pending_ns = None
+        self._heard_s = time.monotonic()
         self._inputs.begin()
         self._subscription = PolledSubscription(
             self._node, Clock, CLOCK_TOPIC, qos.CONSUMER if self._inputs else qos.CLOCK)
@@ -96,6 +99,15 @@ class FollowedTime:
     def now_ns(self) -> int:
         """Return the simulated time [ns], 0 before the first clock message."""
         return self._now_ns
+
+    def remarks(self) -> list[str]:
+        """Return a sentence where the time stands still, and with it the loops of the node."""
+        silent_s = time.monotonic() - self._heard_s
+        if self._pending_ns is not None or silent_s < STANDS_STILL_S:
+            return []
+        since = f'for {silent_s:.0f} s' if self._now_ns else 'since it became active'
+        return [f'use_sim_time is set and nothing came on {CLOCK_TOPIC} {since}, so this node '
+                'stands still']
 
     def wait_until(self, wake_ns: int) -> None:
         """Wait for the next clock message, and in lockstep for the inputs of its tick."""
@@ -121,6 +133,7 @@ class FollowedTime:
             taken = subscription.take(limit)
         if not taken:
             return None
+        self._heard_s = time.monotonic()
         clock = taken[-1][0].clock
         return clock.sec * 1_000_000_000 + clock.nanosec
 
@@ -186,6 +199,10 @@ class PlantTime:
     def now_ns(self) -> int:
         """Return the simulated time [ns]."""
         return self._now_ns
+
+    def remarks(self) -> list[str]:
+        """Return no sentence: this time is made here; ``clock.rate`` tells how it goes."""
+        return []
 
     def publish(self) -> None:
         """Tell everybody the time."""

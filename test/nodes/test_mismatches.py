@@ -22,7 +22,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 from live_rig import wait_for                                               # noqa: E402, I100
-from pam_actuation.nodes import qos                                         # noqa: E402
+from pam_actuation.nodes import qos, simulated_time                         # noqa: E402
 from pam_actuation.nodes.endpoints import PolledSubscription                # noqa: E402
 from pam_actuation.nodes.lockstep import TickInputs                         # noqa: E402
 from pam_actuation.nodes.parameters import unused_qos                       # noqa: E402
@@ -128,6 +128,33 @@ def test_a_clock_that_is_offered_best_effort_is_followed(nodes):
         return followed.now_ns() == 42_000_000_000
 
     wait_for(arrived, 10.0, 'the time of the clock')
+    followed.close()
+    player.destroy_publisher(clock)
+
+
+def test_a_time_that_stands_still_is_told(nodes, monkeypatch):
+    """A node that waits for a clock does nothing, and would say that it is active."""
+    listener, player = nodes
+    monkeypatch.setattr(simulated_time, 'STANDS_STILL_S', 0.3)
+    followed = FollowedTime(listener, TickInputs(list, False, print))
+    followed.begin()
+    assert followed.remarks() == []
+    time.sleep(0.4)
+    told = 'use_sim_time is set and nothing came on /clock {}, so this node stands still'
+    assert followed.remarks() == [told.format('since it became active')]
+    clock = player.create_publisher(Clock, '/clock', BEST_EFFORT)
+    message = Clock()
+    message.clock.sec = 42
+
+    def arrived():
+        clock.publish(message)
+        followed.wait_until(0)
+        return followed.now_ns() > 0
+
+    wait_for(arrived, 10.0, 'the time of the clock')
+    assert followed.remarks() == []
+    time.sleep(0.4)
+    assert followed.remarks() == [told.format('for 0 s')]
     followed.close()
     player.destroy_publisher(clock)
 

@@ -192,6 +192,8 @@ def test_the_time_stands_still_in_a_pause_and_goes_on_in_steps(rig):
     assert not rig.call(Trigger, 'plant_simulator/step').success
     assert rig.call(SetBool, 'plant_simulator/pause', SetBool.Request(data=True)).success
     count = standing_still(rig.heard['force'])
+    wait_for(lambda: rig.health['valve_driver'][-1].level == 1 and 'nothing came on /clock for'
+             in rig.health['valve_driver'][-1].message, 6.0, 'the time that stands still')
     for number in (1, 2, 3):
         answer = rig.call(Trigger, 'plant_simulator/step')
         assert answer.success and '5 ms' in answer.message
