@@ -45,7 +45,7 @@ from pam_actuation.control.modes.files import joint_preset_for
 from pam_actuation.hardware.files import hardware_file
 from pam_actuation.namespaces import launch_namespace, name_in
 from pam_actuation.nodes.hardware_check import check_hardware
-from pam_actuation.nodes.launched import full_namespace, RigEnd, users_file
+from pam_actuation.nodes.launched import full_namespace, launched_by, RigEnd, users_file
 from pam_actuation.rigging import layouts
 from pam_actuation.rigging.layouts import AWAITED_S, BY_SENSORS, BY_TOPIC, SIMULATED, TOPICS
 from pam_sim.joint import load_joint
@@ -135,7 +135,7 @@ def _node(executable, *parameters, side='', condition=None):
     priority = LaunchConfiguration('realtime_priority')
     return LifecycleNode(
         package=PACKAGE, executable=executable, name=executable, namespace=namespace,
-        output='screen', condition=condition,
+        output='screen', condition=condition, additional_env=launched_by(),
         parameters=[{'realtime_priority': ParameterValue(priority, value_type=int),
                      'use_sim_time': ParameterValue(
                          LaunchConfiguration('use_sim_time'), value_type=bool),

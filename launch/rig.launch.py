@@ -41,7 +41,7 @@ from launch_ros.parameter_descriptions import ParameterValue
 from pam_actuation.hardware.files import hardware_file
 from pam_actuation.namespaces import launch_namespace
 from pam_actuation.nodes.hardware_check import check_hardware
-from pam_actuation.nodes.launched import full_namespace, RigEnd, users_file
+from pam_actuation.nodes.launched import full_namespace, launched_by, RigEnd, users_file
 from pam_actuation.nodes.pid_controller import PidNode
 from pam_actuation.rigging import layouts
 from pam_actuation.rigging.layouts import AWAITED_S, controller_node, NO_CONTROLLER
@@ -138,6 +138,7 @@ def _node(executable, *parameters, condition=None):
     return LifecycleNode(
         package=PACKAGE, executable=executable, name=executable,
         namespace=LaunchConfiguration('namespace'), output='screen', condition=condition,
+        additional_env=launched_by(),
         parameters=[common, *parameters])
 
 

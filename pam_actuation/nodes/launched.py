@@ -15,6 +15,7 @@
 
 import atexit
 from collections.abc import Callable, Iterable
+import os
 import shutil
 import signal
 import tempfile
@@ -27,6 +28,7 @@ from launch.events.process import ShutdownProcess
 from launch_ros.actions import SetParametersFromFile
 from pam_actuation.bags.ending import ERROR, INTERRUPTED, REFERENCE, tell_recorder
 from pam_actuation.nodes.hardware_check import check_users_file
+from pam_actuation.rigging.processes import LAUNCHED_BY
 
 if TYPE_CHECKING:
     from pam_actuation.rigging.node_spec import NodeSpec
@@ -80,6 +82,11 @@ class RigEnd:
             tell_recorder(self.notes_folder, ERROR, f'{name} {how}')
         elif name != REFERENCE:
             tell_recorder(self.notes_folder, INTERRUPTED, reason)
+
+
+def launched_by() -> dict[str, str]:
+    """Return the variable that tells a node the process of its launch, however early that ends."""
+    return {LAUNCHED_BY: str(os.getpid())}
 
 
 def full_namespace(context: Any, namespace: str) -> str:

@@ -36,7 +36,7 @@ from pam_actuation.interrupts import leave_within
 from pam_actuation.nodes import arguments
 from pam_actuation.nodes.diagnostics import WARN
 from pam_actuation.nodes.managed import ManagedNode
-from pam_actuation.rigging.processes import end_with_parent
+from pam_actuation.rigging.processes import end_with_parent, LAUNCHED_BY
 from pam_actuation.ros_log import name_log_folder
 from pam_actuation.transport import prepare_middleware
 from pam_sim.errors import InputError
@@ -154,7 +154,8 @@ def _run(node_class: type[ManagedNode], args: Sequence[str] | None, stopper: '_S
     stopper.node = node
     stopper.start()
     if node.value('end_with_parent'):
-        end_with_parent(os.getppid())
+        launch_pid = os.environ.get(LAUNCHED_BY, '')
+        end_with_parent(os.getppid(), int(launch_pid) if launch_pid.isdigit() else 0)
     serving.start()
     try:
         if node.value('autostart'):

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 PACKAGE_ROOT = Path(__file__).resolve().parents[2]
 LIBC = ctypes.CDLL(None) if sys.platform == 'linux' else None
 PR_SET_PDEATHSIG, PR_SET_NAME = 1, 15
+LAUNCHED_BY = 'PAM_LAUNCHED_BY'         # variable: the process of the launch that started a node
 TICKS_PER_S = os.sysconf('SC_CLK_TCK')
 
 
@@ -226,16 +227,29 @@ def begin_session(parent_pid: int) -> None:
     end_with_parent(parent_pid)
 
 
-def end_with_parent(parent_pid: int) -> None:
+def end_with_parent(parent_pid: int, ancestor_pid: int = 0) -> None:
     """
     Ask Linux for a SIGTERM to this process when its parent dies.
 
-    A parent that died before is not told of any more: the process ends at once.
+    A parent that died before is not told of any more: the process ends at once. So it does where
+    ``ancestor_pid`` is given and no process above this one any more.
     """
     if LIBC is not None:
         LIBC.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
-        if os.getppid() != parent_pid:
+        if os.getppid() != parent_pid or ancestor_pid and not _descends_from(ancestor_pid):
             os._exit(1)
+
+
+def _descends_from(pid: int) -> bool:
+    """Tell whether a process is the parent of this one, or the parent of that, and so on."""
+    above = os.getppid()
+    while above not in (0, pid):
+        try:
+            stat = Path(f'/proc/{above}/stat').read_text()
+        except OSError:         # it has just ended
+            return False
+        above = int(stat.rsplit(')', 1)[1].split()[1])
+    return above == pid
 
 
 def name_process(*words: str) -> None:

@@ -25,7 +25,8 @@ pytest.importorskip('rclpy')
 
 from pam_actuation.cli.common import EXIT_BAD_INPUT                           # noqa: E402, I100
 from pam_actuation.rigging.domain import DomainLock                         # noqa: E402
-from pam_actuation.rigging.processes import node_environment, NodeProcess   # noqa: E402
+from pam_actuation.rigging.processes import (                               # noqa: E402
+    LAUNCHED_BY, node_environment, NodeProcess)
 
 pytestmark = [pytest.mark.ros, pytest.mark.shared]
 
@@ -117,7 +118,8 @@ def test_pam_tells_its_result_and_leaves_though_the_middleware_hangs(tmp_path):
 
 # As ros2 launch does, which leaves its nodes behind when SIGTERM or SIGKILL ends it.
 LAUNCHER = """
-import subprocess, sys, time
+import os, subprocess, sys, time
+os.environ['PAM_LAUNCHED_BY'] = str(os.getpid())
 subprocess.Popen([sys.executable, '-m', 'pam_actuation.nodes.valve_driver', '--ros-args', '-p',
                   'end_with_parent:=true'])
 time.sleep(600)
@@ -138,3 +140,17 @@ def test_a_node_ends_in_order_with_the_process_that_started_it(tmp_path):
     finally:
         launcher.kill()
         lock.release()
+
+
+@pytest.mark.skipif(sys.platform != 'linux', reason='Linux tells of the end of a parent')
+def test_a_node_does_not_begin_after_the_end_of_its_launch(tmp_path):
+    """As where a launch fails while its first nodes still start, and others are their parent."""
+    launch = subprocess.Popen(['true'])
+    launch.wait()
+    lock = DomainLock()
+    environment = {**node_environment(lock.domain_id, tmp_path), LAUNCHED_BY: str(launch.pid)}
+    done = subprocess.run(
+        [sys.executable, '-m', 'pam_actuation.nodes.valve_driver', '--ros-args', '-p',
+         'end_with_parent:=true'], env=environment, text=True, capture_output=True, timeout=60.0)
+    lock.release()
+    assert done.returncode == 1 and 'active' not in done.stderr

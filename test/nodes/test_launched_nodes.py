@@ -13,6 +13,7 @@
 # limitations under the License.
 """Test what the launch files describe; needs ``launch``, which comes with ROS 2 only."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -31,6 +32,7 @@ from pam_actuation.nodes.interfaces import node_class                       # no
 from pam_actuation.nodes.parameters import COMMON_PARAMETERS                # noqa: E402
 from pam_actuation.rigging import layouts                                   # noqa: E402
 from pam_actuation.rigging import model_view                                # noqa: E402
+from pam_actuation.rigging.processes import LAUNCHED_BY                     # noqa: E402
 from pam_sim import load_rig                                                # noqa: E402
 from pam_sim.errors import InputError                                       # noqa: E402
 from pam_sim.joint import load_joint                                        # noqa: E402
@@ -267,3 +269,15 @@ def test_both_knees_hand_it_on():
         names = [name if isinstance(name, str) else perform_substitutions(
             launch.LaunchContext(), name) for name, _ in one.launch_arguments]
         assert 'controller' in names
+
+
+@pytest.mark.parametrize('file', ['rig.launch.py', 'knee.launch.py'])
+def test_every_node_is_told_the_process_of_its_launch(file):
+    context = launch.LaunchContext()
+    description = PythonLaunchDescriptionSource(str(LAUNCH / file)).get_launch_description(context)
+    nodes = [one for one in description.entities if isinstance(one, Node)]
+    assert len(nodes) >= 8
+    for node in nodes:
+        told = node.process_description.additional_env
+        assert [(perform_substitutions(context, name), perform_substitutions(context, value))
+                for name, value in told] == [(LAUNCHED_BY, str(os.getpid()))]
