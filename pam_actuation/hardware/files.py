@@ -52,14 +52,15 @@ def hardware_file(name: str) -> str:
                      for key, what, option in _OTHERS if key in tree),
                     'is no file of hardware')
         raise tree.error(
-            f'{kind}. A file of hardware holds parameters of nodes below `{PARAMETERS}`, such '
+            f'{kind}. A file of hardware holds parameters below `{PARAMETERS}` of a node, such '
             'as those in config/hardware')
     return str(path)
 
 
 def holds_parameters(tree: Located, depth: int = _DEPTH) -> bool:
-    """Return whether every branch of a tree leads to parameters of a node."""
-    return bool(tree) and depth > 0 and all(
+    """Return whether every branch of a tree leads to parameters of a node, by its name."""
+    nameless = depth == _DEPTH and PARAMETERS in tree
+    return bool(tree) and not nameless and depth > 0 and all(
         isinstance(value, Located) and (key == PARAMETERS or holds_parameters(value, depth - 1))
         for key, value in tree.items())
 
@@ -68,11 +69,12 @@ def entries(tree: Located, above: tuple[str, ...] = ()) -> Iterator[
         tuple[tuple[str, ...], Located, str]]:
     """Return the words of the name of each node, the mapping that holds it, and its key there."""
     for key, value in tree.items():
+        if key == PARAMETERS:           # of the node above, which may be a namespace as well
+            continue
         words = (*above, *filter(None, key.split('/')))
         if PARAMETERS in value:
             yield words, tree, key
-        else:
-            yield from entries(value, words)
+        yield from entries(value, words)
 
 
 def matches(words: tuple[str, ...], full_name: str) -> bool:

@@ -69,8 +69,8 @@ def check_users_file(file: str, nodes: Iterable[NodeSpec],
     """
     tree = load_yaml(file)
     if not holds_parameters(tree):
-        raise tree.error(f'is no parameter file: one holds parameters of nodes below '
-                         f'`{PARAMETERS}`')
+        raise tree.error(f'is no parameter file: one holds parameters below `{PARAMETERS}` of a '
+                         'node, such as `/**/valve_driver`')
     named = {node_name_of(node.name, node.namespace): node for node in nodes}
     kinds = sorted({node.name for node in named.values()})
     none = True

@@ -115,6 +115,10 @@ WRONG = {
         STACK.replace('use_sim_time: false', 'autostart: true'), 'set by what starts the nodes'),
     'for nobody': ('/planner:\n  ros__parameters: {x: 1.0}\n', 'is for none of the nodes'),
     'no parameter file': ('name: x\nsegments: []\n', 'is no parameter file'),
+    'no node': ('ros__parameters: {max_pressure_gauge_pa: 2.0e5}\n', 'is no parameter file'),
+    'below another': (
+        '/**:\n  ros__parameters: {use_sim_time: false}\n  valve_driver:\n'
+        '    ros__parameters: {max_presure: 2.0e5}\n', 'unknown parameter `max_presure`'),
     'no YAML': ('/**: [', '')}
 
 
