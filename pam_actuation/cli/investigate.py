@@ -163,7 +163,8 @@ def _recorder(args: argparse.Namespace, truth: 'Rig | None', model: 'Rig',
     if args.hardware:
         from pam_actuation.nodes.hardware_check import check_hardware
         from pam_actuation.rigging import layouts
-        check_hardware(layouts.rig(valve=model.valve, hardware=args.hardware))
+        check_hardware(layouts.rig(
+            rig=str(args.model), valve=model.valve, hardware=args.hardware))
 
     def ask(motion: 'Motion') -> bool:
         bar.clear()

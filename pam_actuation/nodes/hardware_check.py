@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-What a file of parameters says to nobody: nodes and parameters that are not there.
+What a file of parameters says to nobody, or against what is stated elsewhere.
 
 A node only warns of a parameter that it does not know, and ROS is silent on a node that does not
 run. With a wrong name a pressure limit would not be the one that is stated.
@@ -41,7 +41,8 @@ def check_hardware(nodes: Iterable[NodeSpec]) -> None:
     Raises
     ------
     InputError
-        A file names a node or a parameter that there is not, or no back end of a driver.
+        A file names a node or a parameter that there is not, a value that is not allowed or not
+        what the nodes are started with, or no back end of a driver.
 
     """
     told: dict[str, list[NodeSpec]] = {}
@@ -64,7 +65,8 @@ def check_users_file(file: str, nodes: Iterable[NodeSpec],
     ------
     InputError
         No such file, or one of another kind. It names a parameter that there is not, or a value
-        that is not allowed or not what the nodes are started with. It reaches no node.
+        that is not allowed or not what the nodes are started with, or their file of hardware
+        states another one. It reaches no node.
 
     """
     tree = load_yaml(file)
@@ -73,22 +75,38 @@ def check_users_file(file: str, nodes: Iterable[NodeSpec],
                          'node, such as `/**/valve_driver`')
     named = {node_name_of(node.name, node.namespace): node for node in nodes}
     kinds = sorted({node.name for node in named.values()})
+    hardware = {name: _stated(name, load_yaml(node.parameter_file)) for name, node in named.items()
+                if node.parameter_file}
     none = True
     for words, holder, key in entries(tree):
         reached = {name: node for name, node in named.items() if matches(words, name)}
         if reached:
             none, given = False, holder[key][PARAMETERS]
             _check_names(given, sorted({node.name for node in reached.values()}))
-            _check_values(given, reached, more or {})
+            _check_values(given, reached, more or {}, hardware)
         elif words[-1] not in (*ORDER, *WILDCARDS) and (near := did_you_mean(words[-1], kinds)):
             raise holder.error(f'unknown node `{words[-1]}`{near}', key)
     if none:
         raise tree.error(f'is for none of the nodes that are started: {", ".join(named)}')
 
 
-def _check_values(given: Located, reached: Mapping[str, NodeSpec],
-                  more: Mapping[str, object]) -> None:
-    """Raise InputError on the first value that is not allowed, or not the one that is given."""
+def _stated(full_name: str, tree: Located) -> dict[str, list[object]]:
+    """Return what a file states of each parameter of a node."""
+    stated: dict[str, list[object]] = {}
+    for words, holder, key in entries(tree):
+        if matches(words, full_name):
+            for name, inside, last in _flat(holder[key][PARAMETERS]):
+                stated.setdefault(name, []).append(inside[last])
+    return stated
+
+
+def _check_values(given: Located, reached: Mapping[str, NodeSpec], more: Mapping[str, object],
+                  hardware: Mapping[str, Mapping[str, list[object]]]) -> None:
+    """
+    Raise InputError on the first value that is not allowed, or not the one that is given.
+
+    ``hardware``: by the full name of a node, what another file states of its parameters.
+    """
     from pam_actuation.nodes.interfaces import node_class
     from pam_actuation.nodes.parameters import COMMON_PARAMETERS, problem
     for name, holder, key in _flat(given):
@@ -109,24 +127,30 @@ def _check_values(given: Located, reached: Mapping[str, NodeSpec],
             if not wrong and own != value:
                 wrong = (f'{value!r} is not what {full_name} is started with, {own!r}; choose it '
                          'with the option or argument that is there for it')
+            others = [one for one in hardware.get(full_name, {}).get(name, ()) if one != value]
+            if not wrong and others:
+                wrong = (f'{value!r} is not what {node.parameter_file} states for {full_name}, '
+                         f'{others[-1]!r}, which would count; state it in one of the two files')
             if wrong:
                 raise holder.error(f'`{name}`: {wrong}', key)
 
 
 def _check_file(tree: Located, readers: list[NodeSpec]) -> None:
-    names = {node_name_of(node.name, node.namespace): node.name for node in readers}
-    without = {full_name for full_name, kind in names.items() if kind == DRIVER}
+    named = {node_name_of(node.name, node.namespace): node for node in readers}
+    without = {full_name for full_name, node in named.items() if node.name == DRIVER}
     for words, holder, key in entries(tree):
         kind, given = words[-1], holder[key][PARAMETERS]
         if kind not in WILDCARDS and kind not in ORDER:
+            started = sorted({node.name for node in readers})
             raise holder.error(
-                f'unknown node `{kind}`{did_you_mean(kind, names.values())}; this file is for '
-                f'{" and ".join(sorted({*names.values()}))}', key)
-        reached = {name for name in names if matches(words, name)}
-        kinds = sorted({names[name] for name in reached} or {kind} - {*WILDCARDS})
+                f'unknown node `{kind}`{did_you_mean(kind, started)}; this file is for '
+                f'{" and ".join(started)}', key)
+        reached = {name: node for name, node in named.items() if matches(words, name)}
+        kinds = sorted({node.name for node in reached.values()} or {kind} - {*WILDCARDS})
         _check_names(given, kinds)
+        _check_values(given, reached, {}, {})
         if BACK_END in given:
-            without -= reached
+            without -= reached.keys()
     if without:
         raise tree.error(f'`{BACK_END}` is missing for {" and ".join(sorted(without))}: nothing '
                          'would drive the valve')

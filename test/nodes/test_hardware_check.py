@@ -145,3 +145,43 @@ def test_a_file_of_the_users_is_for_all_nodes_and_may_be_that_of_a_stack(tmp_pat
     nodes = layouts.knee('/right/knee')
     with pytest.raises(InputError, match='False is not what .*joint_controller is started with'):
         check_users_file(str(file), nodes, {'learning': True})
+
+
+LIMIT = '/**/valve_driver:\n  ros__parameters: {max_pressure_gauge_pa: 50000}\n'
+
+
+def test_two_files_that_state_two_limits_are_refused(tmp_path, capsys):
+    hardware, mine = tmp_path / 'hardware.yaml', tmp_path / 'mine.yaml'
+    hardware.write_text(
+        f'{DRIVER}    max_pressure_gauge_pa: 100000.0\n{SENSORS}')
+    mine.write_text(LIMIT)
+    words = ['up', 'rig', '--hardware', str(hardware), '--params-file', str(mine)]
+    assert main(words) == 2
+    told = capsys.readouterr().err
+    assert (f'{mine}:2: `max_pressure_gauge_pa`: 50000.0 is not what {hardware} states for '
+            '/muscle/valve_driver, 100000.0' in told) and told.count('\n') == 1
+    nodes = layouts.rig(hardware=str(hardware))
+    for same in ('100000', '1.0e5'):
+        mine.write_text(LIMIT.replace('50000', same))
+        check_users_file(str(mine), nodes)
+    mine.write_text(LIMIT)
+    check_users_file(str(mine), layouts.rig())          # simulated: no file of hardware
+
+
+@pytest.mark.parametrize('line, words', {
+    'valve_type: hsv': "`valve_type`: 'hsv' is not what /muscle/valve_driver is started with, "
+                       "'ppr'",
+    'rig: other.yaml': "`rig`: 'other.yaml' is not what",
+    'max_pressure_gauge_pa: 3.0e7': 'must lie in 1000 to 1e+06',
+    'backend: iio_dca': "`backend`: 'iio_dca' is not allowed",
+    'autostart: true': '`autostart` is set by what starts the nodes'}.items())
+def test_a_file_of_hardware_that_says_otherwise_than_the_options_is_refused(
+        tmp_path, capsys, line, words):
+    file = tmp_path / 'mine.yaml'
+    file.write_text(f'/**/valve_driver:\n  ros__parameters:\n    backend: dummy\n    {line}\n'
+                    .replace('    backend: dummy\n' * line.startswith('backend'), ''))
+    assert main(['up', 'rig', '--hardware', str(file)]) == 2
+    told = capsys.readouterr().err
+    assert f'{file}:' in told and words in told and told.count('\n') == 1
+    file.write_text(DRIVER.replace('use_sim_time: false', 'valve_type: ppr'))
+    check_hardware(layouts.rig(hardware=str(file)))
