@@ -19,19 +19,20 @@ A node only warns of a parameter that it does not know, and ROS is silent on a n
 run. With a wrong name a pressure limit would not be the one that is stated.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from pam_actuation.hardware.files import (
     BACK_END, entries, holds_parameters, matches, PARAMETERS, WILDCARDS)
 from pam_actuation.namespaces import node_name_of
 from pam_actuation.rigging.node_spec import NodeSpec, ORDER
-from pam_actuation.rigging.plan import DRIVER
+from pam_actuation.rigging.plan import DRIVER, WATCHDOG
 from pam_actuation.ros_missing import ros_missing
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.located_yaml import load_yaml, Located
 
 OF_ROS = ('use_sim_time', 'qos_overrides.')
 BRINGING_UP = ('autostart', 'notes_folder')     # set by what starts the nodes
+OF_A_MUSCLE = DRIVER, WATCHDOG                  # one in the namespace of each muscle
 
 
 def check_hardware(nodes: Iterable[NodeSpec]) -> None:
@@ -66,7 +67,7 @@ def check_users_file(file: str, nodes: Iterable[NodeSpec],
     InputError
         No such file, or one of another kind. It names a parameter that there is not, or a value
         that is not allowed or not what the nodes are started with, or their file of hardware
-        states another one. It reaches no node.
+        states another one. It reaches no node, or misses a driver of the rig.
 
     """
     tree = load_yaml(file)
@@ -88,6 +89,7 @@ def check_users_file(file: str, nodes: Iterable[NodeSpec],
             raise holder.error(f'unknown node `{words[-1]}`{near}', key)
     if none:
         raise tree.error(f'is for none of the nodes that are started: {", ".join(named)}')
+    check_reach(tree, named)
 
 
 def _stated(full_name: str, tree: Located) -> dict[str, list[object]]:
@@ -135,6 +137,59 @@ def _check_values(given: Located, reached: Mapping[str, NodeSpec], more: Mapping
                 raise holder.error(f'`{name}`: {wrong}', key)
 
 
+def check_given_files(arguments: Sequence[str], kind: str, full_name: str) -> None:
+    """
+    Check the parameter files on the command line of a node, as ``check_reach``.
+
+    A file that is none, or none that is understood here, is left to ROS.
+    """
+    namespace = full_name.rpartition('/')[0]
+    for before, file in zip(arguments, arguments[1:]):
+        if before != '--params-file':
+            continue
+        try:
+            tree = load_yaml(file)
+        except InputError:
+            continue
+        if holds_parameters(tree):
+            check_reach(tree, {full_name: NodeSpec(kind, namespace)})
+
+
+def check_reach(tree: Located, named: Mapping[str, NodeSpec]) -> None:
+    """
+    Raise InputError on an entry for a driver or watchdog that the rig has in another namespace.
+
+    With a wildcard it may be for other rigs, where these nodes get the same parameters by other
+    entries.
+    """
+    for kind in OF_A_MUSCLE:
+        ours = sorted(name for name, node in named.items() if node.name == kind)
+        told: set[str] = set()
+        missed: list[tuple[tuple[str, ...], set[str], Located, str]] = []
+        for words, holder, key in entries(tree):
+            names = {name for name, _, _ in _flat(holder[key][PARAMETERS])}
+            if any(matches(words, name) for name in ours):
+                told |= names
+            elif ours and words[-1] == kind and _is_near(words[:-1], named.values()):
+                missed.append((words, names, holder, key))
+        for words, names, holder, key in missed:
+            if names - told or not {*words} & {*WILDCARDS}:
+                raise holder.error(
+                    f'`/{"/".join(words)}` is none of the nodes that are started: '
+                    f'{", ".join(ours)}; `/**/{kind}` means each of them', key)
+
+
+def _is_near(words: tuple[str, ...], nodes: Iterable[NodeSpec]) -> bool:
+    """Tell whether the words of a namespace are that of a node, or one above it."""
+    places = {''}
+    for node in nodes:
+        place = node.namespace.rstrip('/')
+        while place:
+            places.add(place)
+            place = place.rpartition('/')[0]
+    return any(matches(words, place) for place in places)
+
+
 def _check_file(tree: Located, readers: list[NodeSpec]) -> None:
     named = {node_name_of(node.name, node.namespace): node for node in readers}
     without = {full_name for full_name, node in named.items() if node.name == DRIVER}
@@ -154,6 +209,7 @@ def _check_file(tree: Located, readers: list[NodeSpec]) -> None:
     if without:
         raise tree.error(f'`{BACK_END}` is missing for {" and ".join(sorted(without))}: nothing '
                          'would drive the valve')
+    check_reach(tree, named)
 
 
 def _check_names(given: Located, kinds: list[str]) -> None:

@@ -137,6 +137,9 @@ def _run(node_class: type[ManagedNode], args: Sequence[str] | None, stopper: '_S
         name_log_folder()
         rclpy.init(args=list(args), signal_handler_options=SignalHandlerOptions.NO)
         node = node_class()
+        if '--params-file' in args:
+            from pam_actuation.nodes.hardware_check import check_given_files
+            check_given_files(args, node.NAME, node.get_fully_qualified_name())
     except InputError as error:
         return _refuse(node_class, error)
     except Exception as error:

@@ -20,7 +20,8 @@ pytest.importorskip('rclpy')
 
 from pam_actuation.cli import up                                            # noqa: E402, I100
 from pam_actuation.cli.main import build_parser, main                       # noqa: E402
-from pam_actuation.nodes.hardware_check import check_hardware, check_users_file  # noqa: E402
+from pam_actuation.nodes.hardware_check import (                            # noqa: E402
+    check_given_files, check_hardware, check_users_file)
 from pam_actuation.rigging import layouts                                   # noqa: E402
 from pam_sim.errors import InputError                                       # noqa: E402
 
@@ -185,3 +186,48 @@ def test_a_file_of_hardware_that_says_otherwise_than_the_options_is_refused(
     assert f'{file}:' in told and words in told and told.count('\n') == 1
     file.write_text(DRIVER.replace('use_sim_time: false', 'valve_type: ppr'))
     check_hardware(layouts.rig(hardware=str(file)))
+
+
+NEAR = ('/left/knee/valve_driver', '/left/valve_driver', 'valve_driver', '/*/*/valve_driver')
+
+
+@pytest.mark.parametrize('name', NEAR)
+@pytest.mark.parametrize('which', ['hardware', 'params'])
+def test_a_limit_that_misses_the_drivers_of_the_rig_is_refused(tmp_path, name, which):
+    file, limit = tmp_path / 'mine.yaml', f'\n{LIMIT.replace("/**/valve_driver", name)}'
+    if which == 'hardware':
+        file.write_text(DRIVER + SENSORS.replace(', place: muscle', '') + limit)
+        with pytest.raises(InputError, match='is none of the nodes that are started') as refused:
+            check_hardware(layouts.knee('/left/knee', hardware=str(file)))
+    else:
+        file.write_text(STACK + limit)
+        nodes = layouts.knee('/left/knee')
+        if '*' in name:             # the drivers get their limit by another entry
+            check_users_file(str(file), nodes)
+            file.write_text(STACK.replace('max_pressure_gauge_pa: 300000', '') + limit)
+        with pytest.raises(InputError, match='is none of the nodes that are started') as refused:
+            check_users_file(str(file), nodes)
+    assert '/left/knee/extensor/valve_driver, /left/knee/flexor/valve_driver' in str(refused.value)
+    assert str(refused.value).startswith(f'{file}:') and '/**/valve_driver' in str(refused.value)
+
+
+@pytest.mark.parametrize('name', ['/right/knee/flexor/valve_driver', '/arm/valve_driver',
+                                  '/right/**/valve_driver', '/left/knee/flexor/valve_driver'])
+def test_a_limit_of_another_rig_may_stand_in_the_file_of_a_stack(tmp_path, name):
+    file, limit = tmp_path / 'mine.yaml', f'\n{LIMIT.replace("/**/valve_driver", name)}'
+    file.write_text(STACK + limit)
+    check_users_file(str(file), layouts.knee('/left/knee'))
+    file.write_text(DRIVER + SENSORS.replace(', place: muscle', '') + limit)
+    check_hardware(layouts.knee('/left/knee', hardware=str(file)))
+
+
+def test_the_files_of_a_command_line_may_hold_what_is_for_others(tmp_path):
+    file, words = tmp_path / 'mine.yaml', ['-r', '__ns:=/left', '--params-file']
+    for text in (STACK, LIMIT, LIMIT.replace('**', 'right'), '[', 'x: 1\n', ''):
+        file.write_text(text)
+        check_given_files([*words, str(file)], 'valve_driver', '/left/flexor/valve_driver')
+    for name in ('/left/valve_driver', 'valve_driver', '/left/flexor/valve_driver'):
+        file.write_text(LIMIT.replace('/**/valve_driver', name))
+        check_given_files([*words, str(file)], 'joint_controller', '/left/joint_controller')
+        with pytest.raises(InputError, match='is none of the nodes that are started'):
+            check_given_files([*words, str(file)], 'valve_driver', '/left/flexor/own_name')

@@ -134,3 +134,17 @@ def test_what_ros_cannot_read_is_a_sentence(arguments, words, tmp_path):
     assert done.returncode == 2 and 'Traceback' not in done.stderr
     own = [line for line in done.stderr.splitlines() if line.startswith('valve_watchdog: ')]
     assert len(own) == 1 and words in own[0]        # beside what rcl itself logs
+
+
+def test_a_parameter_file_that_misses_the_driver_is_a_sentence(tmp_path):
+    """Without it the driver would begin with the limit that nobody stated."""
+    file = tmp_path / 'limits.yaml'
+    file.write_text('/left_knee/valve_driver:\n'
+                    '  ros__parameters: {max_pressure_gauge_pa: 200000.0}\n')
+    done = subprocess.run(
+        [sys.executable, '-m', 'pam_actuation.nodes.valve_driver', '--ros-args', '-r',
+         '__ns:=/left_knee/flexor', '--params-file', str(file)],
+        env=node_environment(78, tmp_path), text=True, capture_output=True, timeout=60.0)
+    assert done.returncode == 2 and done.stderr.startswith(
+        f'valve_driver: {file}:1: `/left_knee/valve_driver` is none of the nodes that are '
+        'started: /left_knee/flexor/valve_driver'), done.stderr
