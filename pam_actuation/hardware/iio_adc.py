@@ -59,7 +59,7 @@ class IioAdc(SensorInput):
     Raises
     ------
     DeviceError
-        The converter or a channel is missing, or no sensor is connected.
+        The converter or a channel is missing, two sensors have one, or no sensor is connected.
 
     """
 
@@ -74,11 +74,16 @@ class IioAdc(SensorInput):
     def __init__(self, values: dict[str, Any]) -> None:
         super().__init__(values)
         self._lines = {}
+        channels: dict[int, str] = {}
         for topic in TOPICS[self.place]:
             name, unit, *_ = QUANTITIES[topic]
             channel = values[f'{name}.channel']
             if channel < 0:
                 continue
+            if channel in channels:
+                raise DeviceError(f'{channel} is that of {channels[channel]} already',
+                                  f'parameter {name}.channel')
+            channels[channel] = name
             voltage = IioVoltage(
                 values['sysfs_root'], values['adc.device'], 'in', channel, 'adc.device')
             per_v = values[f'{name}.{unit}_per_v']

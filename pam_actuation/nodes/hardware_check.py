@@ -33,6 +33,9 @@ from pam_sim.located_yaml import load_yaml, Located
 OF_ROS = ('use_sim_time', 'qos_overrides.')
 BRINGING_UP = ('autostart', 'notes_folder')     # set by what starts the nodes
 OF_A_MUSCLE = DRIVER, WATCHDOG                  # one in the namespace of each muscle
+SENSORS, IIO_ADC = 'hardware_sensors', 'iio_adc'
+# One supply may feed several muscles.
+OF_ONE_MUSCLE, OF_JOINT = ('pressure', 'contraction', 'force'), ('angle',)
 
 
 def check_hardware(nodes: Iterable[NodeSpec]) -> None:
@@ -210,6 +213,25 @@ def _check_file(tree: Located, readers: list[NodeSpec]) -> None:
         raise tree.error(f'`{BACK_END}` is missing for {" and ".join(sorted(without))}: nothing '
                          'would drive the valve')
     check_reach(tree, named)
+    _check_channels(tree, named)
+
+
+def _check_channels(tree: Located, named: Mapping[str, NodeSpec]) -> None:
+    """Raise InputError where two nodes read one analog input: one would see the other's sensor."""
+    seen: dict[tuple[object, ...], str] = {}
+    for full_name, node in named.items():
+        stated = {name: values[0] for name, values in _stated(full_name, tree).items()
+                  if all(value == values[0] for value in values)}
+        if node.name != SENSORS or stated.get(BACK_END, IIO_ADC) != IIO_ADC:
+            continue
+        of_joint = node.parameters.get('place') == 'joint'
+        for sensor in OF_JOINT if of_joint else OF_ONE_MUSCLE:
+            channel = stated.get(f'{sensor}.channel', -1)
+            place = stated.get('sysfs_root'), stated.get('adc.device'), channel
+            other = seen.setdefault(place, full_name) if channel != -1 else full_name
+            if other != full_name:
+                raise tree.error(f'{other} and {full_name} both read channel {channel} of '
+                                 f'{place[1]}; give each muscle channels of its own')
 
 
 def _check_names(given: Located, kinds: list[str]) -> None:

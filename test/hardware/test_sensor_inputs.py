@@ -65,6 +65,8 @@ def test_a_sensor_that_falls_silent_is_told_and_comes_back(tmp_path):
     ({'pressure__channel': 0, 'adc__device': ''}, 'adc.device: the name of the device is needed'),
     ({'pressure__channel': 0, 'pressure__pa_per_v': 0.0}, 'pressure.pa_per_v: 0 is not allowed'),
     ({'pressure__channel': 1}, "'broken' is not a number"),
+    ({'pressure__channel': 0, 'force__channel': 0},
+     'parameter force.channel: 0 is that of pressure already'),
 ])
 def test_sensors_that_are_not_usable_are_one_sentence(tmp_path, changes, words):
     put(make_adc(tmp_path, [1.0, 1.0])[1], 'broken')

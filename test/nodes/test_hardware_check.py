@@ -221,6 +221,31 @@ def test_a_limit_of_another_rig_may_stand_in_the_file_of_a_stack(tmp_path, name)
     check_hardware(layouts.knee('/left/knee', hardware=str(file)))
 
 
+ADC = """
+/**/hardware_sensors:
+  ros__parameters: {backend: iio_adc, adc.device: ads1115, pressure.channel: 0,
+                    supply_pressure.channel: 3}
+"""
+
+
+def test_two_muscles_that_read_one_sensor_are_refused(tmp_path):
+    file = tmp_path / 'mine.yaml'
+    of_joint = '\n/*/hardware_sensors:\n  ros__parameters: {angle.channel: 2}\n'
+    file.write_text(DRIVER + ADC + of_joint)
+    check_hardware(layouts.rig(hardware=str(file)))
+    for nodes in (layouts.knee(hardware=str(file)), layouts.exo(hardware=str(file))):
+        with pytest.raises(InputError, match=r'flexor/hardware_sensors and /\w+/extensor/hardware_'
+                           'sensors both read channel 0 of ads1115'):
+            check_hardware(nodes)
+    both = ''.join(ADC.replace('/**', f'/**/{side}').replace('channel: 0', f'channel: {k}')
+                   for k, side in enumerate(('flexor', 'extensor')))
+    file.write_text(DRIVER + both + of_joint.replace('{', '{adc.device: ads1115, '))
+    check_hardware(layouts.knee(hardware=str(file)))       # they share the supply
+    file.write_text(file.read_text().replace('angle.channel: 2', 'angle.channel: 1'))
+    with pytest.raises(InputError, match='/knee/extensor/hardware_sensors both read channel 1'):
+        check_hardware(layouts.knee(hardware=str(file)))
+
+
 def test_the_files_of_a_command_line_may_hold_what_is_for_others(tmp_path):
     file, words = tmp_path / 'mine.yaml', ['-r', '__ns:=/left', '--params-file']
     for text in (STACK, LIMIT, LIMIT.replace('**', 'right'), '[', 'x: 1\n', ''):
