@@ -27,8 +27,10 @@ from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
 from launch.actions import GroupAction
 from launch.actions import IncludeLaunchDescription
+from launch.actions import OpaqueFunction
 from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration
+from pam_actuation.nodes.launched import full_namespace, joint_nodes, users_file
 
 KNEES = ('left_knee', 'right_knee')
 HANDED_ON = {
@@ -63,6 +65,16 @@ def generate_launch_description():
             PythonLaunchDescriptionSource(file), launch_arguments={
                 **{name: LaunchConfiguration(name) for name in HANDED_ON},
                 'output': [LaunchConfiguration('output'), f'/{namespace}'],
-                'namespace': namespace, 'seed': str(2 * k)}.items())])
+                'namespace': namespace, 'seed': str(2 * k),
+                'shares_params_file': 'true'}.items())])
         for k, namespace in enumerate(KNEES)]
-    return LaunchDescription([*arguments, *knees])
+    return LaunchDescription([*arguments, OpaqueFunction(function=_check_file), *knees])
+
+
+def _check_file(context):
+    """Check the parameter file for both knees together: it may be for one of them."""
+    def given(name):
+        return LaunchConfiguration(name).perform(context)
+
+    users_file(given, [node for k, name in enumerate(KNEES) for node in joint_nodes(
+        given, full_namespace(context, name), 2 * k)])

@@ -45,7 +45,8 @@ from pam_actuation.control.modes.files import joint_preset_for
 from pam_actuation.hardware.files import hardware_file
 from pam_actuation.namespaces import launch_namespace, name_in
 from pam_actuation.nodes.hardware_check import check_hardware
-from pam_actuation.nodes.launched import full_namespace, launched_by, RigEnd, users_file
+from pam_actuation.nodes.launched import (
+    full_namespace, joint_nodes, launched_by, OF_SIMULATED_JOINT, RigEnd, users_file)
 from pam_actuation.rigging import layouts
 from pam_actuation.rigging.layouts import AWAITED_S, BY_SENSORS, BY_TOPIC, SIMULATED, TOPICS
 from pam_sim.joint import load_joint
@@ -53,7 +54,7 @@ from pam_sim.joint import load_joint
 PACKAGE = 'pam_actuation'
 SIDES = ('flexor', 'extensor')
 RECORDER = 'experiment_recorder'
-OF_SIMULATION = 'joint_sine'
+SHARES_FILE = 'shares_params_file'      # told by a launch file that has checked it for all joints
 # Noted from the arguments: the joint's name, valves and seed, the experiment, '' for none, the
 # file of the hardware, and what the recorder is, '' for none, and tells.
 (NAME, VALVE, SEED, EXPERIMENT, HARDWARE_FILE, RECORDER_NAME, RECORDED_CONTROLLER,
@@ -97,7 +98,7 @@ def _arguments():
         DeclareLaunchArgument(
             'experiment', default_value='',
             description='Experiment by name, or path of its file; none: wait for references; '
-                        f'empty: {OF_SIMULATION} with hardware:=sim, otherwise none.'),
+                        f'empty: {OF_SIMULATED_JOINT} with hardware:=sim, otherwise none.'),
         DeclareLaunchArgument(
             'seed', default_value='',
             description='Seed of the simulated sensors; empty: by the namespace.'),
@@ -211,14 +212,9 @@ def _note_names(context, end):
     namespace = launch_namespace(given('namespace'))
     valve = given('valve') or load_joint(given('joint')).valve
     place = full_namespace(context, namespace)
-    experiment = layouts.experiment_of(given('experiment'), given('hardware'), OF_SIMULATION)
+    experiment = layouts.experiment_of(given('experiment'), given('hardware'), OF_SIMULATED_JOINT)
     seed = given('seed') or str(layouts.seed_in(place))
-    nodes = layouts.knee(
-        place, given('joint'), valve,
-        layouts.NO_CONTROLLER if given('controller') == 'none' else given('controller_file'),
-        experiment, int(seed), given('accept_other_rig') == 'true',
-        given('output') if given('record') == 'true' else '', given('hardware'), given('angle'),
-        name=given('name'))
+    nodes = joint_nodes(given, place, int(seed), given('name'))
     check_hardware(nodes)
     noted = {'namespace': namespace, VALVE: valve, SEED: seed, EXPERIMENT: experiment,
              NAME: given('name') or name_in(place),
@@ -233,4 +229,5 @@ def _note_names(context, end):
                 load_joint(given('joint')), valve)
         noted[RECORDED_EXPERIMENT] = experiment
     actions = [SetLaunchConfiguration(name, value) for name, value in noted.items()]
-    return [*actions, *users_file(given, nodes)]
+    alone = context.launch_configurations.get(SHARES_FILE) != 'true'
+    return [*actions, *users_file(given, nodes, alone)]

@@ -58,12 +58,13 @@ def check_hardware(nodes: Iterable[NodeSpec]) -> None:
 
 
 def check_users_file(file: str, nodes: Iterable[NodeSpec],
-                     more: Mapping[str, object] | None = None) -> None:
+                     more: Mapping[str, object] | None = None, alone: bool = True) -> None:
     """
     Check a file with parameters for any of the nodes, before one of them starts.
 
     It may hold those of other nodes too, of a larger stack. ``more``: what every node that has
-    such a parameter is started with besides those of its own.
+    such a parameter is started with besides those of its own. Not ``alone``: the file may be for
+    other nodes only, which are checked elsewhere.
 
     Raises
     ------
@@ -90,7 +91,7 @@ def check_users_file(file: str, nodes: Iterable[NodeSpec],
             _check_values(given, reached, more or {}, hardware)
         elif words[-1] not in (*ORDER, *WILDCARDS) and (near := did_you_mean(words[-1], kinds)):
             raise holder.error(f'unknown node `{words[-1]}`{near}', key)
-    if none:
+    if none and alone:
         raise tree.error(f'is for none of the nodes that are started: {", ".join(named)}')
     check_reach(tree, named)
 

@@ -28,12 +28,16 @@ from launch.events.process import ShutdownProcess
 from launch_ros.actions import SetParametersFromFile
 from pam_actuation.bags.ending import ERROR, INTERRUPTED, REFERENCE, tell_recorder
 from pam_actuation.nodes.hardware_check import check_users_file
+from pam_actuation.rigging import layouts
 from pam_actuation.rigging.processes import LAUNCHED_BY
+from pam_sim.joint import load_joint
 
 if TYPE_CHECKING:
     from pam_actuation.rigging.node_spec import NodeSpec
 
+Given = Callable[[str], str]            # the value of a launch argument
 Handler = Callable[[Any, Any], list[Any]]
+OF_SIMULATED_JOINT = 'joint_sine'       # what one plays where no experiment is named
 
 
 class RigEnd:
@@ -96,7 +100,37 @@ def full_namespace(context: Any, namespace: str) -> str:
     return f'{above}{namespace}'
 
 
-def users_file(given: Callable[[str], str], nodes: 'Iterable[NodeSpec]') -> list[Any]:
+def joint_nodes(given: Given, place: str, seed: int, name: str = '') -> 'list[NodeSpec]':
+    """
+    Return the nodes that the arguments of the launch file of a joint lead to.
+
+    Parameters
+    ----------
+    given : callable
+        The value of a launch argument.
+    place : str
+        Full namespace of the joint.
+    seed : int
+        Of the simulated sensors.
+    name : str
+        Of the joint in messages; '': by the namespace.
+
+    Raises
+    ------
+    InputError
+        As of ``load_joint`` and ``layouts.knee``.
+
+    """
+    return layouts.knee(
+        place, given('joint'), given('valve') or load_joint(given('joint')).valve,
+        layouts.NO_CONTROLLER if given('controller') == 'none' else given('controller_file'),
+        layouts.experiment_of(given('experiment'), given('hardware'), OF_SIMULATED_JOINT), seed,
+        given('accept_other_rig') == 'true',
+        given('output') if given('record') == 'true' else '', given('hardware'), given('angle'),
+        name=name)
+
+
+def users_file(given: Given, nodes: 'Iterable[NodeSpec]', alone: bool = True) -> list[Any]:
     """
     Return the action that hands the file of ``params_file`` to all nodes, [] without a file.
 
@@ -106,6 +140,8 @@ def users_file(given: Callable[[str], str], nodes: 'Iterable[NodeSpec]') -> list
         The value of a launch argument.
     nodes : iterable of NodeSpec
         What is started, for the names and values of the file.
+    alone : bool
+        Whether these are all nodes that the file may be for.
 
     Raises
     ------
@@ -119,5 +155,5 @@ def users_file(given: Callable[[str], str], nodes: 'Iterable[NodeSpec]') -> list
     check_users_file(file, nodes, {
         'learning': given('learning') == 'true',
         'use_sim_time': given('use_sim_time') == 'true',
-        'realtime_priority': int(given('realtime_priority'))})
+        'realtime_priority': int(given('realtime_priority'))}, alone)
     return [SetParametersFromFile(file)]

@@ -268,7 +268,22 @@ def test_both_knees_hand_it_on():
     for one in included:
         names = [name if isinstance(name, str) else perform_substitutions(
             launch.LaunchContext(), name) for name, _ in one.launch_arguments]
-        assert 'controller' in names
+        assert 'controller' in names and 'shares_params_file' in names
+
+
+def test_a_parameter_file_may_be_for_one_knee_of_two(tmp_path):
+    file = tmp_path / 'limits.yaml'
+    file.write_text('/left_knee/flexor/valve_driver:\n'
+                    '  ros__parameters: {max_pressure_gauge_pa: 200000.0}\n')
+    given = {'params_file': str(file), 'experiment': 'none'}
+    described('exo.launch.py', **given)
+    for name in ('left_knee', 'right_knee'):
+        assert described('knee.launch.py', namespace=name, shares_params_file='true', **given)
+    with pytest.raises(InputError, match='is for none of the nodes that are started'):
+        described('knee.launch.py', namespace='right_knee', **given)
+    file.write_text(file.read_text().replace('left_knee', 'left_kne'))
+    with pytest.raises(InputError, match='is for none .*/left_knee/.*/right_knee/'):
+        described('exo.launch.py', **given)
 
 
 @pytest.mark.parametrize('file', ['rig.launch.py', 'knee.launch.py'])
