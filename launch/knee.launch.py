@@ -46,7 +46,7 @@ from pam_actuation.hardware.files import hardware_file
 from pam_actuation.namespaces import launch_namespace, name_in
 from pam_actuation.nodes.hardware_check import check_hardware
 from pam_actuation.nodes.launched import (
-    full_namespace, joint_nodes, launched_by, OF_SIMULATED_JOINT, RigEnd, users_file)
+    check_remaps, full_namespace, joint_nodes, launched_by, OF_SIMULATED_JOINT, RigEnd, users_file)
 from pam_actuation.rigging import layouts
 from pam_actuation.rigging.layouts import AWAITED_S, BY_SENSORS, BY_TOPIC, SIMULATED, TOPICS
 from pam_sim.joint import load_joint
@@ -214,6 +214,7 @@ def _note_names(context, end):
     place = full_namespace(context, namespace)
     experiment = layouts.experiment_of(given('experiment'), given('hardware'), OF_SIMULATED_JOINT)
     seed = given('seed') or str(layouts.seed_in(place))
+    check_remaps(context, place)
     nodes = joint_nodes(given, place, int(seed), given('name'))
     check_hardware(nodes)
     noted = {'namespace': namespace, VALVE: valve, SEED: seed, EXPERIMENT: experiment,

@@ -30,13 +30,17 @@ from pam_actuation.bags.ending import ERROR, INTERRUPTED, REFERENCE, tell_record
 from pam_actuation.nodes.hardware_check import check_users_file
 from pam_actuation.rigging import layouts
 from pam_actuation.rigging.processes import LAUNCHED_BY
+from pam_actuation.topics.table import OF_A_RUN
+from pam_sim.errors import InputError
 from pam_sim.joint import load_joint
+from pam_sim.joint.parameters import SIDES
 
 if TYPE_CHECKING:
     from pam_actuation.rigging.node_spec import NodeSpec
 
 Given = Callable[[str], str]            # the value of a launch argument
 Handler = Callable[[Any, Any], list[Any]]
+SHARED = 'supply_pressure', 'controller_state'      # one supply may feed both muscles
 OF_SIMULATED_JOINT = 'joint_sine'       # what one plays where no experiment is named
 
 
@@ -98,6 +102,20 @@ def full_namespace(context: Any, namespace: str) -> str:
     above = '' if namespace.startswith('/') else context.launch_configurations.get(
         'ros_namespace', '').rstrip('/') + '/'
     return f'{above}{namespace}'
+
+
+def check_remaps(context: Any, place: str) -> None:
+    """
+    Raise InputError where a remap around a joint gives both of its muscles one topic.
+
+    Both drivers would follow one sensor, or speak to one valve. Parameters: of the launch, and
+    the full namespace of the joint.
+    """
+    for name, other in context.launch_configurations.get('ros_remaps', ()):
+        if name in OF_A_RUN and name not in SHARED and other.startswith('/'):
+            raise InputError(
+                f'would give both muscles of {place} the topic {other}; use the full name, such '
+                f'as {place}/{SIDES[0]}/{name}', f'remap of {name}')
 
 
 def joint_nodes(given: Given, place: str, seed: int, name: str = '') -> 'list[NodeSpec]':

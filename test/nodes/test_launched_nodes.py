@@ -25,7 +25,7 @@ from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription  # no
 from launch.actions import OpaqueFunction, SetLaunchConfiguration           # noqa: E402
 from launch.launch_description_sources import PythonLaunchDescriptionSource  # noqa: E402
 from launch.utilities import perform_substitutions                          # noqa: E402
-from launch_ros.actions import Node                                         # noqa: E402
+from launch_ros.actions import Node, SetRemap                               # noqa: E402
 from launch_ros.utilities import evaluate_parameters                        # noqa: E402
 from pam_actuation.namespaces import node_name_of                          # noqa: E402
 from pam_actuation.nodes.interfaces import node_class                       # noqa: E402
@@ -296,3 +296,17 @@ def test_every_node_is_told_the_process_of_its_launch(file):
         told = node.process_description.additional_env
         assert [(perform_substitutions(context, name), perform_substitutions(context, value))
                 for name, value in told] == [(LAUNCHED_BY, str(os.getpid()))]
+
+
+@pytest.mark.parametrize('name, other, works', [
+    ('pressure', '/daq/p1', False), ('valve_signal', '/dac/v', False), ('pressure', 'p', True),
+    ('/knee/flexor/pressure', '/daq/p1', True), ('supply_pressure', '/daq/supply', True),
+    ('joint_trajectory', '/joint_trajectory', True)])
+def test_a_remap_does_not_give_two_muscles_one_topic(name, other, works):
+    context = launch.LaunchContext()
+    SetRemap(name, other).execute(context)
+    if works:
+        assert described('knee.launch.py', context)
+    else:
+        with pytest.raises(InputError, match=f'{other}; use the full name, such as /knee/flexor/'):
+            described('knee.launch.py', context)
