@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from pam_actuation.tables.dates import Dates, dates_of, PATTERN
+from pam_actuation.tables.formats.labview import X_VALUE
 from pam_actuation.tables.signals import is_time
 from pam_actuation.tables.table import Table
 from pam_actuation.tables.words import words_of
@@ -51,7 +52,8 @@ def _says_time(title: str, values: 'pd.Series') -> bool:
     words = words_of(title)
     # Of several languages, and anything in others.
     dated = ' '.join('date' if word in ('data', 'dato') else word for word in words.split())
-    return is_time(words) or is_time(dated) and ('time' in words or holds_dates(values))
+    return title == X_VALUE or is_time(words) or is_time(dated) and (
+        'time' in words or holds_dates(values))
 
 
 def holds_dates(values: 'pd.Series') -> bool:

@@ -24,7 +24,7 @@ from pam_actuation.tables.day_and_time import pair_of
 from pam_actuation.tables.guess import falls_below_atmosphere, Guess, unit_of_column
 from pam_actuation.tables.lengths import length_column
 from pam_actuation.tables.mapping import usual_unit
-from pam_actuation.tables.parts import likely_signals, name_of_parts
+from pam_actuation.tables.parts import likely_signals, measured_by, name_of_parts
 from pam_actuation.tables.questions import needs_gain
 from pam_actuation.tables.signals import are_of_joint, BY_NAME
 from pam_actuation.tables.table import Table
@@ -205,6 +205,8 @@ def _option(table: Table, column: str, signal: str) -> str:
     if unit is None and text and needs_gain(text, quantity) and not (
             text == 'mA' and signal in _EXAMPLES):
         return f'--map {signal}="{column}:{form_of(quantity)}"'
+    if unit is None and quantity != VOLTAGE and measured_by(words_of(column)) == {VOLTAGE}:
+        return f'--map {signal}="{column}:{form_of(quantity)}"'     # such as `Voltage_0`
     if unit is None:
         more = f':zero=4:gain={_EXAMPLES[signal][1]:g}' if text == 'mA' else ''
         return f'--map {signal}="{column}:{usual_unit(quantity)}{more}"'

@@ -155,10 +155,11 @@ def whole_rows(frame: 'pd.DataFrame', lines: IntArray, layout: TextLayout, strea
 
     """
     is_row = ~frame.isna().all(axis=1).to_numpy()
-    doubtful = np.flatnonzero(frame[frame.columns[-1]].isna().to_numpy() & is_row)
+    last = frame.columns[-1 - layout.optional]
+    doubtful = np.flatnonzero(frame[last].isna().to_numpy() & is_row)
     if not len(doubtful):
         return WholeRows(is_row, None, [])
-    count, comments, short = len(layout.names), [], []
+    count, comments, short = len(layout.names) - layout.optional, [], []
     rows = dict(zip(lines[doubtful].tolist(), doubtful.tolist()))
     for number, line in enumerate(stream, 1):
         row = rows.get(number)

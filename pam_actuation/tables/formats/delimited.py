@@ -28,8 +28,10 @@ import zlib
 import numpy as np
 from pam_actuation.tables.formats.damage import (
     check_quotes, NOT_CLOSED, WatchedText, whole_rows)
+from pam_actuation.tables.formats.labview import header_rows, X_VALUE
 from pam_actuation.tables.formats.layout_of_text import layout_of, SAMPLE_BYTES, TextLayout
 from pam_actuation.tables.table import MOST_ROWS, Table
+from pam_sim.annotations import IntArray
 from pam_sim.errors import InputError
 
 if TYPE_CHECKING:
@@ -84,6 +86,11 @@ def tables_of_text(path: str, opened: Opened, size: float, every: int,
     frame, last = _frame(path, opened, layout, every, rows, progress)
     lines = layout.first_line + np.arange(len(frame), dtype=np.int64) * every
     check_quotes(frame, lines, path)
+    if layout.is_lvm and (further := header_rows(frame[0])).any():
+        if layout.step_s:
+            raise InputError('a further segment begins here, and the rows hold no times; split '
+                             'the file', f'{path}:{lines[int(np.argmax(further))]}')
+        frame, lines = frame[~further], lines[~further]
     remarks = [layout.remark] if layout.remark else []
     if every == 1 and len(frame) > 1 and last not in '\r\n':
         frame, lines = frame.iloc[:-1], lines[:-1]
@@ -93,9 +100,24 @@ def tables_of_text(path: str, opened: Opened, size: float, every: int,
             raw, layout.encoding, newline=''), path)
     frame, lines = frame[found.kept], lines[found.kept]
     columns = {name: frame[place] for place, name in enumerate(layout.names)}
-    return [Table(path, columns, dict(zip(layout.names, layout.units)), lines,
+    for name in layout.names[len(layout.names) - layout.optional:]:
+        if columns[name].isna().all():
+            del columns[name]
+    units = dict(zip(layout.names, layout.units))
+    if layout.step_s:
+        numbers = np.arange(len(frame)) if found.numbered is None else found.numbered
+        columns = {X_VALUE: _times(layout, every * numbers), **{
+            name: values for name, values in columns.items() if name != X_VALUE}}
+        units[X_VALUE] = 's'
+    return [Table(path, columns, units, lines,
                   remarks=[*remarks, *found.remarks], numbered=found.numbered,
                   called=layout.called, decimal=layout.decimal)]
+
+
+def _times(layout: TextLayout, numbers: IntArray) -> 'pd.Series':
+    """Return the times of rows that hold none, from their numbers [s]."""
+    import pandas as pd
+    return pd.Series(layout.first_s + layout.step_s * numbers)
 
 
 def _head(path: str, opened: Opened) -> bytes:

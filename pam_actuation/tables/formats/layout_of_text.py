@@ -15,10 +15,12 @@
 """How a text file with numbers is laid out: encoding, separator, decimal sign, header."""
 
 from collections import Counter
+from collections.abc import Sequence
 import csv
 from dataclasses import dataclass, field
 import re
 
+from pam_actuation.tables.formats.labview import lvm_header
 from pam_actuation.tables.thousands import with_thousands
 from pam_sim.errors import InputError
 
@@ -60,6 +62,12 @@ class TextLayout:
         What was odd about the header.
     called : dict of str to str
         What the file calls columns whose name stands twice.
+    optional : int
+        How many of the last columns a row may lack.
+    first_s, step_s : float
+        Time of the first row and between rows, where the rows hold no time; else the step is 0.
+    is_lvm : bool
+        Whether it is a file of LabVIEW, in which a header may stand between rows.
 
     """
 
@@ -72,6 +80,10 @@ class TextLayout:
     line_bytes: float
     remark: str = ''
     called: dict[str, str] = field(default_factory=dict)
+    optional: int = 0
+    first_s: float = 0.0
+    step_s: float = 0.0
+    is_lvm: bool = False
 
 
 def layout_of(head: bytes, source: str) -> TextLayout:
@@ -94,6 +106,13 @@ def layout_of(head: bytes, source: str) -> TextLayout:
     encoding = encoding_of(head, source)
     lines = LINE_END.split(head.decode(encoding, errors='ignore'))
     lines = lines[:-1] if len(head) >= SAMPLE_BYTES or not lines[-1] else lines
+    if (own := lvm_header(lines)) is not None:
+        names = _unique([*own.names])
+        return TextLayout(
+            encoding, own.separator, own.decimal, names, own.units, own.begin + 1,
+            _line_bytes(lines[own.begin:], encoding), called=_called(names, own.names),
+            optional=own.optional, first_s=own.first_s, step_s=own.step_s,
+            is_lvm=True)
     said = None
     if lines and re.fullmatch(r'sep=.', lines[0].strip()):
         said = lines[0].strip()[4:]
@@ -114,15 +133,23 @@ def layout_of(head: bytes, source: str) -> TextLayout:
     _, separator, decimal, begin, count = best
     named, units = _header(lines[:begin], separator, count, begin, source, decimal)
     names = _unique(named or [''] * count)
-    called = {own: name for own, name in zip(names, named) if name and own != name}
     remark = ''
     if not named and _counts(split(lines[begin], separator)):
         remark = f'line {begin + 1} numbers the columns: it was taken for a header'
         begin += 1
-    rows = lines[begin:begin + _LOOKED_AT]
-    line_bytes = sum(len(line) + 1 for line in rows) / len(rows)
     return TextLayout(encoding, separator, decimal, names, units, begin + 1,
-                      line_bytes * WIDTH.get(encoding, 1), remark, called)
+                      _line_bytes(lines[begin:], encoding), remark, _called(names, named))
+
+
+def _line_bytes(lines: list[str], encoding: str) -> float:
+    """Return the usual length of a row, bytes."""
+    rows = lines[:_LOOKED_AT]
+    return WIDTH.get(encoding, 1) * sum(len(line) + 1 for line in rows) / len(rows)
+
+
+def _called(names: Sequence[str], named: Sequence[str]) -> dict[str, str]:
+    """Return what the file calls the columns that have another name of their own."""
+    return {own: name for own, name in zip(names, named) if name and own != name}
 
 
 def _number(decimal: str) -> re.Pattern[str]:
