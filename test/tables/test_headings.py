@@ -166,3 +166,12 @@ def test_a_duty_in_per_cent_that_never_exceeds_1_is_asked_about(tmp_path, monkey
     assert 'share of 1' not in capsys.readouterr().out
     assert load_run('bag')['valve_signal']['vent_duty'].max() == pytest.approx(
         1.0 - 0.25 * min(WAVE), abs=1e-3)
+
+
+@pytest.mark.parametrize('first', ['NaN,NaN,NaN', ',,', 'nan,,n/a'])
+def test_a_first_row_of_missing_values_is_no_header(first, tmp_path):
+    path = tmp_path / 'm.csv'
+    path.write_text(f't_s,p_bar_g,x_mm\n{first}\n' + ''.join(
+        f'{0.01 * k:.2f},{k % 7},{k % 9}\n' for k in range(200)))
+    assert main(['import', str(path), '--out', str(tmp_path / 'bag')]) == 0
+    assert {'pressure', 'contraction'} <= set(load_run(tmp_path / 'bag').topics)

@@ -259,7 +259,8 @@ def _header(above: list[str], separator: str, count: int, begin: int, source: st
             rows.append(split(text, separator))
     if not rows:
         return [], ()
-    while rows and rows[-1] and not any(rows[-1]):
+    # A first row of missing values is no header.
+    while rows and rows[-1] and all(one.lower() in _EMPTY for one in rows[-1]):
         rows.pop()
     last = rows[-1] if rows else []
     if len(last) == count + 1 and not last[-1]:
