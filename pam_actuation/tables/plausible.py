@@ -31,6 +31,7 @@ from pam_actuation.tables.units import (
 from pam_actuation.tables.words import unit_in, words_of
 from pam_actuation.topics.table import topic_of
 from pam_sim.annotations import BoolArray, FloatArray, IntArray
+from pam_sim.muscle.geometry import MOST_STRAIN
 from pam_sim.units import EMPTY_PA, P_ATM_PA
 
 LONGEST_STROKE = 0.5                 # of the length at rest: no muscle moves by more
@@ -39,6 +40,7 @@ MUCH_PA, LITTLE = 2e5, 0.01         # a free muscle shortens by more of its leng
 MUCH_N = 8e3                         # the strongest muscle on sale pulls 6 kN
 PUSH_N = 2.0                         # more than the zero of a load cell is off
 SMALL_GAUGE_PA = 20e3                # no muscle moves below
+FILLED_PA, TURNED_ROUND = 1e5, 0.5   # gauge; correlation of pressure and contraction
 # Numbers by which programs say that there is none.
 STAND_INS = {-9999.0, -999.0, -99.0, -99999.0, 9999.0, 99999.0, 999999.0, -32768.0, 32767.0,
              65535.0, 4294967295.0, 2147483647.0, -2147483648.0}
@@ -178,7 +180,11 @@ def _held(place: str, signals: Mapping[str, tuple[IntArray, FloatArray]],
 
 def _zero(place: str, signals: Mapping[str, tuple[IntArray, FloatArray]],
           mapped: Mapping[str, ColumnMap], size: Size) -> Doubt | None:
-    """Return a doubt on a contraction that an empty muscle keeps, None without."""
+    """
+    Return a doubt on a contraction that an empty muscle keeps, None without.
+
+    It is certain where the contraction falls as the pressure rises, unless the rig gives it.
+    """
     (own_ns, pressure_pa), (stamp_ns, contraction_m) = signals['pressure'], signals['contraction']
     known = np.isfinite(pressure_pa)
     if not known.any():
@@ -191,11 +197,41 @@ def _zero(place: str, signals: Mapping[str, tuple[IntArray, FloatArray]],
     at_rest_m, one = float(np.median(empty)), mapped['contraction']
     if at_rest_m < KEPT_SHARE * size.length_m:
         return None
+    said = f'{place}contraction (column "{one.column}" in {one.unit.name}): it is '
+    said += f'{1e3 * at_rest_m:.3g} mm while the muscle is empty'
     zero = replace(one, zero=float(f'{float(_raw(one, np.array([at_rest_m]))[0]):.4g}'))
-    return Doubt(
-        f'{place}contraction (column "{one.column}" in {one.unit.name}): it is '
-        f'{1e3 * at_rest_m:.3g} mm while the muscle is empty; is the zero off? Then write '
-        f'{zero.option(f"{place}contraction")}')
+    filled_m = _when_filled_m(pressure_pa, contraction_m)
+    if not size.is_held and at_rest_m - filled_m > KEPT_SHARE * size.length_m:
+        zero = replace(zero, gain=-zero.gain)
+        return Doubt(f'{said}, and falls to {1e3 * filled_m:.3g} mm under pressure, which '
+                     'shortens a muscle; if it counts the other way, write '
+                     f'{zero.option(f"{place}contraction")}', True)
+    return Doubt(f'{said}; is the zero off? Then write {zero.option(f"{place}contraction")}')
+
+
+def _when_filled_m(pressure_pa: FloatArray, contraction_m: FloatArray) -> float:
+    """
+    Return the median contraction above half of the largest gauge pressure [m].
+
+    Parameters
+    ----------
+    pressure_pa : ndarray
+        Absolute, shape (rows,); not finite where it is not known.
+    contraction_m : ndarray
+        At the same times; NaN where missing.
+
+    Returns
+    -------
+    float
+        NaN where no muscle moves by the pressure, or the contraction does not follow it down.
+
+    """
+    both = np.isfinite(pressure_pa) & np.isfinite(contraction_m)
+    gauge_pa, moved_m = pressure_pa[both] - P_ATM_PA, contraction_m[both]
+    if not len(gauge_pa) or gauge_pa.max() < FILLED_PA or not np.ptp(moved_m) or (
+            float(np.corrcoef(gauge_pa, moved_m)[0, 1]) > -TURNED_ROUND):
+        return float('nan')
+    return float(np.median(moved_m[gauge_pa > 0.5 * gauge_pa.max()]))
 
 
 def _of_values(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Size
@@ -371,7 +407,9 @@ def _turned(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Size) -
     if 0.0 <= middle <= size.most_m:
         return ''
     sign = replace(mapped, gain=-mapped.gain)
-    if not value_findings('', signal.field, -finite, lambda: size):
+    # Nobody stated how long the muscle is: it may be longer than the usual one.
+    longer = size if size.known_by else size._replace(max_strain=MOST_STRAIN)
+    if not value_findings('', signal.field, -finite, lambda: longer):
         return f'if it counts the other way, write {sign.option(signal.name)}'
     zero, least = (float(f'{one:.6g}') for one in _raw(mapped, np.array([high, low])))
     ways = []

@@ -390,3 +390,35 @@ def test_psi_that_are_called_bar_are_refused_beside_the_noise_of_a_vented_muscle
 def test_no_unit_is_proposed_in_which_no_muscle_moves():
     doubt, = of_pressure(np.repeat([-60e3, 90e3], [40, 20]))
     assert doubt.is_wrong and 'hPa' not in doubt.sentence
+
+
+@pytest.mark.parametrize('stroke_mm', [60.0, 98.0])
+def test_a_contraction_that_counts_the_other_way_is_refused(stroke_mm, tmp_path, monkeypatch,
+                                                            capsys):
+    monkeypatch.chdir(tmp_path)
+    lifted = (1.0 - np.cos(np.arange(500) / 50.0)) / 2.0
+    (tmp_path / 'm.csv').write_text('t_s,p_bar_gauge,x_mm\n' + ''.join(
+        f'{0.01 * k:.2f},{4.0 * one:.3f},{0.1 - stroke_mm * one:.3f}\n'
+        for k, one in enumerate(lifted)))
+    words = ['import', 'm.csv', '--out', 'bag']
+    assert main(words) == 2
+    said = capsys.readouterr().err
+    assert 'if it counts the other way, write --map contraction="x_mm:mm:gain=-1"' in said
+    # With its zero at the shortest length it would be long under pressure.
+    assert main([*words, '--map', f'contraction=x_mm:mm:zero={0.1 - stroke_mm:g}']) == 2
+    said = capsys.readouterr().err
+    assert 'while the muscle is empty, and falls to' in said and 'gain=-1"' in said
+    way = said.partition('--map ')[2].partition('"')[2].partition('"')[0]
+    assert way.startswith('x_mm:mm:zero=') and way.endswith(':gain=-1')
+    assert main([*words, '--map', f'contraction={way}']) < 2
+    assert load_run('bag')['contraction']['contraction_m'].max() == pytest.approx(
+        1e-3 * stroke_mm, abs=1e-3)
+
+
+def test_a_contraction_that_the_rig_gives_may_fall_under_pressure():
+    mapped = {'contraction': column_of_text('contraction', 'x:mm', 'here'),
+              'pressure': column_of_text('pressure', 'p:bar_abs', 'here')}
+    signals = {'pressure': (STAMP_NS, PRESSURE_PA),
+               'contraction': (STAMP_NS, 0.04 - SHORTENED_M)}
+    for size, is_wrong in ((Size(), True), (Size(is_held=True), False)):
+        assert any(one.is_wrong for one in doubts(signals, mapped, size)) == is_wrong
