@@ -37,6 +37,7 @@ from pam_sim.errors import InputError
 from pam_sim.units import P_ATM_PA
 
 BELOW_ATMOSPHERE = 0.9            # of it: no muscle on a rig is evacuated further
+LOWEST_AIR = 0.6                  # of it: the air of the highest towns
 # What names of other programs end in that says only where in a message the number stands.
 _PLACE = re.compile(r'(?<=.)/(data|value|[xyz])([.\[]\d+\]?)?$')
 FEW_BELOW = 0.02                  # share of the rows; fewer may be a sensor that drops out
@@ -234,6 +235,12 @@ def falls_below_atmosphere(values: FloatArray, unit: Unit) -> BoolArray:
     return values * unit.factor < BELOW_ATMOSPHERE * P_ATM_PA
 
 
+def is_thin_air(values: FloatArray, unit: Unit) -> bool:
+    """Return whether pressures go down to that of the air high above the sea, and not lower."""
+    lowest_pa = float(values.min()) * unit.factor
+    return LOWEST_AIR * P_ATM_PA <= lowest_pa < BELOW_ATMOSPHERE * P_ATM_PA
+
+
 def _name_of(table: Table, column: str) -> str:
     """Return what a column is called before ``/data`` or ``/z``; '' for one that stands still."""
     name = table.called.get(column, column)
@@ -307,9 +314,15 @@ def _of_column(table: Table, column: str, signal: Signal, missing: Collection[st
     by, kind = 'name', kind_of_pressure(words_of(_name_of(table, column)))
     if column in table.by_type:                             # as the type of the message says
         by, kind = 'message type', ABSOLUTE
-    if kind == GAUGE or kind == ABSOLUTE and not below.any():
+    is_thin = is_thin_air(finite, unit)
+    if kind == GAUGE or kind == ABSOLUTE and (not below.any() or is_thin and by == 'name'):
         chosen = checked_unit(f'{unit.name}_{kind}', PRESSURE, column)
         return ColumnMap(column, chosen), f'unit {chosen.name} by {by}'
+    if is_thin:
+        zero = f'{unit.name}_{GAUGE}:zero={low:.4g}'
+        return Question(signal.name, column, f'{shown}: gauge (0 when vented), or absolute and '
+                        f'measured high above the sea, where a vented muscle reads {low:.4g} (a '
+                        'guess to be checked)?', (zero, f'{unit.name}_{GAUGE}'))
     if below.any() and float(below.mean()) < FEW_BELOW:
         shown += f', below 1 atmosphere in {int(below.sum())} of {len(finite)} rows only'
     elif below.any():

@@ -22,12 +22,14 @@ from pam_actuation.bags.oddities import silent_remarks
 from pam_actuation.bags.plausibility import (
     GAUGE_HINT, Implausible, SHARE_HINT, Size, value_findings)
 from pam_actuation.bags.sensor_faults import course_remarks
+from pam_actuation.tables.guess import is_thin_air
 from pam_actuation.tables.lengths import LEAST_KEPT
 from pam_actuation.tables.mapping import ColumnMap
 from pam_actuation.tables.parts import kind_of_pressure
 from pam_actuation.tables.signals import BY_NAME, of_muscles, Signal
 from pam_actuation.tables.units import (
-    ABSOLUTE, ANGLE, DUTY, FORCE, GAUGE, LENGTH, names_of, of_output, PRESSURE, unit_of_text)
+    ABSOLUTE, ANGLE, DUTY, FORCE, GAUGE, LENGTH, names_of, of_output, PRESSURE, si_unit,
+    unit_of_text)
 from pam_actuation.tables.words import unit_in, words_of
 from pam_actuation.topics.table import topic_of
 from pam_sim.annotations import BoolArray, FloatArray, IntArray
@@ -245,7 +247,8 @@ def _of_values(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Size
     no_hint = SHARE_HINT if mapped.unit.factor != 1.0 else ''
     no_gauge = GAUGE_HINT if mapped.unit.name.endswith(GAUGE) else ''
     found = [Doubt(one.sentence.partition(': ')[2].removesuffix(no_hint).removesuffix(
-        no_gauge).rstrip('.') + _longer(signal, finite, size)) for one in wrong]
+        no_gauge).rstrip('.') + _longer(signal, finite, size)
+                   + _thin_air(signal, mapped, finite)) for one in wrong]
     if finite.min() == finite.max() and not signal.is_rate:
         return [*found, Doubt(f'the value never changes ({_shown(signal, float(finite.min()))}): '
                               'is the sensor connected?')]
@@ -262,7 +265,8 @@ def _impossible(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Siz
     if any(one.unusable for one in wrong) or signal.quantity == LENGTH and (
             high - low > LONGEST_STROKE * size.length_m):
         return Doubt(f'{_shown(signal, low)} to {_shown(signal, high)}, which no rig has'
-                     f'{_fix(signal, mapped, finite, size)}{_longer(signal, finite, size)}', True)
+                     f'{_fix(signal, mapped, finite, size)}{_longer(signal, finite, size)}'
+                     f'{_thin_air(signal, mapped, finite)}', True)
     turned = _turned(signal, mapped, finite, size) if (
         wrong and signal.quantity == LENGTH) else ''
     if turned:
@@ -429,6 +433,19 @@ def _longer(signal: Signal, finite: FloatArray, size: Size) -> str:
         return ''
     return ('; if it is right, state `max_strain` under `muscle` in the file of the rig'
             if size.known_by else '; if the muscle is longer, name the file of its rig with --rig')
+
+
+def _thin_air(signal: Signal, mapped: ColumnMap, finite: FloatArray) -> str:
+    """Return how an absolute pressure measured high above the sea is read, '' for another."""
+    unit = mapped.unit
+    gauge = unit_of_text(unit.name.replace(ABSOLUTE, GAUGE), PRESSURE)
+    if signal.quantity != PRESSURE or not unit.name.endswith(ABSOLUTE) or gauge is None or (
+            not is_thin_air(finite, si_unit(PRESSURE))):
+        return ''
+    vented = float(f'{float(_raw(mapped, finite).min()):.4g}')
+    way = replace(mapped, unit=gauge, zero=vented)
+    return ('; if it reads that of a vented muscle high above the sea, write '
+            f'{way.option(signal.name)}')
 
 
 def _fix(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Size) -> str:

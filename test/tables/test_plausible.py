@@ -422,3 +422,39 @@ def test_a_contraction_that_the_rig_gives_may_fall_under_pressure():
                'contraction': (STAMP_NS, 0.04 - SHORTENED_M)}
     for size, is_wrong in ((Size(), True), (Size(is_held=True), False)):
         assert any(one.is_wrong for one in doubts(signals, mapped, size)) == is_wrong
+
+
+@pytest.mark.parametrize('air_bar', [0.83, 0.76])
+def test_an_absolute_pressure_high_above_the_sea_is_asked_for(air_bar, tmp_path, monkeypatch,
+                                                              capsys):
+    monkeypatch.chdir(tmp_path)
+    gauge_bar = 2.0 - 2.0 * np.cos(np.arange(500) / 50.0)
+
+    def write(name):
+        (tmp_path / 'm.csv').write_text(f't_s,{name}\n' + ''.join(
+            f'{0.01 * k:.2f},{air_bar + one:.4f}\n' for k, one in enumerate(gauge_bar)))
+
+    words = ['import', 'm.csv', '--out', 'bag', '--overwrite']
+    way = f'--map pressure="{{}}:bar_gauge:zero={air_bar}"'
+    write('p_bar')
+    assert main(words) == 2
+    said = capsys.readouterr().err
+    assert way.format('p_bar') in said and 'or --map pressure="p_bar:bar_gauge", or' in said
+    assert main([*words, '--map', f'pressure=p_bar:bar_gauge:zero={air_bar}']) == 0
+    np.testing.assert_allclose(load_run('bag')['pressure']['pressure_pa'],
+                               P_ATM_PA + 1e5 * gauge_bar, atol=10.0)
+    capsys.readouterr()
+    for name in ('p_bar_abs', 'Absolutdruck [bar]'):
+        write(name)
+        assert main(words) == 1
+        assert f'high above the sea, write {way.format(name)}' in capsys.readouterr().out
+
+
+def test_a_gauge_pressure_that_ends_near_zero_is_not_asked_for(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for low_bar in (0.0, 0.5):
+        (tmp_path / 'm.csv').write_text('t_s,p_bar\n' + ''.join(
+            f'{0.01 * k:.2f},{low_bar + k % 70 / 20:.3f}\n' for k in range(500)))
+        assert main(['import', 'm.csv', '--out', 'bag', '--overwrite']) == 0
+        assert load_run('bag')['pressure']['pressure_pa'].min() == pytest.approx(
+            P_ATM_PA + 1e5 * low_bar)
