@@ -28,7 +28,7 @@ from pam_actuation.tables.mapping import TableMapping, TimeMap
 from pam_actuation.tables.order import Clock, in_order, Times
 from pam_actuation.tables.table import Table
 from pam_actuation.tables.units import DATE, FACTORS, is_output, TIME, unit_of_text
-from pam_actuation.tables.words import unit_in
+from pam_actuation.tables.words import unit_in, words_of
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.errors import InputError
 
@@ -42,6 +42,7 @@ FEWEST_RISING = 20                          # rows that tell a time from values 
 EPOCH_S = 9e8                               # seconds that can only count from 1970
 GAP_S, GAP_STEPS = 0.05, 5.0                # longer than both: rows are missing
 CLOCK_ROWS, CLOCK_SHARE = 3.0, 0.02         # further apart: two clocks, and not one that drifts
+GOES_ON = 0.9                               # share of the rows in which a clock goes on
 JUMP_S = 10.0                               # longer than this and the rest: the clock was set
 
 
@@ -130,9 +131,7 @@ def clock_of(table: Table, mapping: TableMapping, sort: bool = False, part: int 
     column = time_column(table, mapping)
     if column is None:
         if table.stamp_ns is None:
-            raise InputError(
-                'no column is the time; add --map time="COLUMN:s", or --rate HZ for rows at '
-                'equal distances', table.source)
+            raise InputError(_no_time(table), table.source)
         read = Times(table.stamp_ns, f'times of the messages on {table.topic}')
     else:
         read = _from_column(table, column)
@@ -163,11 +162,14 @@ def _other_clock(table: Table, name: str, stamp_ns: IntArray, rows: IntArray) ->
     """
     pair = pair_of(table, name) or ()
     for other in table.columns:
-        if other == name or other in pair or not is_called_time(table, other):
+        if other == name or other in pair:
             continue
-        values = table.columns[other]
+        values, of_part = table.columns[other], _is_time_of_part(table, other)
+        if not (is_called_time(table, other) or of_part):
+            continue
         # Without a unit it may count the rows.
         if not (_unit_of_name(table, other) or values.dtype.kind == 'M' or _is_text_date(values)
+                or of_part and values.dtype.kind == 'f'
                 or leaf_of(table.title_of(other)) == leaf_of(table.title_of(name))):
             continue
         both = rows[values.notna().to_numpy()[rows]]
@@ -180,6 +182,8 @@ def _other_clock(table: Table, name: str, stamp_ns: IntArray, rows: IntArray) ->
         steps, own_steps = np.diff(stamps), np.diff(stamp_ns[both])
         if not steps.any() or not own_steps.any() or min(steps.min(), own_steps.min()) < 0:
             continue                                # it stands still, or begins anew
+        if of_part and float((steps > 0).mean()) < GOES_ON:
+            continue                                # of events, such as `time of last pulse`
         # A coarse clock, one that drifts and one that is read late go with the rows all the same.
         usual_ns = max(float(np.median(one[one > 0])) for one in (steps, own_steps))
         long_ns, own_ns = int(steps.sum()), int(own_steps.sum())
@@ -190,6 +194,24 @@ def _other_clock(table: Table, name: str, stamp_ns: IntArray, rows: IntArray) ->
                     f'{len(both)} rows: two clocks? Give the columns of each logger their own '
                     'file')
     return ''
+
+
+def _is_time_of_part(table: Table, column: str) -> bool:
+    """Return whether a name speaks of a time and of more, as `Time - Force` of one sensor."""
+    words = words_of(table.title_of(column)).split()
+    return 'time' in words and not is_called_time(table, column)
+
+
+def _no_time(table: Table) -> str:
+    """Return the sentence that no column is the time, with those that may be it."""
+    found = [name for name in table.columns if _is_time_of_part(table, name)]
+    if len(found) < 2:
+        return (f'no column is the time; add --map time="{(found or ["COLUMN"])[0]}:s", or '
+                '--rate HZ for rows at equal distances')
+    names = ' and '.join(f'"{name}"' for name in found)
+    return (f'columns {names} could each be the time: give the columns of each logger their own '
+            f'file, or say which of them is the time of every signal, with --map '
+            f'time="{found[0]}:s"')
 
 
 def _hidden(table: Table, mapping: TableMapping) -> tuple[str, ...]:
@@ -308,7 +330,9 @@ def _times_of(table: Table, told: str, found: Dates) -> Times:
 
 def _unit_of_name(table: Table, name: str) -> str:
     """Return the unit that the row of units or the name of the column says, '' without one."""
-    for text in (table.units.get(name, ''), unit_in(table.title_of(name))):
+    title = table.title_of(name)
+    # A name may be the unit, as `millis` of an Arduino is.
+    for text in (table.units.get(name, ''), unit_in(title), words_of(title)):
         unit = unit_of_text(text, TIME) if text else None
         if unit is not None:
             return unit.name

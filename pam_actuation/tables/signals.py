@@ -139,7 +139,8 @@ _SIDE_WORDS = {'flexor': 'flexor', 'flex': 'flexor', 'agonist': 'flexor', 'ago':
                'extensor': 'extensor', 'antagonist': 'extensor', 'antago': 'extensor'}
 _TIME = re.compile(
     r't|(measured )?time( of day)?|t ?(nominal|rel|s)|time ?stamp|stamp( time)?|'
-    r'elapsed( time)?|time elapsed|timer|clock|seconds|sec|date ?time|time date|date')
+    r'elapsed( time)?|time elapsed|timer|clock|seconds|sec|milli(s|seconds)|micro(s|seconds)|'
+    r'date ?time|time date|date')
 _BETWEEN = {'and', 'und', 'en', 'et', 'y', 'e', 'i', 'a', 'og', 'och', 'ja', 'és', 'și', 've', 'и',
             'de', 'du', 'der', 'del', 'di', 'do', '&', '+'}
 

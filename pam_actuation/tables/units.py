@@ -53,7 +53,8 @@ _OTHER_NAMES = {'µm': 'um', 'μm': 'um', 'µs': 'us', 'μs': 'us', 'sec': 's', 
                 'grad': 'deg', 'radian': 'rad', 'radians': 'rad', 'prozent': '%', 'zoll': 'in',
                 'pascal': 'Pa', 'kilopascal': 'kPa', 'sekunde': 's', 'sekunden': 's',
                 'secondes': 's', 'segundos': 's', 'millisekunden': 'ms', 'milliseconds': 'ms',
-                'millimeters': 'mm', 'milímetros': 'mm', 'millimètres': 'mm', 'pct': '%'}
+                'millimeters': 'mm', 'milímetros': 'mm', 'millimètres': 'mm', 'pct': '%',
+                'millis': 'ms', 'micros': 'us', 'microseconds': 'us', 'mm/mm': '1', 'm/m': '1'}
 
 
 # What sensors put out: where that begins, and how far it goes.

@@ -165,3 +165,47 @@ def test_a_joint_keeps_its_angle():
             'flexor/pressure', 'angle')}))
     with pytest.raises(InputError, match='no angle lies between 1.2 and 1.8 s'):
         whole.between(1.2, 1.8)
+
+
+def of_each_channel(names, times_of):
+    """Write a file whose channels have a time each."""
+    with open('two.csv', 'w', encoding='utf-8') as stream:
+        stream.write('\n'.join([names, *(
+            f'{0.01 * k:.3f},{1.2 + k % 700 / 200:.3f},{times_of(k):.3f},{40 + k % 900 / 9:.2f}'
+            for k in range(ROWS)), '']))
+
+
+def test_a_time_of_each_channel_is_told_where_they_differ(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    names = 'Time - Pressure,Pressure [bar g],Time - Force,Force [N]'
+    of_each_channel(names, lambda k: 0.02 * k)
+    words = ['import', 'two.csv', '--out', 'bag', '--overwrite']
+    assert main(words) == 2
+    assert ('columns "Time - Pressure" and "Time - Force" could each be the time: give the '
+            'columns of each logger their own file' in capsys.readouterr().err)
+    stated = [*words, '--map', 'time=Time - Pressure:s']
+    assert main(stated) == 1
+    assert 'two clocks?' in capsys.readouterr().out
+    of_each_channel(names, lambda k: 0.01 * k + 0.003)
+    assert main(stated) == 0, capsys.readouterr()
+    # One that is the time by its name, and one of a channel.
+    names = 'Time,Pressure [bar g],{},Force [N]'
+    of_each_channel(names.format('Time Force'), lambda k: 0.02 * k)
+    assert main(words) == 2 and 'two clocks?' in capsys.readouterr().err
+    # A duration, and a time that stands still between events.
+    for times_of in (lambda k: 0.004 + 0.001 * (k % 3), lambda k: float(k // 100)):
+        of_each_channel(names.format('time of last pulse'), times_of)
+        assert main(words) == 0, capsys.readouterr()
+
+
+@pytest.mark.parametrize('name, factor', [
+    ('millis', 1e3), ('millis()', 1e3), ('Milliseconds', 1e3), ('time_millis', 1e3),
+    ('micros', 1e6), ('micros()', 1e6)])
+@pytest.mark.parametrize('step_s', [0.01, 0.1])
+def test_the_clock_of_an_arduino_says_its_unit(name, factor, step_s, tmp_path, monkeypatch,
+                                               capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'm.csv').write_text(f'{name},p_bar_g\n' + ''.join(
+        f'{step_s * factor * k:.0f},{k % 70 / 20}\n' for k in range(200)))
+    assert main(['import', 'm.csv', '--out', 'bag']) == 0, capsys.readouterr()
+    assert f'imported {199 * step_s:.4g} s' in capsys.readouterr().out
