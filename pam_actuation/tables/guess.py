@@ -41,6 +41,7 @@ LOWEST_AIR = 0.6                  # of it: the air of the highest towns
 # What names of other programs end in that says only where in a message the number stands.
 _PLACE = re.compile(r'(?<=.)/(data|value|[xyz])([.\[]\d+\]?)?$')
 FEW_BELOW = 0.02                  # share of the rows; fewer may be a sensor that drops out
+_STRAIN = re.compile(r'\b(strain|epsilon|ratio)\b')
 
 
 @dataclass
@@ -291,7 +292,7 @@ def _of_column(table: Table, column: str, signal: Signal, missing: Collection[st
     if is_exported(column, signal):
         si = si_unit(signal.quantity)
         return ColumnMap(column, si), f'unit {si.name} by name'
-    text = unit_of_column(table, column)
+    text = unit_of_column(table, column) or _share_of_length(table, column, signal, missing)
     unit = unit_of_text(text, signal.quantity) if text else None
     is_output = unit is None and bool(text) and needs_gain(text, signal.quantity)
     if unit is None and not is_output and any(unit_of_text(text, one) for one in FACTORS):
@@ -331,6 +332,14 @@ def _of_column(table: Table, column: str, signal: Signal, missing: Collection[st
     return Question(signal.name, column,
                     f'{shown}: gauge (0 when vented) or absolute?',
                     (f'{unit.name}_{GAUGE}', f'{unit.name}_{ABSOLUTE}'))
+
+
+def _share_of_length(table: Table, column: str, signal: Signal, missing: Collection[str]) -> str:
+    """Return '1' or '%' for a strain that has no unit, '' for any other column."""
+    words = words_in(_heading_of(table, column).name.rpartition('/')[2])
+    if signal.quantity != LENGTH or not _STRAIN.search(words):
+        return ''
+    return '%' if (np.abs(table.numbers(column, missing)) > 1.0).any() else '1'
 
 
 # The largest value that a rig of this kind has, SI; a tenth to a hundredth of it is usual.

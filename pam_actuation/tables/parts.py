@@ -57,7 +57,8 @@ _NAMES = {PRESSURE: 'pressure', FORCE: 'force', LENGTH: 'contraction', VOLTAGE: 
           ANGLE: 'angle'}
 # What says too little to be read: a `Seilzug` is the pull of a cable, or a draw wire.
 _VAGUE = {'pull': (FORCE, LENGTH), 'cable': (FORCE, LENGTH), 'wire': (FORCE, LENGTH),
-          'length': (LENGTH,), 'encoder': (LENGTH,)}
+          'length': (LENGTH,), 'encoder': (LENGTH,), 'pot': (LENGTH,), 'potentiometer': (LENGTH,),
+          'stringpot': (LENGTH,), 'lvdt': (LENGTH,), 'laser': (LENGTH,)}
 # Of other things than the muscle, however much they are called alike.
 _OF_OTHERS = {'luft', 'umgebung', 'umgebungs', 'air', 'ambient', 'atmospheric', 'barometric',
               'baro', 'atm', 'room', 'raum'}

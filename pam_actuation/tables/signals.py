@@ -88,8 +88,8 @@ SIGNALS = (
     Signal('contraction', 'contraction', 'contraction_m', LENGTH,
            r'(x|s|y|pos|position|contraction|stroke|displacement|disp|shortening|encoder)'
            r' ?(1|is|ist|act|actual|meas|measured|muscle|pam|sensor)?|'
-           r'(measured|actual) (position|contraction|displacement)',
-           'shortening of the muscle'),
+           r'(measured|actual) (position|contraction|displacement)|strain|epsilon|'
+           r'contraction (ratio|strain)', 'shortening of the muscle'),
     Signal('external_force', 'external_force', 'force_n', FORCE,
            r'(f ?ext|external force|disturbance( force)?)', 'disturbance on the load'),
     Signal('reference_force', 'reference', 'force_n', FORCE,

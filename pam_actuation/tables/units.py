@@ -146,7 +146,8 @@ def checked_unit(text: str, quantity: str, where: str) -> Unit:
         article = 'an' if quantity[0] == 'a' else 'a'
         raise InputError(
             f'{text!r} is no unit of {article} {quantity}'
-            + (f'; {said}' if (said := of_output(text, quantity)) else did_you_mean(text, names))
+            + (f'; {said}' if (said := of_output(text, quantity) or _of_share(text, quantity))
+               else did_you_mean(text, names))
             + '; allowed: ' + ', '.join(names), where)
     if not unit.is_complete:
         raise InputError(
@@ -161,6 +162,16 @@ def of_output(text: str, quantity: str) -> str:
         return ''
     return (f'{text} is what a sensor puts out: state the unit of what it measures, with zero '
             f'and gain, such as COLUMN:{example_of(text, quantity) or form_of(quantity)}')
+
+
+def _of_share(text: str, quantity: str) -> str:
+    """Return how a share of the length at rest is mapped; '' where the unit is another."""
+    name = _spelled(text.strip().strip('[]()'), DUTY) if quantity == LENGTH else None
+    if name is None:
+        return ''
+    share = f'{text} of the length at rest' if name == '%' else 'a share of the length at rest'
+    gain = 300.0 * FACTORS[DUTY][name]
+    return f'for {share} state mm with a gain, such as COLUMN:mm:gain={gain:g} for 300 mm'
 
 
 def example_of(text: str, quantity: str) -> str:

@@ -18,9 +18,10 @@ import numpy as np
 from pam_actuation.bags.load import load_run
 from pam_actuation.cli.main import main
 from pam_actuation.tables.guess import guess
-from pam_actuation.tables.mapping import load_mapping, TableMapping
+from pam_actuation.tables.mapping import column_of_text, load_mapping, TableMapping
 from pam_actuation.tables.preview import question_sentence
 from pam_actuation.tables.table import Table
+from pam_sim.errors import InputError
 import pandas as pd
 import pytest
 
@@ -198,3 +199,22 @@ def test_a_signal_of_the_mapping_may_be_missing(tmp_path, monkeypatch, capsys):
     assert main(words) == 0
     assert 'force: no column "F_N", which is optional' in capsys.readouterr().out
     assert 'force' not in load_run('bag').metadata['mapping']
+
+
+@pytest.mark.parametrize('column, values, share', [
+    ('strain [%]', 5.0 * PLACES, '1/100 of that length'), ('strain', 0.05 * PLACES, 'that length'),
+    ('strain', 5.0 * PLACES, '1/100 of that length'),
+    ('Contraction ratio (%)', 5.0 * PLACES, '1/100 of that length'),
+    ('strain [mm/mm]', 0.05 * PLACES, 'that length')])
+def test_a_strain_is_a_share_of_the_length(column, values, share):
+    question, = guessed(column, values=values).questions
+    assert (question.signal, question.answers) == ('contraction', ('mm:gain=GAIN',))
+    assert f'(GAIN is {share}, in mm)' in question.text
+    assert not guessed(column, 'x_mm', values=values).questions
+    assert not guessed('strain gauge [mV]', values=values).questions
+
+
+@pytest.mark.parametrize('unit, way', [('%', 'mm:gain=3 '), ('1', 'mm:gain=300 ')])
+def test_a_share_that_is_stated_as_a_unit_of_a_length_is_told_its_gain(unit, way):
+    with pytest.raises(InputError, match=f'COLUMN:{way}for 300 mm; allowed: m, cm'):
+        column_of_text('contraction', f'strain:{unit}', 'here')
