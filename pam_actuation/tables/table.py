@@ -54,7 +54,8 @@ class Table:
     numbered : ndarray of int64, optional
         Number of every row in the file from 0, where rows between were left out.
     called : dict of str to str
-        What the file calls a column whose name stands twice; its own is its number.
+        What the file calls a column whose name stands twice; its own is its number. Also what a
+        column is called within the struct that holds all columns of a file.
     decimal : str
         Decimal sign of numbers that are held as texts.
     topic : str

@@ -250,6 +250,23 @@ def test_a_file_that_is_not_what_its_ending_says(tmp_path, capsys, ending):
         assert capsys.readouterr().err.count('\n') == 1
 
 
+def test_a_struct_that_holds_all_is_no_part_of_the_names(tmp_path, capsys):
+    time_s = np.arange(0.0, 2.0, 0.01)
+    own = {'t': time_s, 'p_kPa_gauge': 100.0 * time_s, 'u_V': time_s, 'L_mm': 200.0 - 9.0 * time_s}
+    words = ['import', str(tmp_path / 'run.mat'), '--preview']
+    for content in ({'data': own, 'fs': 100.0}, {'data': {'run1': own}}):
+        savemat(tmp_path / 'run.mat', content)
+        assert main(words) == 0
+        said = capsys.readouterr().out
+        assert 'pressure in kPa_gauge' in said and 'ppr_voltage in V' in said
+        assert 'L_mm:mm:zero=200:gain=-1' in said
+    # A struct of what is wanted is another than that of what is measured.
+    savemat(tmp_path / 'run.mat', {'ref': own, 'meas': {'t': time_s, 'q_counts': time_s}})
+    assert main(words) == 0
+    said = capsys.readouterr().out
+    assert 'pressure in kPa_gauge' not in said and 'L_mm:mm:zero' not in said
+
+
 def test_a_struct_of_matlab(tmp_path, capsys):
     time_s = np.arange(300) * 0.002
     savemat(tmp_path / 'run.mat', {'log': {'t': time_s, 'signals': {

@@ -15,6 +15,7 @@
 """Arrays of a MAT or HDF5 file to tables: those of one length belong together."""
 
 from collections.abc import Iterable
+import os
 from typing import Any
 
 import numpy as np
@@ -28,14 +29,24 @@ def tables_of(source: str, arrays: Iterable[tuple[str, Any]], every: int) -> lis
     Return one table for each length of the arrays, the longest first.
 
     A two-dimensional array becomes one column for each index of its shorter side, named
-    ``data[0]``, ``data[1]``, …; one with named fields becomes ``data.pressure``, and so on.
+    ``data[0]``, ``data[1]``, …; one with named fields becomes ``data.pressure``, and so on. Where
+    one struct or group holds all columns, each is called without it.
     """
     import pandas as pd
     by_length: dict[int, dict[str, Any]] = {}
     for name, column in _columns(arrays):
         if len(column) >= SHORTEST:
             by_length.setdefault(len(column), {})[name] = pd.Series(column[::every])
-    return [Table(source, columns) for _, columns in sorted(by_length.items(), reverse=True)]
+    of_all = _struct_of([name for columns in by_length.values() for name in columns])
+    return [Table(source, columns, called={
+        name: name.removeprefix(of_all) for name in columns} if of_all else {})
+        for _, columns in sorted(by_length.items(), reverse=True)]
+
+
+def _struct_of(names: list[str]) -> str:
+    """Return the struct that holds all columns, such as ``data.``; '' where there is none."""
+    common = os.path.commonprefix([name.split('.')[:-1] for name in names])
+    return ''.join(f'{one}.' for one in common)
 
 
 def _columns(arrays: Iterable[tuple[str, Any]]) -> Iterable[tuple[str, Any]]:
