@@ -19,7 +19,7 @@ import re
 from typing import Any
 
 import numpy as np
-from pam_actuation.tables.clock import clock_of, own_time, time_column
+from pam_actuation.tables.clock import clock_of, FEWEST_RISING, own_time, time_column
 from pam_actuation.tables.day_and_time import pair_of
 from pam_actuation.tables.guess import falls_below_atmosphere, Guess, unit_of_column
 from pam_actuation.tables.lengths import length_column
@@ -132,13 +132,17 @@ def how_to_begin(tables: Collection[Table], found: Guess) -> str:
     left = {column: table for table in tables if not _is_of_internals(table)
             for column in unread([table], found) if not _is_constant(table, column)}
     said: dict[str, str] = {}
+    times = [one for one, table in left.items() if _is_a_time(table, one, found)]
+    if times:
+        del left[times[0]]
     for fits in (_has_the_topic, _is_likely, _is_called, _has_the_unit, _has_no_unit):
         for signal in ('pressure', 'contraction', 'force', 'ppr_voltage'):
             column = next((one for one, table in left.items() if signal not in said
                            and fits(table, one, signal)), None)
             if column is not None:
                 said[signal] = _option(left.pop(column), column, signal)
-    return ' '.join(said[one] for one in BY_NAME if one in said) or '--map SIGNAL="COLUMN:UNIT"'
+    words = [said[one] for one in BY_NAME if one in said] or ['--map SIGNAL="COLUMN:UNIT"']
+    return ' '.join([*(f'--map time="{one}:s"' for one in times[:1]), *words])
 
 
 def may_be_signals(tables: Collection[Table], found: Guess) -> list[str]:
@@ -181,6 +185,16 @@ def _has_the_unit(table: Table, column: str, signal: str) -> bool:
 
 def _has_no_unit(table: Table, column: str, signal: str) -> bool:
     return signal in _EXAMPLES and unit_of_column(table, column) in ('', 'mA')
+
+
+def _is_a_time(table: Table, column: str, found: Guess) -> bool:
+    """Return whether a column rises from row to row in a table whose time is not known."""
+    mapping = found.mapping
+    if (mapping.rate_hz or table.stamp_ns is not None or unit_of_column(table, column)
+            or time_column(table, mapping) is not None):
+        return False
+    values = _finite(table, column)
+    return len(values) == len(table) >= FEWEST_RISING and bool((np.diff(values) > 0.0).all())
 
 
 def _is_constant(table: Table, column: str) -> bool:

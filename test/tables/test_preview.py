@@ -17,8 +17,10 @@
 import json
 from pathlib import Path
 
+import numpy as np
 from pam_actuation.cli.main import main
 import pytest
+from scipy.io import savemat
 
 
 @pytest.fixture
@@ -68,3 +70,13 @@ def test_a_preview_for_programs_says_how_each_column_is_read(table, capsys):
     lines = {line.split()[1]: line for line in shown.splitlines() if line.startswith('  #')}
     assert 'no number' in lines['left'] and 'no number' not in lines['state']
     assert lines['t_ms'].split()[2:] == ['0', '1990', '0', 'time']
+
+
+def test_a_column_that_rises_is_proposed_as_the_time(tmp_path, capsys):
+    time_s = 0.01 * np.arange(200)
+    savemat(tmp_path / 'm.mat', {'data': np.column_stack([
+        time_s, np.sin(time_s), np.cos(time_s)])})
+    assert main(['import', str(tmp_path / 'm.mat'), '--preview']) == 0
+    said = capsys.readouterr().out
+    assert ('--map time="data[0]:s" --map pressure="data[1]:kPa_gauge" --map '
+            'contraction="data[2]:mm"' in said)
