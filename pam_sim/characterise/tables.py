@@ -23,6 +23,7 @@ kept as the source.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+import re
 
 import numpy as np
 from pam_sim.annotations import FloatArray
@@ -38,6 +39,7 @@ from pam_sim.muscle.lookup_table import read_commented_csv
 from pam_sim.short_repr import short_repr
 from pam_sim.units import P_ATM_PA
 
+_KG_N = 9.80665                       # the weight of 1 kg
 # Column name in lower case -> (quantity, factor to SI).
 COLUMNS = {
     'pressure_pa': ('pressure', 1.0), 'pressure_gauge_pa': ('pressure', 1.0),
@@ -48,7 +50,15 @@ COLUMNS = {
     'force_n': ('force', 1.0), 'load_n': ('load', 1.0),
     'contraction_u_m': ('contraction_u', 1.0), 'contraction_u_mm': ('contraction_u', 1e-3),
     'load_u_n': ('load_u', 1.0), 'drift_m': ('drift', 1.0), 'pressure_u_pa': ('pressure_u', 1.0),
+    **{f'pressure_{kind}{unit}': ('pressure', pa) for kind in ('', 'gauge_')
+       for unit, pa in (('bar', 1e5), ('mpa', 1e6), ('psi', 6894.757293168361))},
+    'length_cm': ('length', 1e-2), 'length_in': ('length', 0.0254),
+    'contraction_cm': ('contraction', 1e-2), 'contraction_in': ('contraction', 0.0254),
+    'contraction_%': ('strain', 0.01), 'strain_%': ('strain', 0.01),
+    **{f'{name}_{unit}': (name, newton) for name in ('force', 'load') for unit, newton in (
+        ('kn', 1e3), ('kg', _KG_N), ('kgf', _KG_N), ('lbf', 4.4482216152605))},
 }
+_IN_BRACKETS = re.compile(r'[\s_]*[\[(]\s*([^\])]*?)\s*[\])]$')
 # From about the atmosphere on, rows so close to the lowest pressure, moved by less than a share.
 NEAR_ATMOSPHERE_PA, LEVEL_PA, RESTS = 5e3, 3e3, 0.02
 RowsOf = Callable[[StrPath], tuple[list[list[str]], str]]
@@ -90,7 +100,7 @@ def read_measured_table(path: StrPath, rows_of: RowsOf = read_commented_csv) -> 
 
     """
     rows, source = rows_of(path)
-    head = [name.strip().lower() for name in rows[0]] if rows else []
+    head = [_plain(name) for name in rows[0]] if rows else []
     unknown = [name for name in head if name not in COLUMNS and name != 'branch']
     if not rows:
         raise InputError('holds no table', str(path))
@@ -136,6 +146,11 @@ def read_measured_table(path: StrPath, rows_of: RowsOf = read_commented_csv) -> 
         raise InputError('has a negative pressure; pressures are gauge', str(path))
     _check_gauge(columns, first['pressure'], str(path))
     return MeasuredTable(kind, columns, branch, source, str(path))
+
+
+def _plain(name: str) -> str:
+    """Return the name of a column as it is known: ``pressure_kpa`` for ``Pressure [kPa]``."""
+    return re.sub(r'\s+', '_', _IN_BRACKETS.sub(r'_\1', name.strip()).lower())
 
 
 def _check_gauge(columns: dict[str, FloatArray], name: str, path: str) -> None:

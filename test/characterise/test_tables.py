@@ -161,7 +161,7 @@ def test_zeros_of_force_are_censored_and_leave_a_doubt(tmp_path):
 
 @pytest.mark.parametrize('head, rows, words', [
     ('pressure_kPa,load_N', [(1, 2)], 'length or contraction'),
-    ('pressure_psi,load_N,strain', [(1, 2, 0)], 'pressure_psi'),
+    ('pressure_inHg,load_N,strain', [(1, 2, 0)], 'pressure_inhg'),
     ('pressure_kPa,load_N,strain', [(1, 'x', 0)], 'no number'),
     ('pressure_kPa,load_N,strain', [(1, 2)], '2 cells'),
     ('pressure_kPa,load_N,strain', [(-50, 2, 0)], 'gauge'),
@@ -227,3 +227,20 @@ def test_tables_with_too_few_points_are_refused(tmp_path):
         read_measured_table(tmp_path / 'missing.csv')
     with pytest.raises(InputError, match='allowed is'):
         Dimensions(-0.3)
+
+
+@pytest.mark.parametrize('head, factors', [
+    ('Pressure (psi),Length [in],Force (lbf)', (6894.757293168361, 0.0254, 4.4482216152605)),
+    ('pressure_bar,length_cm,force_kg', (1e5, 1e-2, 9.80665)),
+    ('Pressure gauge [MPa],Length (mm),Force [kN]', (1e6, 1e-3, 1e3)),
+    ('Pressure_kPa, Length  mm,Force [kgf]', (1e3, 1e-3, 9.80665))])
+def test_columns_in_the_units_of_the_lab(head, factors, tmp_path):
+    rows = np.array([(p, length, p / length) for p in (1.0, 2.0, 3.0) for length in (4.0, 5.0)])
+    table = write(tmp_path / 'table.csv', head, rows)
+    for name, values, factor in zip(('pressure', 'length', 'force'), rows.T, factors):
+        assert table.columns[name] == pytest.approx(factor * values)
+
+
+def test_an_absolute_pressure_is_no_column_of_a_force_map(tmp_path):
+    with pytest.raises(InputError, match='has the column `pressure_bar_abs`; known are pressure'):
+        write(tmp_path / 'table.csv', 'Pressure (bar abs),Length (mm),Force (N)', [(1, 2, 3)])
