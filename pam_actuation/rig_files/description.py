@@ -34,9 +34,11 @@ BY_BORE_TOLERANCE = 0.2      # of a force map taken from a muscle of another bor
 LAG_TOLERANCE = 0.5          # of the lag of a regulator that nobody stated
 BY_SIZE_TOLERANCE = 0.5      # of damping and valve by the size of the muscle
 ZERO_SHARE = 0.02            # of the range; by data sheets 1 % each of regulator and sensor
-ZERO = 'ppr_zero_pa'
+GAIN, ZERO = 'K_m', 'ppr_zero_pa'
 NOT_STATED = 'not stated: that of the nominal regulator, yours may differ'
-REGULATOR_NUMBERS = ('K_m', 'ppr_lowest_v', 'ppr_highest_v', ZERO)
+NO_PRESSURES = ('pressures not stated: those of the nominal regulator, yours may differ; see '
+                '--regulator-kpa')
+REGULATOR_NUMBERS = (GAIN, 'ppr_lowest_v', 'ppr_highest_v', ZERO)
 
 
 @dataclass
@@ -220,7 +222,10 @@ class Description:
             source = NOT_STATED
         for name, value in values.items():
             unsure = self._zero_tolerance(low_pa, high_pa) if name == ZERO else None
-            self._add(name, value, unsure, source)
+            if name == GAIN and gauge_pa is None:
+                self._add(name, value, LAG_TOLERANCE, NO_PRESSURES)
+            else:
+                self._add(name, value, unsure, source)
         if 'T_m' not in self.numbers:
             self._add('T_m', nominal['T_m'], LAG_TOLERANCE, NOT_STATED)
 

@@ -88,7 +88,8 @@ def get_regulator(name: str) -> RegulatorPreset:
     names = regulator_names()
     if name not in names:
         raise InputError(f'regulator `{name}` is not known{did_you_mean(name, names)}; allowed: '
-                         f'{", ".join(names)}')
+                         f'{", ".join(names)}; for another one state '
+                         '--regulator-volts and --regulator-kpa in its place')
     data = _FILES.read(name).check_keys(names_of(KEYS))
     values = {key.name: key.read(data) for key in KEYS}
     return RegulatorPreset(name, **{**values, 'rests_on': ' '.join(values['rests_on'].split())})

@@ -97,3 +97,15 @@ def test_a_period_of_pulses_too_short_for_the_valves_is_told(capsys):
     assert driver_config(rig.with_(valve='ppr')).hsv.period_s == 0.005
     new('--valve', 'hsv', '--known', 'pwm_period_s=0.0065', *switching, '--overwrite')
     assert 'no short pulse' not in capsys.readouterr().out
+
+
+def test_the_gain_of_a_regulator_whose_pressures_nobody_stated_is_not_known(capsys):
+    rig = new('--regulator-volts', '0:10')
+    assert (rig.parameters['K_m'], rig.tolerance['K_m']) == (60e3, 0.5)
+    assert 'pressures not stated' in open('made.yaml', encoding='utf-8').read()
+    assert 'K_m: 60000 ± 30000 Pa/V' in capsys.readouterr().out
+    for options in (['--regulator-volts', '0:10', '--regulator-kpa', '0:600'],
+                    ['--regulator', 'smc_itv1050', '--regulator-volts', '0:10'],
+                    ['--regulator-kpa', '0:600'], []):
+        rig = new(*options, '--overwrite')
+        assert rig.prior_sd('K_m') == pytest.approx(0.02 * rig.parameters['K_m'])
