@@ -401,9 +401,12 @@ def _with_gaps(table: Table, clock: Clock) -> Clock:
     long_s, rest_s = 1e-9 * float(steps[longest]), 1e-9 * float(steps.sum() - steps[longest])
     place = table.place(int(clock.rows[longest + 1]))
     if long_s > max(JUMP_S, rest_s):
-        return replace(clock, jump=(
+        after_s = 1e-9 * (clock.stamp_ns[longest:longest + 2] - clock.stamp_ns[0])
+        at_s = float(f'{float(after_s.mean()):.4g}')
+        return replace(clock, jump_at_s=at_s, jump=(
             f'{place}: the time jumps on by {long_s:g} s, more than all the rest lasts '
-            f'({rest_s:.4g} s); was the clock set? Split the file here, or correct the times'))
+            f'({rest_s:.4g} s); two recordings, or was the clock set? Take one side with '
+            f'--to {at_s:g} or --from {at_s:g}, or correct the times'))
     return replace(clock, remarks=(
         *clock.remarks, f'gaps in the time: {len(gaps)}, the longest {long_s:.4g} s before '
         f'{_line(place)}'))

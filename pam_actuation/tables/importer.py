@@ -164,7 +164,9 @@ def recording_of(tables: Sequence[Table], mapping: TableMapping, *, size: Size,
         if not held:
             continue
         clock = clock_of(table, own_time(table, tables, mapping), sort, part)
-        if clock.jump and not accept:
+        # Of several files the first one need not begin the recording.
+        cut = len(tables) == 1 and not begin_s < clock.jump_at_s < end_s
+        if clock.jump and not (accept or cut):
             raise InputError(f'{clock.jump}. (--accept takes them as they are)')
         result.told.append(f'{Path(table.source).name}: time from {clock.told}')
         result.found += [Doubt(f'{Path(table.source).name}: {text}')

@@ -44,6 +44,8 @@ class Clock:
         What was mended, and gaps.
     jump : str
         A sentence on a clock that was set within the recording, '' without.
+    jump_at_s : float
+        In the middle of that jump, after the first row.
 
     """
 
@@ -52,6 +54,7 @@ class Clock:
     told: str
     remarks: tuple[str, ...] = ()
     jump: str = ''
+    jump_at_s: float = 0.0
 
 
 class Times(NamedTuple):

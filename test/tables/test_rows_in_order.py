@@ -209,3 +209,14 @@ def test_the_clock_of_an_arduino_says_its_unit(name, factor, step_s, tmp_path, m
         f'{step_s * factor * k:.0f},{k % 70 / 20}\n' for k in range(200)))
     assert main(['import', 'm.csv', '--out', 'bag']) == 0, capsys.readouterr()
     assert f'imported {199 * step_s:.4g} s' in capsys.readouterr().out
+
+
+def test_one_side_of_a_long_pause_is_taken(call, tmp_path):
+    times_ms = 10 * NUMBERS + np.where(NUMBERS < 1200, 0, 100_000)
+    code, said = call(times_ms, PRESSURE_BAR)
+    assert code == 2 and 'Take one side with --to 61.99 or --from 61.99' in said
+    for side, rows in (('--to', 1200), ('--from', 800)):
+        code, said = call(times_ms, PRESSURE_BAR, side, '61.99')
+        assert code < 2 and f'), {rows} values' in said and 'jumps' not in said
+    code, said = call(times_ms, PRESSURE_BAR, '--to', '115')
+    assert code == 2 and 'the time jumps on' in said
