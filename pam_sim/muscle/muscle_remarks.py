@@ -25,6 +25,8 @@ from pam_sim.volume import bore
 
 _WORTH_A_REMARK = 1e-3      # of contraction, beyond that of the largest volume
 _FILLED_PA = 600e3          # gauge; where the largest force is looked at
+_ANGLE, _DIAMETER = 'braid_angle_rad', 'diameter_m'
+_SAME = 0.01                # of the angle
 
 
 def muscle_remarks(muscle: Muscle, force_map_gain: float = 1.0) -> list[str]:
@@ -34,7 +36,7 @@ def muscle_remarks(muscle: Muscle, force_map_gain: float = 1.0) -> list[str]:
     ``force_map_gain``: factor on its force, as the rig has it.
     """
     return [*table_remarks(muscle), *_vented_remarks(muscle, force_map_gain),
-            *_braid_remarks(muscle)]
+            *_braid_remarks(muscle), *_law_angle_remarks(muscle)]
 
 
 def _vented_remarks(muscle: Muscle, gain: float) -> list[str]:
@@ -67,3 +69,24 @@ def _braid_remarks(muscle: Muscle) -> list[str]:
         f'{100.0 * muscle.max_strain:.4g} %. Beyond that the simulated muscle pulls and '
         f'compresses its air. State max_strain: {math.floor(1e3 * end) / 1e3:g}, or the right '
         'braid_angle_rad.']
+
+
+def _law_angle_remarks(muscle: Muscle) -> list[str]:
+    """Return a sentence where the braid angle of the force law is that of another muscle."""
+    values: dict[str, float] = getattr(muscle.law.law, 'values', {})
+    own = values.get(_ANGLE)
+    if own is None or _ANGLE in muscle.law.parameters or (
+            abs(own / muscle.braid_angle_rad - 1.0) <= _SAME):
+        return []
+    law = muscle.law.law
+    told = ', '.join(f'{name}: {value:.4g}' for name, value in {
+        **({_DIAMETER: muscle.bore_m} if _DIAMETER in values else {}),
+        _ANGLE: muscle.braid_angle_rad}.items())
+    diameter = (f' and a diameter of {1e3 * values[_DIAMETER]:.3g} mm'
+                if _DIAMETER in values else '')
+    return [
+        f'Law `{law.NAME}` has a braid angle of {math.degrees(own):.3g} degrees'
+        f'{diameter}, those of its set `{law.muscle}`. The muscle has '
+        f'{math.degrees(muscle.braid_angle_rad):.3g} degrees and {1e3 * muscle.bore_m:.3g} mm, '
+        'which act on its volume alone. For its force as well write law: '
+        f'{{name: {law.NAME}, parameters: {{{told}}}}}.']

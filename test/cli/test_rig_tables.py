@@ -136,3 +136,17 @@ def test_a_law_that_pulls_in_a_vented_muscle_is_told(rig, said, folder, capsys):
     assert main(['rig', 'check', 'rig.yaml']) == 0
     out = capsys.readouterr().out
     assert out.count('at 0 kPa') == bool(said) and said in out
+
+
+@pytest.mark.parametrize('law, angle, said', [
+    ('chou_hannaford', 0.436, True), ('tondu_lopez', 0.436, True),
+    ('chou_hannaford', 0.499, False),
+    ('{name: chou_hannaford, parameters: {diameter_m: 0.02, braid_angle_rad: 0.436}}', 0.436,
+     False), ('sarosi', 0.436, False)])
+def test_a_law_with_the_braid_angle_of_another_muscle_is_told(law, angle, said, tmp_path, capsys):
+    (tmp_path / 'own.yaml').write_text(
+        f'muscle: {{like: dmsp_20_300, braid_angle_rad: {angle}, law: {law}}}\n'
+        'load: hanging_mass\nvalve: ppr\n')
+    assert main(['rig', 'check', str(tmp_path / 'own.yaml')]) == 0
+    assert ('parameters: {diameter_m: 0.02, braid_angle_rad: 0.436}}' in capsys.readouterr().out
+            ) == said
