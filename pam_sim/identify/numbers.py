@@ -21,6 +21,7 @@ import math
 from pam_sim.effects.registry import effect_parameter, get_effect
 from pam_sim.effects.setting import EffectSetting
 from pam_sim.errors import did_you_mean, InputError
+from pam_sim.gap.data.health import LENGTH
 from pam_sim.gap.data.noise import SMALLEST
 from pam_sim.gap.subsystems.effects import acts_on
 from pam_sim.gap.subsystems.problem import SubsystemProblem
@@ -160,6 +161,9 @@ class Number:
         if signal:
             return signal == 'pressure' or problem.subsystem != 'valve' and (
                 signal == 'contraction' or signal in problem.signals)
+        if self.name == LENGTH and all('contraction' in one.stamp_ns
+                                       for one in problem.recordings):
+            return False                # what was recorded counts
         return any(k.name == self.name for k in problem.known) and (
             not self.subsystem or self.subsystem == problem.subsystem)
 

@@ -18,6 +18,7 @@ from collections.abc import Collection, Sequence
 import math
 
 from pam_sim.gap.criteria import CRITERIA
+from pam_sim.gap.data.health import LENGTH
 from pam_sim.gap.subsystems.effects import subsystem_of_number
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.identify.numbers import Number
@@ -102,6 +103,9 @@ def of_another_law(rig: Rig, left: Squares) -> list[str]:
 def _what_shows(number: Number) -> str:
     if number.name == 'force_zero_n':
         return 'record a force'
+    if number.name == LENGTH:
+        return ('the recorded contraction counts in its place, so state it as known, or leave the '
+                'contraction out of the recording')
     if subsystem_of_number(number.name) == 'valve':
         return 'record a `valve_signal` or `pressure_command`'
     return 'record a contraction that moves'

@@ -152,6 +152,12 @@ def test_the_held_length_may_be_unknown_and_beyond_the_stroke_is_no_length():
     run = record(rig, keep=('pressure', 'force'), command=False)
     found = identify(run, load_rig('dmsp_5_300_isometric'), ['contraction_m'], advise=False)
     assert found['contraction_m'].value == pytest.approx(0.03, rel=0.02)
+    # Where it was recorded, the number has no say.
+    run = record(rig, keep=('pressure', 'contraction', 'force'), command=False)
+    found = identify(run, load_rig('dmsp_5_300_isometric'), ['contraction_m', 'force_map_gain'],
+                     advise=False)
+    assert [one.number.name for one in found.found] == ['force_map_gain']
+    assert 'the recorded contraction counts in its place' in found.text()
 
 
 def test_recordings_at_several_held_lengths_are_told_to_count_as_one():
