@@ -41,6 +41,7 @@ FACTORS: dict[str, dict[str, float]] = {
 GAUGE, ABSOLUTE = 'gauge', 'abs'
 DATE = 'date'                       # of a time: text such as 2026-11-25T09:30:00.125
 _KINDS = {'gauge': GAUGE, 'g': GAUGE, 'gage': GAUGE, 'rel': GAUGE, 'relative': GAUGE,
+          'ü': GAUGE, 'ue': GAUGE, 'eff': GAUGE,
           'abs': ABSOLUTE, 'a': ABSOLUTE, 'absolute': ABSOLUTE}
 _OTHER_NAMES = {'µm': 'um', 'μm': 'um', 'µs': 'us', 'μs': 'us', 'sec': 's', 'secs': 's',
                 'seconds': 's', 'second': 's', 'msec': 'ms', 'usec': 'us', 'nsec': 'ns',
@@ -120,7 +121,7 @@ def unit_of_text(text: str, quantity: str) -> Unit | None:
     if ending and kind is None:
         return None
     name = _spelled(base, quantity)
-    if name is None and not ending and base[-1:].lower() in ('g', 'a'):      # barg, psia
+    if name is None and not ending and base[-1:].lower() in ('g', 'a', 'ü'):     # barg, psia
         name, kind = _spelled(base[:-1], quantity), _KINDS[base[-1].lower()]
     if name is None:
         return None

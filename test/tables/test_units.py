@@ -26,6 +26,8 @@ import pytest
 
 @pytest.mark.parametrize('text, name, pascal', [
     ('bar_gauge', 'bar_gauge', 201_325.0), ('barg', 'bar_gauge', 201_325.0),
+    ('bar Ü', 'bar_gauge', 201_325.0), ('bar(ü)', 'bar_gauge', 201_325.0),
+    ('barü', 'bar_gauge', 201_325.0), ('bar_eff', 'bar_gauge', 201_325.0),
     ('bar(g)', 'bar_gauge', 201_325.0), ('bar abs', 'bar_abs', 1e5), ('BARA', 'bar_abs', 1e5),
     ('kPa_gauge', 'kPa_gauge', 102_325.0), ('kpa-gauge', 'kPa_gauge', 102_325.0),
     ('MPa_abs', 'MPa_abs', 1e6), ('psig', 'psi_gauge', 101_325.0 + 6894.757293168361),
