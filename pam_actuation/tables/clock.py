@@ -24,6 +24,7 @@ from pam_actuation.messages import START_NS
 from pam_actuation.tables.dates import Dates, dates_of, days_as_ns
 from pam_actuation.tables.day_and_time import (
     dates_of_pair, holds_dates, holds_times_of_day, is_called_time, leaf_of, pair_of)
+from pam_actuation.tables.durations import durations_of
 from pam_actuation.tables.mapping import TableMapping, TimeMap
 from pam_actuation.tables.order import Clock, in_order, Times
 from pam_actuation.tables.table import Table
@@ -78,7 +79,8 @@ def _rank(table: Table, name: str) -> int:
     if holds_dates(values):
         return 2
     # Behind seconds, which are finer; before numbers whose unit is not stated.
-    return int(holds_times_of_day(values) and any(
+    is_coarse = _is_text_date(values) and values.nunique() < len(values)
+    return int((holds_times_of_day(values) or is_coarse) and any(
         _unit_of_name(table, other) for other in table.columns if is_called_time(table, other)))
 
 
@@ -247,6 +249,8 @@ def _from_column(table: Table, column: TimeMap) -> Times:
             f'column "{name}" holds dates without a time of day, and no column is known to hold '
             'that; add --map time="COLUMN:s", or --rate HZ for rows at equal distances',
             table.source)
+    if column.unit == '' and (durations := durations_of(table, name)) is not None:
+        return _times_of(table, f'column "{name}", {durations.told}', durations)
     if is_date or column.unit in ('', DATE) and _is_text_date(values):
         return _dates(table, name)
     unit = column.unit or _unit_of_name(table, name)

@@ -200,3 +200,30 @@ def test_a_time_that_cannot_be_read_shows_in_the_preview(tmp_path, monkeypatch, 
         assert main(['import', 'log.csv', '--out', 'bag']) == 2
         told = capsys.readouterr().err
         assert said in told and '--missing' not in told
+
+
+@pytest.mark.parametrize('form, decimal', [
+    ('{0:g} sec', '.'), ('{0:g} s', ','), ('0 days 00:00:{0:09.6f}', '.'), ('{1:g} ms', '.')])
+def test_durations_are_read_with_their_unit(form, decimal, tmp_path):
+    separator = ';' if decimal == ',' else ','
+    rows = [form.format(0.01 * k, 10.0 * k) + f'{separator}{1 + k / 8}' for k in range(300)]
+    path = tmp_path / 'm.csv'
+    path.write_text('\n'.join([f'Time{separator}p_bar', *rows, '']).replace('.', decimal))
+    table, = read_tables(path)
+    clock = clock_of(table, TableMapping())
+    assert (clock.stamp_ns - START_NS).tolist() == [10_000_000 * k for k in range(300)]
+    path.write_text(path.read_text().replace('\n' + rows[7].replace('.', decimal), '\nlate;1'
+                                             if separator == ';' else '\nlate,1'))
+    table, = read_tables(path)
+    with pytest.raises(InputError, match="holds 'late', which is no duration as in 0.01 sec"):
+        clock_of(table, TableMapping())
+
+
+def test_seconds_are_taken_before_a_coarse_date(tmp_path):
+    path = tmp_path / 'm.csv'
+    path.write_text('Time Stamp,Elapsed (s),p_bar\n' + ''.join(
+        f'2026-11-20 10:11:{k // 100:02d},{0.01 * k:.2f},{1 + k / 8}\n' for k in range(300)))
+    table, = read_tables(path)
+    clock = clock_of(table, TableMapping())
+    assert 'Elapsed (s)' in clock.told
+    assert (clock.stamp_ns - START_NS).tolist() == [10_000_000 * k for k in range(300)]

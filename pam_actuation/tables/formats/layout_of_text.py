@@ -33,7 +33,8 @@ LINE_END = re.compile(r'\r\n|\r|\n')               # as pandas counts lines; no 
 _SEPARATORS = (';', '\t', ',', '|', r'\s+')
 _NUMBER = r'[+-]?(\d+{0}?\d*|{0}\d+)([eEdD][+-]?\d+)?'
 _DATE = re.compile(
-    r'\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}([T ]\d{1,2}:\d{2}[^;|\t]*)?|\d{1,2}:\d{2}(:[\d.,]+)?')
+    r'\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}([T ]\d{1,2}:\d{2}[^;|\t]*)?|\d{1,2}:\d{2}(:[\d.,]+)?'
+    r'|-?\d+ days? \d{1,2}:\d{2}:[\d.]+|[\d.,]+ (sec|min|hr)')      # durations
 _DATE_AND_TIME = re.compile(r'\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4} +\d{1,2}:\d{2}')
 _EMPTY = {'', 'nan', 'na', 'n/a', 'null', 'none', '-', 'inf', '+inf', '-inf', '#n/a'}
 COMMENTS = ('#', '%', '//')
