@@ -132,6 +132,7 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     ------
     InputError
         No recording is given. Two of them, searched or for the validation, are the same one.
+        A name in ``effects`` is unknown.
 
     """
     started = time.perf_counter() - spent_s

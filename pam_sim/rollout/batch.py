@@ -219,7 +219,15 @@ def residual_sums(rigs: 'list[Rig]', records: list[Record],
 
 
 def default_workers() -> int:
-    """Return PAM_THREADS of the environment, by default the cores this process may use."""
+    """
+    Return PAM_THREADS of the environment, by default the cores this process may use.
+
+    Raises
+    ------
+    InputError
+        It is no whole number from 1 on.
+
+    """
     given = os.environ.get('PAM_THREADS', '')
     if given:
         if not given.isdecimal() or int(given) < 1:
