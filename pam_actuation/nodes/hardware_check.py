@@ -30,7 +30,8 @@ from pam_actuation.ros_missing import ros_missing
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.located_yaml import load_yaml, Located
 
-OF_ROS = ('use_sim_time', 'qos_overrides.')
+SIMULATED_TIME = 'use_sim_time'
+OF_ROS = (SIMULATED_TIME, 'qos_overrides.')
 BRINGING_UP = ('autostart', 'notes_folder')     # set by what starts the nodes
 OF_A_MUSCLE = DRIVER, WATCHDOG                  # one in the namespace of each muscle
 SENSORS, IIO_ADC = 'hardware_sensors', 'iio_adc'
@@ -71,7 +72,8 @@ def check_users_file(file: str, nodes: Iterable[NodeSpec],
     InputError
         No such file, or one of another kind. It names a parameter that there is not, or a value
         that is not allowed or not what the nodes are started with, or their file of hardware
-        states another one. It reaches no node, or misses a driver of the rig.
+        states another one. It reaches no node, misses a driver of the rig, or gives some of the
+        nodes another clock.
 
     """
     tree = load_yaml(file)
@@ -91,6 +93,11 @@ def check_users_file(file: str, nodes: Iterable[NodeSpec],
             _check_values(given, reached, more or {}, hardware)
         elif words[-1] not in (*ORDER, *WILDCARDS) and (near := did_you_mean(words[-1], kinds)):
             raise holder.error(f'unknown node `{words[-1]}`{near}', key)
+    timed = [name for name in named if True in _stated(name, tree).get(SIMULATED_TIME, ())]
+    if timed and len(timed) < len(named) and not (more or {}).get(SIMULATED_TIME):
+        others = ', '.join(name for name in named if name not in timed)
+        raise tree.error(f'`{SIMULATED_TIME}` is true for {", ".join(timed)} and not for '
+                         f'{others}; all nodes of a rig need one clock')
     if none and alone:
         raise tree.error(f'is for none of the nodes that are started: {", ".join(named)}')
     check_reach(tree, named)

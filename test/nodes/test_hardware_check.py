@@ -114,6 +114,9 @@ WRONG = {
     'of an option': (STACK.replace('valve_type: ppr', 'valve_type: hsv'), "started with, 'ppr'"),
     'of bringing up': (
         STACK.replace('use_sim_time: false', 'autostart: true'), 'set by what starts the nodes'),
+    'a clock for some': (
+        '/**/flexor/valve_driver:\n  ros__parameters: {use_sim_time: true}\n',
+        '`use_sim_time` is true for /knee/flexor/valve_driver and not for /knee/joint_simulator'),
     'for nobody': ('/planner:\n  ros__parameters: {x: 1.0}\n', 'is for none of the nodes'),
     'no parameter file': ('name: x\nsegments: []\n', 'is no parameter file'),
     'no node': ('ros__parameters: {max_pressure_gauge_pa: 2.0e5}\n', 'is no parameter file'),
@@ -133,6 +136,14 @@ def test_a_mistake_in_a_file_of_the_users_is_one_sentence(tmp_path, capsys, case
     assert f'{file}' in told and words in told and told.count('\n') == 1
     assert main(['up', 'knee', '--params-file', str(tmp_path / 'none.yaml')]) == 2
     assert capsys.readouterr().err.count('\n') == 1
+
+
+def test_one_clock_for_all_nodes_is_taken(tmp_path):
+    file = tmp_path / 'stack.yaml'
+    file.write_text('/**:\n  ros__parameters: {use_sim_time: true}\n')
+    check_users_file(str(file), layouts.knee())
+    file.write_text(file.read_text().replace('/**', '/**/valve_driver'))
+    check_users_file(str(file), layouts.knee(), {'use_sim_time': True})
 
 
 def test_a_file_of_the_users_is_for_all_nodes_and_may_be_that_of_a_stack(tmp_path):
