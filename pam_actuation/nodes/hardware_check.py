@@ -101,6 +101,7 @@ def check_users_file(file: str, nodes: Iterable[NodeSpec],
     if none and alone:
         raise tree.error(f'is for none of the nodes that are started: {", ".join(named)}')
     check_reach(tree, named)
+    check_order(tree, named)
 
 
 def _stated(full_name: str, tree: Located) -> dict[str, list[object]]:
@@ -150,7 +151,7 @@ def _check_values(given: Located, reached: Mapping[str, NodeSpec], more: Mapping
 
 def check_given_files(arguments: Sequence[str], kind: str, full_name: str) -> None:
     """
-    Check the parameter files on the command line of a node, as ``check_reach``.
+    Check the parameter files on the command line of a node: ``check_reach``, ``check_order``.
 
     A file that is none, or none that is understood here, is left to ROS.
     """
@@ -164,6 +165,25 @@ def check_given_files(arguments: Sequence[str], kind: str, full_name: str) -> No
             continue
         if holds_parameters(tree):
             check_reach(tree, {full_name: NodeSpec(kind, namespace)})
+            check_order(tree, [full_name])
+
+
+def check_order(tree: Located, full_names: Iterable[str]) -> None:
+    """Raise InputError where a wildcard overrules what is stated above for fewer nodes."""
+    for full_name in full_names:
+        stated: dict[str, tuple[int, object]] = {}      # how wide the entry is, and the value
+        for words, holder, key in entries(tree):
+            if not matches(words, full_name):
+                continue
+            width = 2 if '**' in words else 1 if '*' in words else 0
+            for name, inside, last in _flat(holder[key][PARAMETERS]):
+                before, value = stated.get(name), inside[last]
+                if before is not None and before[0] < width and before[1] != value:
+                    raise inside.error(
+                        f'`{name}`: {value!r} would overrule {before[1]!r}, stated above for '
+                        f'{full_name}: ROS takes the last entry that fits. Put entries with '
+                        'wildcards first', last)
+                stated[name] = width, value
 
 
 def check_reach(tree: Located, named: Mapping[str, NodeSpec]) -> None:
@@ -221,6 +241,7 @@ def _check_file(tree: Located, readers: list[NodeSpec]) -> None:
         raise tree.error(f'`{BACK_END}` is missing for {" and ".join(sorted(without))}: nothing '
                          'would drive the valve')
     check_reach(tree, named)
+    check_order(tree, named)
     _check_channels(tree, named)
 
 

@@ -267,3 +267,27 @@ def test_the_files_of_a_command_line_may_hold_what_is_for_others(tmp_path):
         check_given_files([*words, str(file)], 'joint_controller', '/left/joint_controller')
         with pytest.raises(InputError, match='is none of the nodes that are started'):
             check_given_files([*words, str(file)], 'valve_driver', '/left/flexor/own_name')
+
+
+OWN = '/muscle/valve_driver:\n  ros__parameters: {max_pressure_gauge_pa: 40000.0}\n'
+
+
+@pytest.mark.parametrize('wide', ['/**', '/**/valve_driver', '/*/valve_driver'])
+def test_a_wildcard_below_the_limit_of_a_node_is_refused(tmp_path, wide):
+    """ROS would take the last entry, and not the one for fewer nodes."""
+    file, limit = tmp_path / 'mine.yaml', LIMIT.replace('/**/valve_driver', wide)
+    words = ['--params-file', str(file)]
+    for text, is_right in ((limit + OWN, True), (OWN + limit, False), (
+            OWN + limit.replace('50000', '40000'), True)):
+        file.write_text(text)
+        whole = tmp_path / 'hardware.yaml'
+        whole.write_text(f'{text}/muscle/*:\n  ros__parameters: {{backend: dummy}}\n')
+        for check in (lambda: check_users_file(str(file), layouts.rig()),
+                      lambda: check_hardware(layouts.rig(hardware=str(whole))),
+                      lambda: check_given_files(words, 'valve_driver', '/muscle/valve_driver')):
+            if is_right:
+                check()
+                continue
+            with pytest.raises(InputError, match='50000 would overrule 40000.0, stated above for '
+                               '/muscle/valve_driver'):
+                check()
