@@ -122,7 +122,8 @@ def _new(args: argparse.Namespace) -> int:
         described.work_out()
         text, rig = rig_file(described, args.out)
         write_text(args.out, text)
-    remarks = list(dict.fromkeys([*remarks, *_remarks(rig, args.out)]))
+    remarks = list(dict.fromkeys([
+        *remarks, *_mass_not_stated(rig, described), *_remarks(rig, args.out)]))
     following = _following(rig, args.out)
     lines = [f'rig file: {args.out}', *_numbers_text(rig), *_law_text(rig),
              *remarks, f'next: {following}']
@@ -251,6 +252,17 @@ def _remarks(rig: 'Rig', path: str) -> list[str]:
     return [*muscle_remarks(rig.muscle, rig.parameters['force_map_gain']), *left_remarks(rig),
             *idle_remarks(path, rig), *unstated_valve_data(rig), *driver_remarks(rig),
             *_zeros_known_relatively(rig)]
+
+
+def _mass_not_stated(rig: 'Rig', described: 'Description') -> list[str]:
+    """Return a sentence where the mass of the load is that of the nominal rig."""
+    name = 'mass_kg'
+    if name not in rig.parameters or name in described.numbers:
+        return []
+    value = rig.parameters[name]
+    return [f'Nobody stated `{name}`, so the {value:g} kg of the nominal rig count as known to '
+            f'{100.0 * rig.prior_sd(name) / value:.2g} %. State it with --known or --about, or '
+            f'add --unknown {name}.']
 
 
 def _zeros_known_relatively(rig: 'Rig') -> list[str]:

@@ -109,3 +109,13 @@ def test_the_gain_of_a_regulator_whose_pressures_nobody_stated_is_not_known(caps
                     ['--regulator-kpa', '0:600'], []):
         rig = new(*options, '--overwrite')
         assert rig.prior_sd('K_m') == pytest.approx(0.02 * rig.parameters['K_m'])
+
+
+def test_a_mass_that_nobody_stated_is_told(capsys):
+    said = 'Nobody stated `mass_kg`, so the 5 kg of the nominal rig count as known to 2 %'
+    for options, is_told in (([], True), (['--known', 'mass_kg=5'], False),
+                             (['--about', 'mass_kg=5±1'], False),
+                             (['--unknown', 'mass_kg'], False),
+                             (['--load', 'isometric'], False)):
+        new(*options, '--overwrite')
+        assert (said in capsys.readouterr().out) == is_told, options
