@@ -74,7 +74,8 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument('--sort', action='store_true',
                         help='put rows in order whose time runs back')
     parser.add_argument('--part', type=count(1, 10**6), default=0, metavar='N',
-                        help='take the Nth recording of a file in which the time begins anew')
+                        help='take the Nth recording of a file in which the time begins anew, '
+                             'or the Nth of several sheets with the same columns')
     parser.add_argument('--missing', action='append', default=[], metavar='TEXT',
                         help='text that stands for a missing value; may be repeated')
     parser.add_argument('--leave-out', action='append', default=[], metavar='COLUMN',
@@ -143,6 +144,7 @@ def _understood(args: argparse.Namespace) -> 'tuple[list[Table], Guess]':
     from pam_actuation.tables.guess import as_stated, ask, guess
     from pam_actuation.tables.mapping import load_mapping, TableMapping
     from pam_actuation.tables.preview import how_to_begin, question_sentence
+    from pam_actuation.tables.sheets import of_part
     from pam_sim.errors import InputError
     mapping = (load_mapping(args.mapping) if args.mapping else TableMapping()).with_options(
         args.maps, args.rate).without(args.without)
@@ -155,6 +157,8 @@ def _understood(args: argparse.Namespace) -> 'tuple[list[Table], Guess]':
     with progress(args, float(len(args.files)), '', 'reading') as bar:
         for done, file in enumerate(args.files):
             tables += read_tables(file, args.every, wanted, partial(_move, bar, done))
+    if len(args.files) == 1:
+        tables, args.part = of_part(tables, args.part)
     # A file that is kept says everything.
     found = as_stated(mapping) if args.mapping else guess(
         tables, mapping, args.missing, args.leave_out)

@@ -219,9 +219,13 @@ def _joined(name: str, pieces: list[tuple[IntArray, FloatArray, str]]
     pieces = sorted(pieces, key=lambda piece: int(piece[0][0]))
     for (before, _, first), (after, _, second) in zip(pieces, pieces[1:]):
         if after[0] <= before[-1]:
+            of_one_file = first != second and len({
+                one.partition(', ')[0] for one in (first, second)}) == 1
+            way = ('take one of them with --part 1, --part 2 and so on' if of_one_file
+                   else 'import them one by one')
             raise InputError(
-                f'{name} is in both {first} and {second}, at overlapping times; import them one '
-                'by one, or map a column that only one of them has', '--map')
+                f'{name} is in both {first} and {second}, at overlapping times; {way}, or map a '
+                'column that only one of them has', '--map')
     return (np.concatenate([stamps for stamps, _, _ in pieces]),
             np.concatenate([values for _, values, _ in pieces]))
 

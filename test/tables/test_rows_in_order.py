@@ -220,3 +220,26 @@ def test_one_side_of_a_long_pause_is_taken(call, tmp_path):
         assert code < 2 and f'), {rows} values' in said and 'jumps' not in said
     code, said = call(times_ms, PRESSURE_BAR, '--to', '115')
     assert code == 2 and 'the time jumps on' in said
+
+
+def test_a_sheet_for_each_recording_is_a_part(tmp_path, monkeypatch, capsys):
+    import openpyxl
+    monkeypatch.chdir(tmp_path)
+    book = openpyxl.Workbook()
+    for number in (1, 2):
+        sheet = book.create_sheet(f'Trial {number}')
+        for row in [['t_s', 'p_bar_g'], *([0.01 * k, number + k % 7 / 7] for k in range(200))]:
+            sheet.append(row)
+    book.active.append(['Operator', 'M. Muster'])
+    book.save('lab.xlsx')
+    words = ['import', 'lab.xlsx', '--out', 'bag', '--overwrite']
+    assert main(words) == 2
+    said = capsys.readouterr().err
+    assert 'sheet Trial 2, at overlapping times; take one of them with --part 1' in said
+    for number in (1, 2):
+        assert main([*words, '--part', f'{number}']) < 2, capsys.readouterr()
+        assert f'sheet Trial {number}: time' in capsys.readouterr().out
+        lowest_pa = load_run('bag')['pressure']['pressure_pa'].min()
+        assert lowest_pa == pytest.approx(101_325.0 + 1e5 * number)
+    assert main([*words, '--part', '3']) == 2
+    assert '--part 3: there are 2 recordings: lab.xlsx, sheet Trial 1' in capsys.readouterr().err
