@@ -82,7 +82,9 @@ def check_users_file(file: str, nodes: Iterable[NodeSpec],
                          'node, such as `/**/valve_driver`')
     named = {node_name_of(node.name, node.namespace): node for node in nodes}
     kinds = sorted({node.name for node in named.values()})
-    hardware = {name: _stated(name, load_yaml(node.parameter_file)) for name, node in named.items()
+    trees = {path: load_yaml(path) for path in {node.parameter_file for node in named.values()}
+             if path}
+    hardware = {name: _stated(name, trees[node.parameter_file]) for name, node in named.items()
                 if node.parameter_file}
     none = True
     for words, holder, key in entries(tree):
@@ -100,8 +102,7 @@ def check_users_file(file: str, nodes: Iterable[NodeSpec],
                          f'{others}; all nodes of a rig need one clock')
     if none and alone:
         raise tree.error(f'is for none of the nodes that are started: {", ".join(named)}')
-    check_reach(tree, named)
-    check_order(tree, named)
+    check_entries(tree, named)
 
 
 def _stated(full_name: str, tree: Located) -> dict[str, list[object]]:
@@ -151,7 +152,7 @@ def _check_values(given: Located, reached: Mapping[str, NodeSpec], more: Mapping
 
 def check_given_files(arguments: Sequence[str], kind: str, full_name: str) -> None:
     """
-    Check the parameter files on the command line of a node: ``check_reach``, ``check_order``.
+    Check the parameter files on the command line of a node by ``check_entries``.
 
     A file that is none, or none that is understood here, is left to ROS.
     """
@@ -164,11 +165,26 @@ def check_given_files(arguments: Sequence[str], kind: str, full_name: str) -> No
         except InputError:
             continue
         if holds_parameters(tree):
-            check_reach(tree, {full_name: NodeSpec(kind, namespace)})
-            check_order(tree, [full_name])
+            check_entries(tree, {full_name: NodeSpec(kind, namespace)})
 
 
-def check_order(tree: Located, full_names: Iterable[str]) -> None:
+def check_entries(tree: Located, named: Mapping[str, NodeSpec]) -> None:
+    """
+    Raise InputError where an entry misses the nodes it is for, or a later one overrules it.
+
+    Parameters
+    ----------
+    tree : Located
+        A parameter file.
+    named : dict of str to NodeSpec
+        The nodes that are started, by full name.
+
+    """
+    _check_reach(tree, named)
+    _check_order(tree, named)
+
+
+def _check_order(tree: Located, full_names: Iterable[str]) -> None:
     """Raise InputError where a wildcard overrules what is stated above for fewer nodes."""
     for full_name in full_names:
         stated: dict[str, tuple[int, object]] = {}      # how wide the entry is, and the value
@@ -186,7 +202,7 @@ def check_order(tree: Located, full_names: Iterable[str]) -> None:
                 stated[name] = width, value
 
 
-def check_reach(tree: Located, named: Mapping[str, NodeSpec]) -> None:
+def _check_reach(tree: Located, named: Mapping[str, NodeSpec]) -> None:
     """
     Raise InputError on an entry for a driver or watchdog that the rig has in another namespace.
 
@@ -240,8 +256,7 @@ def _check_file(tree: Located, readers: list[NodeSpec]) -> None:
     if without:
         raise tree.error(f'`{BACK_END}` is missing for {" and ".join(sorted(without))}: nothing '
                          'would drive the valve')
-    check_reach(tree, named)
-    check_order(tree, named)
+    check_entries(tree, named)
     _check_channels(tree, named)
 
 
