@@ -113,11 +113,8 @@ def test_a_line_that_no_topic_takes_is_told(nodes):
     subscription.destroy()
 
 
-def test_a_clock_that_is_offered_best_effort_is_followed(nodes):
-    """As ``ros2 bag play --clock`` and Gazebo offer it."""
-    listener, player = nodes
-    followed = FollowedTime(listener, TickInputs(list, False, print))
-    followed.begin()
+def heard_clock(player, followed):
+    """Return a publisher of ``/clock``, best effort, whose 42 s have arrived."""
     clock = player.create_publisher(Clock, '/clock', BEST_EFFORT)
     message = Clock()
     message.clock.sec = 42
@@ -128,6 +125,15 @@ def test_a_clock_that_is_offered_best_effort_is_followed(nodes):
         return followed.now_ns() == 42_000_000_000
 
     wait_for(arrived, 10.0, 'the time of the clock')
+    return clock
+
+
+def test_a_clock_that_is_offered_best_effort_is_followed(nodes):
+    """As ``ros2 bag play --clock`` and Gazebo offer it."""
+    listener, player = nodes
+    followed = FollowedTime(listener, TickInputs(list, False, print))
+    followed.begin()
+    clock = heard_clock(player, followed)
     followed.close()
     player.destroy_publisher(clock)
 
@@ -142,16 +148,7 @@ def test_a_time_that_stands_still_is_told(nodes, monkeypatch):
     time.sleep(0.4)
     told = 'use_sim_time is set and nothing came on /clock {}, so this node stands still'
     assert followed.remarks() == [told.format('since it became active')]
-    clock = player.create_publisher(Clock, '/clock', BEST_EFFORT)
-    message = Clock()
-    message.clock.sec = 42
-
-    def arrived():
-        clock.publish(message)
-        followed.wait_until(0)
-        return followed.now_ns() > 0
-
-    wait_for(arrived, 10.0, 'the time of the clock')
+    clock = heard_clock(player, followed)
     assert followed.remarks() == []
     time.sleep(0.4)
     assert followed.remarks() == [told.format('for 0 s')]
