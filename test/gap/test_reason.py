@@ -198,6 +198,22 @@ def test_the_sentence_on_venting_says_what_the_ratio_says(ratio_minus_1, sentenc
     assert text.startswith(f'{sentence} (vent_asymmetry: ')
 
 
+def test_a_number_without_a_unit_has_no_dash_behind_it():
+    gain = Calibrated('force_map_gain', '-', 1.0, 1.1, (1.09, 1.11), 5.0)
+    text = said('parameter', {'pressure': PRESSURE}, parameters=[gain])
+    assert text.startswith('force_map_gain = 1.1 instead of 1 (+10.0 %). With this')
+    vent = effect('vent_asymmetry', 'vent_to_fill_time_ratio', '-')
+    found = GapResult('effects', '', signals={'pressure': PRESSURE}, effects=[vent],
+                      calibration=[gain])
+    found.reason = explain(found, SimpleNamespace(
+        named=[NamedEffect('vent_asymmetry', 'valve', [], ('vent_asymmetry',))], share={},
+        mistaken={}, complete=True))
+    assert 'vent to fill time ratio 0.03, 95 % 0.02 to 0.04' in found.reason
+    page = gap_section(found).body
+    assert '0.03 -' not in page and '>0.03<' in page
+    assert '1.1 -' not in page and '>1.1<' in page
+
+
 def test_a_number_that_was_0_has_no_change_in_percent():
     spring = Calibrated('spring_n_per_m', 'N/m', 0.0, 400.0, (390.0, 410.0), 8.0)
     text = said('parameter', {'pressure': PRESSURE}, parameters=[spring])

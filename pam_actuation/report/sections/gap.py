@@ -25,6 +25,7 @@ from pam_actuation.report.sections.gap_witness import coloured_part, witness_par
 from pam_actuation.report.sections.replay import SHOWN
 from pam_sim.gap.criteria import CRITERIA
 from pam_sim.gap.words import in_words
+from pam_sim.units import behind_number
 
 if TYPE_CHECKING:
     from pam_sim.gap.result import GapResult, SignalGap
@@ -109,7 +110,7 @@ def percent(value: float | None) -> str | None:
 
 def quantity(name: str, q: Mapping[str, Any]) -> list[str]:
     """Return an equivalent quantity in words: its name, value with unit, 95 % interval."""
-    return [in_words(name), f'{q["value"]:.4g} {q["unit"]}', interval(q['ci95'])]
+    return [in_words(name), f'{q["value"]:.4g}{behind_number(q["unit"])}', interval(q['ci95'])]
 
 
 def interval(ends: Sequence[float | None]) -> str:
@@ -199,7 +200,8 @@ def _calibration(result: 'GapResult') -> str:
     if not result.calibration:
         return ''
     wrong = {p.name for p in result.parameters}
-    rows = [[c.name, f'{c.nominal:.5g} {c.unit}', f'{c.value:.5g} {c.unit}',
+    rows = [[c.name, f'{c.nominal:.5g}{behind_number(c.unit)}',
+             f'{c.value:.5g}{behind_number(c.unit)}',
              f'{c.ci95[0]:.5g} … {c.ci95[1]:.5g}', f'{c.prior_deviation:+.1f}',
              'wrong' if c.name in wrong else ''] for c in result.calibration]
     return ('<details><summary>Calibrated numbers</summary>'

@@ -17,6 +17,7 @@
 from typing import TYPE_CHECKING
 
 from pam_actuation.report.page import paragraph, Section, table
+from pam_sim.units import behind_number
 
 if TYPE_CHECKING:
     from pam_sim.gap.result import GapResult
@@ -30,7 +31,7 @@ def numbers_section(result: 'GapResult') -> list[Section]:
     body = paragraph('The model has unknown numbers. These are found first, so that a wrong '
                      'load or valve is not taken for an effect or an error of a sensor.')
     body += table(['number', 'status', 'value', '95 % interval'], [
-        [n['name'], n['status'], f'{n["value"]:.5g} {n["unit"]}',
+        [n['name'], n['status'], f'{n["value"]:.5g}{behind_number(n["unit"])}',
          ' … '.join('open' if end is None else f'{end:.5g}' for end in n['ci95'])]
         for n in first['numbers']])
     for formula in first['together']:

@@ -23,6 +23,7 @@ from pam_sim.gap.result import Calibrated, GapResult
 from pam_sim.gap.select.search import Outcome
 from pam_sim.gap.verify.harm import Harm
 from pam_sim.gap.words import in_words
+from pam_sim.units import behind_number
 
 SEEN = 1.2                   # times the noise floor: a gap in a signal that is worth a word
 BENT = 1.2                   # times the gap of the given model: calibration made it clearly worse
@@ -96,8 +97,8 @@ def _sentence(name: str, parameters: Mapping[str, Mapping[str, Any]] | None = No
 
 
 def _quantity(equivalent: Mapping[str, Mapping[str, Any]]) -> str:
-    return join([f'{in_words(n)} {q["value"]:.3g} {q["unit"]}, 95 % {q["ci95"][0]:.3g} to '
-                 f'{q["ci95"][1]:.3g}' for n, q in equivalent.items()])
+    return join([f'{in_words(n)} {q["value"]:.3g}{behind_number(q["unit"])}, 95 % '
+                 f'{q["ci95"][0]:.3g} to {q["ci95"][1]:.3g}' for n, q in equivalent.items()])
 
 
 def _together(formulas: Iterable[str]) -> str:
@@ -106,7 +107,8 @@ def _together(formulas: Iterable[str]) -> str:
 
 
 def _numbers(parameters: Iterable[Calibrated]) -> str:
-    return join([f'{c.name} = {c.value:.4g} {c.unit} instead of {c.nominal:.4g} {c.unit}'
+    return join([f'{c.name} = {c.value:.4g}{behind_number(c.unit)} instead of '
+                 f'{c.nominal:.4g}{behind_number(c.unit)}'
                  + (f' ({100 * (c.value / c.nominal - 1):+.1f} %)' if c.nominal else '')
                  for c in parameters])
 
