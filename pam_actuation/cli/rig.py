@@ -25,6 +25,7 @@ from pam_actuation.cli.completion import presets, REGULATOR
 from pam_actuation.cli.options import number, out_path, Parser, source
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
     from contextlib import AbstractContextManager
 
     from pam_actuation.rig_files.description import Description
@@ -282,11 +283,13 @@ def _check(args: argparse.Namespace) -> int:
     remarks = [*nominal_beside_size(rig), *_remarks(rig, args.file)]
     size = f'muscle of {1e3 * rig.muscle.bore_m:.4g} mm by {1e3 * rig.muscle.length_m:.4g} mm'
     lines = [rig_title(rig), f'{size}, load {rig.load}, valve {rig.valve}', *_numbers_text(rig),
-             *_exact_text(rig), *(f'remark: {text}' for text in remarks)]
+             *_exact_text(rig), *_stated_text(rig), *(f'remark: {text}' for text in remarks)]
     emit(args, {'rig': rig.name, 'load': rig.load, 'valve': rig.valve,
                 'muscle': {'bore_m': rig.muscle.bore_m, 'length_m': rig.muscle.length_m},
                 **_numbers(rig), 'exact': [{'name': p.name, 'unit': p.unit,
                                             'value': rig.number(p.name)} for p in _exact(rig)],
+                'effects': {one.name: one.parameters for one in rig.effects},
+                'sensors': {p.name: rig.sensors[p.name] for p in _of_sensors(rig)},
                 'remarks': remarks}, '\n'.join(lines))
     return EXIT_DONE
 
@@ -311,6 +314,26 @@ def _exact_text(rig: 'Rig') -> list[str]:
     from pam_sim.units import behind_number
     return [f'  {p.name}: {rig.number(p.name):.6g}{behind_number(p.unit)}'
             f'{_as_gauge(rig, p.name)}, exact' for p in _exact(rig)]
+
+
+def _stated_text(rig: 'Rig') -> list[str]:
+    """Return a line on each effect of a rig, and one on what its sensors add."""
+    from pam_sim.effects.registry import effects
+    from pam_sim.units import behind_number
+
+    def said(parameters: 'Sequence[Any]', values: 'Mapping[str, float]') -> str:
+        return ', '.join(f'{p.name} {values[p.name]:.6g}{behind_number(p.unit)}'
+                         for p in parameters)
+    lines = [f'  effect {one.name}: {said(effects()[one.name].parameters, one.parameters)}'
+             for one in rig.effects]
+    added = _of_sensors(rig)
+    return lines + ([f'  sensors: {said(added, rig.sensors)}'] if added else [])
+
+
+def _of_sensors(rig: 'Rig') -> list[Any]:
+    """Return the settings of the sensors that are not nominal."""
+    from pam_sim.sensors import SENSOR_PARAMETERS
+    return [p for p in SENSOR_PARAMETERS if rig.sensors[p.name] != p.default]
 
 
 def _as_gauge(rig: 'Rig', name: str) -> str:

@@ -423,6 +423,23 @@ def test_check_tells_what_is_unknown_and_how_well_the_rest_is_known(capsys):
     assert main(['rig', 'check']) == 2 and main(['rig', 'check', 'none.yaml']) == 2
 
 
+def test_check_shows_effects_and_sensors_with_their_numbers(folder, capsys):
+    (folder / 'pair.yaml').write_text(
+        'muscle: dmsp_20_300\nload: hanging_mass\nvalve: hsv\neffects:\n'
+        '  - {name: valve_dead_zone, parameters: {open_time_s: 0.0017, close_time_s: 0.002}}\n'
+        '  - {name: vent_asymmetry, parameters: {ratio_minus_1: -0.25}}\n'
+        'sensors: {pressure_noise_pa: 300.0}\n')
+    assert main(['rig', 'check', 'pair.yaml']) == 0
+    printed = capsys.readouterr().out
+    assert 'open_time_s 0.0017 s, close_time_s 0.002 s' in printed
+    assert '  effect vent_asymmetry: ratio_minus_1 -0.25\n' in printed
+    assert '  sensors: pressure_noise_pa 300 Pa\n' in printed
+    assert main(['rig', 'check', 'pair.yaml', '--json']) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told['effects']['valve_dead_zone']['close_time_s'] == 0.002
+    assert told['sensors'] == {'pressure_noise_pa': 300.0}
+
+
 def test_check_shows_what_is_exact_and_the_supply_as_gauge_too(folder, capsys):
     (folder / 'slip.yaml').write_text(
         'muscle: dmsp_10_250\nload: hanging_mass\nvalve: hsv\nparameters: {mass_kg: 4.0, '
