@@ -34,7 +34,7 @@ from pam_actuation.report.sections.over_seeds import over_seeds, seeds_section
 from pam_actuation.report.sections.overlaid import lines, read_topic, together
 from pam_actuation.report.sections.provenance import provenance
 from pam_actuation.report.sections.timing import timing
-from pam_actuation.report.steps import ANGLE, Answer, answers, as_data, settling_text
+from pam_actuation.report.steps import ANGLE, as_data, responses, settling_text, StepResponse
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.files import write_text
@@ -69,7 +69,7 @@ class JointMetrics:
     cycle_parts: tuple[errors.Cycles, ...] = ()
     times_rolled_back: int | None = None
     learned_worse: tuple[str, ...] = ()
-    steps: tuple[Answer, ...] = ()
+    steps: tuple[StepResponse, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Return the main numbers as plain data."""
@@ -113,7 +113,7 @@ def joint_metrics(run: Run) -> JointMetrics:
               if (found := metrics.loop_timing(run, topic)) is not None),
         errors.counted(parts, cycles), times_rolled_back(run),
         learned_worse(run, np.degrees(errors.joined(cycles)), errors.counted(parts, cycles), '°'),
-        answers(signals.series(run, 'joint_reference', 'angle_rad'), error, ANGLE))
+        responses(signals.series(run, 'joint_reference', 'angle_rad'), error, ANGLE))
 
 
 def joint_report(runs: Sequence[Run], out_path: str | os.PathLike[str],

@@ -21,7 +21,7 @@ failing.
 """
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
@@ -33,7 +33,7 @@ from pam_actuation.report.command_path import command_path
 from pam_actuation.report.errors import (
     counted, Cycles, difference, find_parts, joined, part_rmse, parts_as_data, rmse, Signal)
 from pam_actuation.report.learning import learned_worse, times_rolled_back
-from pam_actuation.report.steps import Answer, answers, as_data, CONTRACTION, FORCE
+from pam_actuation.report.steps import as_data, CONTRACTION, FORCE, responses, StepResponse
 from pam_sim.annotations import FloatArray
 from pam_sim.short_repr import short_repr
 from pam_sim.units import (
@@ -59,16 +59,6 @@ class LoopTiming:
     late_share: float
 
 
-@dataclass(frozen=True)
-class StepResponse:
-    """One step of the reference: size [m], settling time [s] or None, overshoot [m]."""
-
-    start_s: float
-    size_m: float
-    settling_s: float | None
-    overshoot_m: float
-
-
 @short_repr
 @dataclass(frozen=True)
 class RunMetrics:
@@ -79,7 +69,7 @@ class RunMetrics:
     max_error_m: float | None
     mean_error_m: float | None
     cycle_rmse_m: FloatArray
-    steps: tuple[StepResponse, ...]
+    steps: tuple[StepResponse, ...]          # in m
     saturation_low: float | None
     saturation_high: float | None
     air_use_kg: float | None
@@ -94,7 +84,7 @@ class RunMetrics:
     cycle_parts: tuple[Cycles, ...] = ()     # whose cycles follow one another above
     times_rolled_back: int | None = None
     learned_worse: tuple[str, ...] = ()      # sentences
-    force_steps: tuple[Answer, ...] = ()     # in N
+    force_steps: tuple[StepResponse, ...] = ()     # in N
 
     def to_dict(self) -> dict[str, Any]:
         """Return the main numbers as plain data, SI."""
@@ -105,8 +95,8 @@ class RunMetrics:
                 'cycle_rmse_n': [float(v) for v in self.cycle_rmse_n],
                 'cycle_parts': parts_as_data(self.cycle_parts),
                 'settling_s': [s.settling_s for s in self.steps],
-                'overshoot_m': [s.overshoot_m for s in self.steps],
-                'steps': [asdict(step) for step in self.steps],
+                'overshoot_m': [s.overshoot for s in self.steps],
+                'steps': as_data(self.steps, CONTRACTION),
                 'force_steps': as_data(self.force_steps, FORCE),
                 'command_variation_pa_per_s': self.command_variation_pa_per_s,
                 'interruptions': self.interruptions and self.interruptions[0],
@@ -135,17 +125,15 @@ def force_error(run: 'Run') -> Signal | None:
     return difference(signals.series(run, 'reference', 'force_n'), signals.series(run, 'force'))
 
 
-def step_responses(run: 'Run') -> tuple[StepResponse, ...]:
-    """Return a StepResponse for every step of the wanted contraction; see ``steps.answers``."""
-    found = answers(signals.series(run, 'reference', 'contraction_m'), tracking_error(run),
-                    CONTRACTION)
-    return tuple(StepResponse(one.start_s, one.size, one.settling_s, one.overshoot)
-                 for one in found)
+def contraction_steps(run: 'Run') -> tuple[StepResponse, ...]:
+    """Return the response to every step of the wanted contraction [m]; see ``steps``."""
+    return responses(signals.series(run, 'reference', 'contraction_m'), tracking_error(run),
+                     CONTRACTION)
 
 
-def force_steps(run: 'Run') -> tuple[Answer, ...]:
-    """Return an Answer for every step of the wanted force [N]; see ``steps.answers``."""
-    return answers(signals.series(run, 'reference', 'force_n'), force_error(run), FORCE)
+def force_steps(run: 'Run') -> tuple[StepResponse, ...]:
+    """Return the response to every step of the wanted force [N]; see ``steps``."""
+    return responses(signals.series(run, 'reference', 'force_n'), force_error(run), FORCE)
 
 
 def saturation_share(run: 'Run', rig: 'Rig | None' = None) -> tuple[float | None, float] | None:
@@ -309,7 +297,7 @@ def run_metrics(run: 'Run', rig: 'Rig | None' = None) -> RunMetrics:
         max_error_m=None if error is None else float(np.max(np.abs(error))),
         mean_error_m=None if error is None else float(np.mean(error)),
         cycle_rmse_m=joined(cycles_m),
-        steps=step_responses(run), force_steps=force_steps(run),
+        steps=contraction_steps(run), force_steps=force_steps(run),
         saturation_low=saturation[0], saturation_high=saturation[1],
         air_use_kg=used, timing=tuple(t for t in timing if t is not None),
         interruptions=interruptions(run),

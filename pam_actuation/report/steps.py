@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How a step of the reference is answered: settling time and overshoot."""
+"""Responses to steps of the reference: settling time and overshoot."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -51,8 +51,12 @@ ANGLE = Kind('rad', 0.05, 0.01)
 
 
 @dataclass(frozen=True)
-class Answer:
-    """One step of the reference: size, settling time [s] or None, overshoot; SI."""
+class StepResponse:
+    """
+    One step of the reference: start [s], size, settling time [s] or None, overshoot.
+
+    Size and overshoot are in the SI unit of what is tracked: m, N or rad.
+    """
 
     start_s: float
     size: float
@@ -60,14 +64,15 @@ class Answer:
     overshoot: float
 
 
-def answers(reference: Signal | None, tracked: Signal | None, kind: Kind) -> tuple[Answer, ...]:
+def responses(reference: Signal | None, tracked: Signal | None, kind: Kind
+              ) -> tuple[StepResponse, ...]:
     """
-    Return an Answer to every step of a reference.
+    Return the response to every step of a reference.
 
     Settled means that the error stays within 5 % of the step, at least within the band of its
     kind, until the next step or the end; ``settling_s`` is None if it never does. A reference
     that rests after its step and then moves on, as in a ramp, ends it too: what follows is no
-    answer to the step.
+    response to the step.
 
     Parameters
     ----------
@@ -105,12 +110,12 @@ def answers(reference: Signal | None, tracked: Signal | None, kind: Kind) -> tup
     for (start, size), end in zip(steps, ends):
         end = _rests_until(tr, r, start, kind.settled(size), end)
         inside = (te >= start) & (te < end - 2.0 * STEP_WITHIN_S)
-        found.append(_answer(te[inside], error[inside], start, size, kind.settled(size)))
+        found.append(_response(te[inside], error[inside], start, size, kind.settled(size)))
     return tuple(found)
 
 
-def as_data(found: Iterable[Answer], kind: Kind) -> list[dict[str, Any]]:
-    """Return answers as plain data, sizes named by their unit."""
+def as_data(found: Iterable[StepResponse], kind: Kind) -> list[dict[str, Any]]:
+    """Return responses as plain data, sizes named by their unit."""
     return [{'start_s': one.start_s, f'size_{kind.unit}': one.size, 'settling_s': one.settling_s,
              f'overshoot_{kind.unit}': one.overshoot} for one in found]
 
@@ -136,14 +141,14 @@ def _rests_until(time_s: FloatArray, reference: FloatArray, start_s: float, band
     return left_s if left_s - start_s >= REST_S else end_s
 
 
-def _answer(time_s: FloatArray, error: FloatArray, start_s: float, size: float, band: float
-            ) -> Answer:
+def _response(time_s: FloatArray, error: FloatArray, start_s: float, size: float, band: float
+            ) -> StepResponse:
     if not time_s.size:
-        return Answer(start_s, size, None, 0.0)
+        return StepResponse(start_s, size, None, 0.0)
     outside = np.flatnonzero(np.abs(error) > band)
     overshoot = max(float(np.max(-np.sign(size) * error)), 0.0)
     if not outside.size:
-        return Answer(start_s, size, 0.0, overshoot)
+        return StepResponse(start_s, size, 0.0, overshoot)
     if outside[-1] + 1 >= time_s.size:
-        return Answer(start_s, size, None, overshoot)
-    return Answer(start_s, size, float(time_s[outside[-1] + 1] - start_s), overshoot)
+        return StepResponse(start_s, size, None, overshoot)
+    return StepResponse(start_s, size, float(time_s[outside[-1] + 1] - start_s), overshoot)

@@ -126,10 +126,10 @@ def test_rmse_and_largest_error_and_missing_topics():
 
 
 def test_settling_time_of_a_first_order_lag():
-    (step,) = metrics.step_responses(step_run(gain_per_s=10.0))
-    assert step.size_m == pytest.approx(0.01)
+    (step,) = metrics.contraction_steps(step_run(gain_per_s=10.0))
+    assert step.size == pytest.approx(0.01)
     assert step.settling_s == pytest.approx(np.log(20) / 10.0, abs=0.012)
-    assert step.overshoot_m == pytest.approx(0.0, abs=1e-9)
+    assert step.overshoot == pytest.approx(0.0, abs=1e-9)
 
 
 def test_what_follows_a_rest_after_a_step_is_no_answer_to_it():
@@ -140,9 +140,9 @@ def test_what_follows_a_rest_after_a_step_is_no_answer_to_it():
         series = run.topics[topic]
         series.values['contraction_m'] -= 5e-3 * np.clip(
             series.time_s(begin_ns) - from_s, 0.0, 2.0)
-    (step,) = metrics.step_responses(run)
+    (step,) = metrics.contraction_steps(run)
     assert step.settling_s == pytest.approx(np.log(20) / 10.0, abs=0.012)
-    assert step.overshoot_m == pytest.approx(0.0, abs=1e-9)
+    assert step.overshoot == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_reference_that_is_sent_when_it_changes_holds_until_then():
@@ -205,7 +205,7 @@ def test_control_effort_is_the_total_variation_of_the_command_per_second():
 
 
 def test_a_step_that_stays_off_is_not_settled():
-    (step,) = metrics.step_responses(step_run(late_m=0.001))
+    (step,) = metrics.contraction_steps(step_run(late_m=0.001))
     assert step.settling_s is None
 
 
@@ -213,7 +213,7 @@ def test_a_step_that_stays_off_is_not_settled():
 def test_a_sine_has_no_steps(frequency_hz):
     # Of 16 mm from end to end: at 1 Hz its fastest 30 ms are 1.5 mm long.
     run = tracking_run(AMPLITUDES, period_s=1.0 / frequency_hz)
-    assert metrics.step_responses(run) == ()
+    assert metrics.contraction_steps(run) == ()
 
 
 def test_steps_on_a_moving_reference_are_found():
@@ -222,9 +222,9 @@ def test_steps_on_a_moving_reference_are_found():
     time_s = reference.time_s(reference.stamp_ns[0])
     for begin_s, size_m in ((5.5, 0.004), (12.0, -0.003)):
         reference.values['contraction_m'][time_s >= begin_s] += size_m
-    steps = metrics.step_responses(run)
+    steps = metrics.contraction_steps(run)
     assert [step.start_s for step in steps] == pytest.approx([5.5, 12.0], abs=0.011)
-    assert [step.size_m for step in steps] == pytest.approx([0.004, -0.003], abs=1e-4)
+    assert [step.size for step in steps] == pytest.approx([0.004, -0.003], abs=1e-4)
 
 
 @pytest.mark.parametrize('lowest_v, highest_v', [(0.0, 6.0), (1.0, 5.0)])

@@ -108,7 +108,7 @@ def _overshoot(m: 'RunMetrics') -> str | None:
     """Return the largest overshoot; a run tracks a contraction or a force."""
     if m.force_steps and not m.steps:
         return _n(max(step.overshoot for step in m.force_steps))
-    return _mm(max((step.overshoot_m for step in m.steps), default=None))
+    return _mm(max((step.overshoot for step in m.steps), default=None))
 
 
 def interrupted_text(m: 'RunMetrics | JointMetrics') -> str | None:
