@@ -14,7 +14,7 @@
 
 """What the directory of a bag says: its metadata.yaml, and the order of its files."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 import contextlib
 from pathlib import Path
 from typing import Any
@@ -68,9 +68,6 @@ def data_files(path: Path, ending: str) -> list[Path]:
     """
     Return the files of one storage in a folder by number, also those that rosbag2 compressed.
 
-    Of a file that is there in both forms this is the plain one: a recorder that is killed while
-    it compresses leaves both.
-
     Parameters
     ----------
     path : pathlib.Path
@@ -79,10 +76,28 @@ def data_files(path: Path, ending: str) -> list[Path]:
         Of the plain files, such as ``.mcap``.
 
     """
-    plain = {file.name: file for file in path.glob(f'*{ending}') if file.is_file()}
-    packed = [file for file in path.glob(f'*{ending}{SUFFIX}')
-              if file.is_file() and file.name.removesuffix(SUFFIX) not in plain]
-    return sorted([*plain.values(), *packed], key=by_number)
+    names = data_names((file.name for file in path.glob('*') if file.is_file()), ending)
+    return sorted((path / name for name in names), key=by_number)
+
+
+def data_names(names: Iterable[str], endings: str | tuple[str, ...]) -> list[str]:
+    """
+    Return those of the names of files that are data files of a bag, sorted by name.
+
+    Of a file that is there in both forms this is the plain one: a recorder that is killed while
+    it compresses leaves both.
+
+    Parameters
+    ----------
+    names : iterable of str
+        Of files in one folder.
+    endings : str or tuple of str
+        Of the plain files, such as ``.mcap``.
+
+    """
+    found = {name for name in names if name.removesuffix(SUFFIX).endswith(endings)}
+    return sorted(name for name in found
+                  if not name.endswith(SUFFIX) or name.removesuffix(SUFFIX) not in found)
 
 
 def plain_ending(path: Path) -> str:

@@ -28,6 +28,7 @@ from pathlib import Path
 import re
 from typing import NamedTuple
 
+from pam_actuation.bags.directory import data_names
 from pam_actuation.bags.load_joint import joints_of
 from pam_actuation.bags.rig_topics import namespaces
 from pam_actuation.bags.source import Bag, read_bag
@@ -193,11 +194,7 @@ def _bags_below(folder: Path, without: StrPath | None) -> Iterator[Path]:
 
 def _bag_files(names: Sequence[str]) -> list[str]:
     """Return those of the names of files that are recordings by their ending."""
-    found = {name for name in names
-             if name.removesuffix(SUFFIX).endswith(BAG_FILES) and not name.startswith('.')}
-    # Of a file that is there in both forms the plain one is read.
-    return sorted(name for name in found
-                  if not name.endswith(SUFFIX) or name.removesuffix(SUFFIX) not in found)
+    return data_names((name for name in names if not name.startswith('.')), BAG_FILES)
 
 
 def _is_split(name: str, files: Sequence[str]) -> bool:
