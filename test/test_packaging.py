@@ -118,6 +118,13 @@ def test_one_version_everywhere(manifest, setup_keywords):
     assert {manifest.version, setup_keywords['version'], newest} == {pam_actuation.__version__}
 
 
+def test_how_to_cite_says_what_the_manifest_says(manifest):
+    cited = yaml.safe_load((ROOT / 'CITATION.cff').read_text(encoding='utf-8'))
+    assert cited['title'] == manifest.name and cited['license'] == manifest.licenses[0]
+    assert [one['name'] for one in cited['authors']] == [one.name for one in manifest.authors]
+    assert 'version' not in cited       # it would be one more place that a release must change
+
+
 def test_changelog_is_read_by_the_release_tool():
     changelog = get_changelog_from_path(str(ROOT), 'pam_actuation')
     versions = [version for version, date, content in changelog.foreach_version()]
