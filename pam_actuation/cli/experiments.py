@@ -66,8 +66,7 @@ def run(args: argparse.Namespace) -> int | None:
     if args.name is not None:
         one = load_experiment(args.name)
         data = {'schema': 1, 'experiment': {**_summary(args.name, one), **one.to_dict()}}
-        emit(args, data, f'# tracks {TRACKS[one.domain]}, {one.duration_s:g} s\n'
-             f'{one.to_yaml().rstrip()}')
+        emit(args, data, f'# {one.duration_s:g} s, {_followed(one)}\n{one.to_yaml().rstrip()}')
         return EXIT_DONE
     found = {name: load_experiment(name) for name in list_config('experiments')}
     rigs, joints = preset_names(), joint_preset_names()
@@ -90,6 +89,13 @@ def run(args: argparse.Namespace) -> int | None:
 def shorten(line: str, wide: int) -> str:
     """Return a line that fits, cut between two words where it is too long."""
     return line if len(line) <= wide else f'{line[:wide - 2].rpartition(" ")[0]} …'
+
+
+def _followed(one: 'Experiment') -> str:
+    """Return in words what a controller tracks, or what is commanded without one."""
+    if one.asks_for_motion:
+        return f'a controller tracks the {TRACKS[one.domain]}'
+    return f'the {TRACKS[one.domain].strip("- ()")} is commanded, without a controller'
 
 
 def _summary(name: str, one: 'Experiment') -> dict[str, Any]:

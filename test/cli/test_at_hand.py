@@ -94,7 +94,11 @@ def test_experiments_are_listed_with_length_and_what_they_track(capsys):
     assert 'dmsp_5_300_realistic' in found['rigs'] and 'knee_dmsp_20_300' in found['joints']
     assert main(['experiments', 'short_sine']) == 0
     shown = capsys.readouterr().out
+    assert shown.startswith('# 6 s, a controller tracks the contraction\n')
     assert load_experiment(shown).to_dict() == load_experiment('short_sine').to_dict()
+    assert main(['experiments', 'rest']) == 0
+    assert capsys.readouterr().out.startswith(
+        '# 10 s, the pressure is commanded, without a controller\n')
 
 
 @pytest.mark.parametrize('arguments, words', [
