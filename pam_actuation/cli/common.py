@@ -218,13 +218,28 @@ def tell_remarks(args: SimpleNamespace | argparse.Namespace, experiment: 'Experi
     from pam_actuation.drivers.vented import left_remarks
     from pam_actuation.experiments.limits import unknown_remarks
     from pam_sim.idle import idle_remarks
-    remarks = [*experiment.remarks(valve, rig, controller), *unknown_remarks(rig)]
+    remarks = [*_of_no_use(args, experiment, controller),
+               *experiment.remarks(valve, rig, controller), *unknown_remarks(rig)]
     if rig is not None:
         remarks += left_remarks(rig)
     if model is not None and rig is not None:
         remarks += idle_remarks(model, rig)
     say_remarks(args, remarks)
     return remarks
+
+
+def _of_no_use(args: SimpleNamespace | argparse.Namespace, experiment: 'Experiment',
+               controller: Any) -> list[str]:
+    """Return a sentence where options of the controller change nothing."""
+    from pam_actuation.rigging.layouts import NO_CONTROLLER
+    given = [f'--{name}' for name in ('controller', 'rules', 'freeze')
+             if getattr(args, name, None) not in (None, False, NO_CONTROLLER)]
+    if given and not experiment.asks_for_motion:
+        return [f'experiment "{experiment.name}" runs without a controller, so '
+                f'{" and ".join(given)} {"change" if len(given) > 1 else "changes"} nothing']
+    if '--freeze' in given and controller is not None and not controller.learns:
+        return [f'a {controller.kind} controller does not learn, so --freeze changes nothing']
+    return []
 
 
 def say_remarks(args: SimpleNamespace | argparse.Namespace, remarks: 'Iterable[str]') -> None:

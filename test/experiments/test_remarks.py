@@ -18,8 +18,8 @@ import math
 from types import SimpleNamespace
 
 from pam_actuation.bags.info import bag_info
-from pam_actuation.cli.common import tell_remarks
-from pam_actuation.cli.main import main
+from pam_actuation.cli.common import load_setup, tell_remarks
+from pam_actuation.cli.main import build_parser, main
 from pam_actuation.control.config import load_controller
 from pam_actuation.experiments import load_experiment
 from pam_actuation.experiments.limits import unknown_remarks
@@ -99,6 +99,21 @@ def test_it_is_said_before_and_kept_in_the_bag(tmp_path, rig, capsys):
     said = capsys.readouterr()
     assert all(f'remark: {text}' in said.err for text in wanted)
     assert set(bag_info(tmp_path / 'bag').notes) >= {f'{text}.' for text in wanted}
+
+
+@pytest.mark.parametrize('experiment, options, said', [
+    ('rest', ['--controller', 'pid'], 'rest" runs without a controller, so --controller changes'),
+    ('rest', ['--controller', 'sofc_ppr', '--freeze'], '--controller and --freeze change nothing'),
+    ('short_sine', ['--controller', 'pid', '--freeze'], 'a pid controller does not learn'),
+    ('short_sine', ['--controller', 'ilc_ppr', '--freeze'], ''),
+    ('short_sine', ['--freeze'], ''), ('rest', [], '')])
+def test_options_of_a_controller_that_change_nothing_are_told(experiment, options, said, capsys):
+    args = build_parser('simulate').parse_args(['simulate', experiment, *options])
+    args.json = False
+    asked, rig, controller = load_setup(args)
+    tell_remarks(args, asked, 'ppr', rig, controller)
+    printed = capsys.readouterr().err
+    assert said in printed and ('nothing' in printed) == bool(said)
 
 
 def test_nominal_values_of_unknown_numbers_are_said_until_they_are_found(rig):
