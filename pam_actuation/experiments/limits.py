@@ -183,12 +183,14 @@ def _check_force(experiment: 'Experiment', rig: 'Rig', place: str) -> None:
 
 
 def _check_joint(experiment: 'Experiment', joint: 'JointRig | Rig', place: str) -> None:
-    is_joint = isinstance(joint, JointRig)
-    if not isinstance(joint, JointRig) or experiment.domain != 'joint_angle':
+    if not isinstance(joint, JointRig):
         raise InputError(
-            f'is in {experiment.domain}; {joint.name} is '
-            + ('a joint' if is_joint else
-               'a single muscle; name a joint, such as joint_dmsp_5_300_realistic'), place)
+            f'is in {experiment.domain}; {joint.name} is a single muscle; name a joint, such as '
+            'joint_dmsp_5_300_realistic', place)
+    if experiment.domain != 'joint_angle':
+        raise InputError(
+            f'is in {experiment.domain}; {joint.name} is a joint; name an experiment in '
+            'joint_angle, such as joint_sine or knee_sine', place)
     lower, upper = joint.range_rad
     worst = experiment.chain.extremes()
     if worst[0] < lower or worst[1] > upper:

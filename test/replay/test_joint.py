@@ -327,7 +327,8 @@ def test_what_does_not_fit_is_one_sentence(tmp_path, capsys):
     for options, words in (
             (['joint_sine'],
              'is a single muscle; name a joint, such as joint_dmsp_5_300_realistic'),
-            (['sine_quarter_hz', '--rig', 'joint_dmsp_5_300'], 'is a joint')):
+            (['sine_quarter_hz', '--rig', 'joint_dmsp_5_300'],
+             'is a joint; name an experiment in joint_angle, such as joint_sine')):
         assert main(['simulate', *options, '--out', str(tmp_path / 'bag')]) == 2
         assert words in capsys.readouterr().err
     assert not (tmp_path / 'bag').exists()
