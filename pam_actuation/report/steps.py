@@ -141,8 +141,8 @@ def _rests_until(time_s: FloatArray, reference: FloatArray, start_s: float, band
     return left_s if left_s - start_s >= REST_S else end_s
 
 
-def _response(time_s: FloatArray, error: FloatArray, start_s: float, size: float, band: float
-            ) -> StepResponse:
+def _response(time_s: FloatArray, error: FloatArray, start_s: float, size: float,
+              band: float) -> StepResponse:
     if not time_s.size:
         return StepResponse(start_s, size, None, 0.0)
     outside = np.flatnonzero(np.abs(error) > band)
