@@ -39,6 +39,8 @@ EXAMPLE = 'pam gap runs/first --model dmsp_5_300_hanging_mass --certify runs/sec
 SECONDS = 120.0
 SAID_EVERY_S = 10.0             # between two lines on the progress in a log file
 MODEL = 'dmsp_5_300_hanging_mass'
+ANSWERED = 'effects', 'parameter', 'no_gap'       # with them the model can be tuned on
+TUNED = 'tuned.yaml'
 # Options that a question of the other kind needs: here they would change nothing.
 UNUSED = {
     '--explain': ('plan', 'valve', 'no_force', 'certify', 'effects', 'seconds', 'materiality',
@@ -169,7 +171,7 @@ def _next_lines(result: 'GapResult', out: str, runs: 'Sequence[Run]' = (),
     """Return how to use a model without a name, what to measure next and how, if anything."""
     from pathlib import Path
     from pam_actuation.report.gap import next_command, with_term
-    from pam_actuation.report.next_run import simulated
+    from pam_actuation.report.next_run import simulated, tuned_on
     from pam_sim.gap.propose.surrogate import FILE as SURROGATE_FILE
     lines, played = [], simulated(result.model_yaml)
     if result.proposal:
@@ -181,6 +183,9 @@ def _next_lines(result: 'GapResult', out: str, runs: 'Sequence[Run]' = (),
         lines += [f'what to measure next: {result.next_experiment["why"]}',
                   'next: ' + next_command(Path(out) / 'next_experiment.yaml', runs,
                                           Path(out) / 'model.yaml', joint_model)]
+    elif result.verdict in ANSWERED and not result.not_judged and (
+            command := tuned_on(result.model_yaml, Path(out) / 'model.yaml', TUNED)):
+        lines.append(f'next: {command}')
     return lines
 
 

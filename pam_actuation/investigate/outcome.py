@@ -16,7 +16,6 @@
 
 from dataclasses import dataclass
 import os
-import shlex
 import shutil
 from typing import Any, TYPE_CHECKING
 
@@ -24,7 +23,7 @@ from pam_actuation.investigate.decide import (
     ANSWERED, DECLINED, FAILED, IMPOSSIBLE, MINUTES, REFUSED, ROUNDS)
 from pam_actuation.investigate.page import investigation_page
 from pam_actuation.investigate.store import MODEL, OPTIONAL, PAGE, RESULT, Store
-from pam_actuation.report.next_run import is_driven
+from pam_actuation.report.next_run import tuned_on
 from pam_actuation.report.sections.replay import SHOWN
 from pam_sim.files import StrPath, whole_files, write_json, write_text
 from pam_sim.gap.propose.proposal import MODEL_FILE
@@ -113,11 +112,10 @@ class Outcome:
         None without a model, and for a load that does not move freely: no controller of
         contraction can be tuned on it.
         """
-        if not self.has_model or is_driven(self.question['model']):
+        if not self.has_model:
             return None
-        model, tuned = (shlex.quote(os.path.normpath(os.path.join(folder, name)))
-                        for name in (MODEL, TUNED))
-        return f'pam tune --model {model} --out {tuned}'
+        model, tuned = (os.path.normpath(os.path.join(folder, name)) for name in (MODEL, TUNED))
+        return tuned_on(self.question['model'], model, tuned) or None
 
     def text(self, folder: StrPath) -> str:
         """Return the outcome in lines for a person; ``folder`` is that of the investigation."""

@@ -59,6 +59,27 @@ def simulated(model: str) -> str:
     return OF_DRIVEN if is_driven(model) else OF_FREE
 
 
+def tuned_on(model: str, file: StrPath, tuned: StrPath) -> str:
+    """
+    Return the command that tunes a controller on a model, '' where none can be tuned on it.
+
+    That is a load that does not move freely: no controller of contraction works on it.
+
+    Parameters
+    ----------
+    model : str
+        The model as YAML text.
+    file : path
+        Where it is.
+    tuned : path
+        The controller that the command writes.
+
+    """
+    if is_driven(model):
+        return ''
+    return f'pam tune --model {shlex.quote(str(file))} --out {shlex.quote(str(tuned))}'
+
+
 def command_on_rig(runs: 'Sequence[Run]', experiment: StrPath, model: StrPath,
                    name: str = 'next') -> str:
     """

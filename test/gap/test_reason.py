@@ -241,6 +241,16 @@ def test_the_next_experiment_is_told_with_its_command():
     assert command in gap_section(result, command=command).body
 
 
+@pytest.mark.parametrize('verdict, load, told', [
+    ('effects', 'hanging_mass', True), ('parameter', 'hanging_mass', True),
+    ('no_gap', 'hanging_mass', True), ('unknown', 'hanging_mass', False),
+    ('effects', 'driven', False), ('effects', 'isometric', False)])
+def test_an_answer_is_followed_by_a_tuning_where_the_load_moves(verdict, load, told):
+    result = GapResult(verdict, '', model_yaml=load_rig(f'dmsp_5_300_{load}').to_yaml())
+    assert gap_verb._next_lines(result, 'my gap') == [
+        "next: pam tune --model 'my gap/model.yaml' --out tuned.yaml"] * told
+
+
 def test_a_proposed_term_is_told_with_the_command_that_uses_it(monkeypatch):
     result = GapResult('unknown', '')
     result.proposal = object()
