@@ -96,11 +96,8 @@ def _find(args: argparse.Namespace, name: str) -> 'FoundRules':
 
 def _rig(args: argparse.Namespace) -> 'JointRig | Rig':
     """Return the rig or joint that the options name."""
-    from pam_sim import load_rig
-    from pam_sim.joint import load_joint
-    from pam_sim.joint.model_file import joint_preset_names
-    load = load_joint if args.rig in joint_preset_names() else load_rig
-    return load(args.rig, valve=args.valve)
+    from pam_sim.joint import load_rig_or_joint
+    return load_rig_or_joint(args.rig, args.valve)
 
 
 def _terminal() -> tuple[int, bool]:

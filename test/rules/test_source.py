@@ -128,6 +128,13 @@ def test_other_modes_say_what_their_places_are(preset, rig, mode, capsys):
     assert code == 0 and f'not a contraction ({mode})' in shown
 
 
+def test_the_rig_may_be_the_file_of_a_joint(tmp_path, capsys):
+    (tmp_path / 'mine.yaml').write_text(
+        'joint: joint_dmsp_5_300\nparameters: {limb_mass_kg: 0.2}\n')
+    code, shown, _ = pam(capsys, 'sofc_joint_ppr', '--rig', tmp_path / 'mine.yaml')
+    assert code == 0 and 'not a contraction (joint at 300 kPa)' in shown
+
+
 def test_presets_and_controller_files(tmp_path, capsys):
     code, shown, _ = pam(capsys, 'sofc_untuned', '--rig', RIG)
     assert code == 0 and 'No rule has fired yet' in shown
