@@ -25,7 +25,6 @@ from pam_actuation.cli.completion import presets, REGULATOR
 from pam_actuation.cli.options import number, out_path, Parser, source
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
     from contextlib import AbstractContextManager
 
     from pam_actuation.rig_files.description import Description
@@ -43,7 +42,7 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument('action', choices=('new', 'check'),
                         help='new: write a file; check: load one and say what it states')
     parser.add_argument('file', type=source, nargs='?', default=None, metavar='NAME|FILE',
-                        help='the rig to check')
+                        help='the rig or joint to check')
     parser.add_argument('--out', type=out_path, default='my_rig.yaml', metavar='FILE.yaml',
                         help='file to write (default: %(default)s)')
     parser.add_argument('--muscle', type=source, default=None, metavar='NAME',
@@ -108,6 +107,7 @@ def run(args: argparse.Namespace) -> int:
 def _new(args: argparse.Namespace) -> int:
     from pam_actuation.rig_files.force_map import describe_table
     from pam_actuation.rig_files.questions import ask_description
+    from pam_actuation.rig_files.stated import numbers, numbers_text
     from pam_actuation.rig_files.text import rig_file
     from pam_sim.errors import InputError
     from pam_sim.files import write_text
@@ -126,9 +126,9 @@ def _new(args: argparse.Namespace) -> int:
     remarks = list(dict.fromkeys([
         *remarks, *_mass_not_stated(rig, described), *_remarks(rig, args.out)]))
     following = _following(rig, args.out)
-    lines = [f'rig file: {args.out}', *_numbers_text(rig), *_law_text(rig),
+    lines = [f'rig file: {args.out}', *numbers_text(rig), *_law_text(rig),
              *remarks, f'next: {following}']
-    emit(args, {'file': args.out, **_numbers(rig), 'remarks': remarks, 'next': following},
+    emit(args, {'file': args.out, **numbers(rig), 'remarks': remarks, 'next': following},
          '\n'.join(lines))
     return EXIT_DONE
 
@@ -243,16 +243,16 @@ def _one_of(option: str, value: str, allowed: Any) -> str:
     return value
 
 
-def _remarks(rig: 'Rig', path: str) -> list[str]:
-    """Return what a person should know of a rig that a file holds."""
+def _remarks(rig: 'Rig', path: str = '') -> list[str]:
+    """Return what a person should know of a rig; with what its file states for nothing."""
     from pam_actuation.drivers.for_rig import driver_remarks
     from pam_actuation.drivers.vented import left_remarks
     from pam_actuation.rig_files.effects import unstated_valve_data
     from pam_sim.idle import idle_remarks
     from pam_sim.muscle.muscle_remarks import muscle_remarks
     return [*muscle_remarks(rig.muscle, rig.parameters['force_map_gain']), *left_remarks(rig),
-            *idle_remarks(path, rig), *unstated_valve_data(rig), *driver_remarks(rig),
-            *_zeros_known_relatively(rig)]
+            *(idle_remarks(path, rig) if path else ()), *unstated_valve_data(rig),
+            *driver_remarks(rig), *_zeros_known_relatively(rig)]
 
 
 def _mass_not_stated(rig: 'Rig', described: 'Description') -> list[str]:
@@ -277,76 +277,19 @@ def _zeros_known_relatively(rig: 'Rig') -> list[str]:
 
 def _check(args: argparse.Namespace) -> int:
     from pam_actuation.rig_files.by_size import nominal_beside_size
-    from pam_sim import load_rig
-    from pam_sim.rig_text import rig_title
-    rig = load_rig(args.file)
-    remarks = [*nominal_beside_size(rig), *_remarks(rig, args.file)]
-    size = f'muscle of {1e3 * rig.muscle.bore_m:.4g} mm by {1e3 * rig.muscle.length_m:.4g} mm'
-    lines = [rig_title(rig), f'{size}, load {rig.load}, valve {rig.valve}', *_numbers_text(rig),
-             *_exact_text(rig), *_stated_text(rig), *(f'remark: {text}' for text in remarks)]
-    emit(args, {'rig': rig.name, 'load': rig.load, 'valve': rig.valve,
-                'muscle': {'bore_m': rig.muscle.bore_m, 'length_m': rig.muscle.length_m},
-                **_numbers(rig), 'exact': [{'name': p.name, 'unit': p.unit,
-                                            'value': rig.number(p.name)} for p in _exact(rig)],
-                'effects': {one.name: one.parameters for one in rig.effects},
-                'sensors': {p.name: rig.sensors[p.name] for p in _of_sensors(rig)},
-                'remarks': remarks}, '\n'.join(lines))
+    from pam_actuation.rig_files.stated import stated, stated_text
+    from pam_sim.idle import idle_remarks
+    from pam_sim.joint import JointRig, load_rig_or_joint
+    rig = load_rig_or_joint(args.file)
+    if isinstance(rig, JointRig):
+        remarks = [f'{place.rstrip("/")}: {text}' for place, muscle in rig.muscles.items()
+                   for text in (*nominal_beside_size(muscle), *_remarks(muscle))]
+        remarks += idle_remarks(args.file, rig)
+    else:
+        remarks = [*nominal_beside_size(rig), *_remarks(rig, args.file)]
+    emit(args, {**stated(rig), 'remarks': remarks},
+         '\n'.join([*stated_text(rig), *(f'remark: {text}' for text in remarks)]))
     return EXIT_DONE
-
-
-def _numbers(rig: 'Rig') -> dict[str, Any]:
-    """Return the numbers that are not exact, for programs."""
-    return {'unknown': list(rig.unknown), 'about': [
-        {'name': p.name, 'unit': p.unit, 'value': rig.number(p.name),
-         'sd': rig.prior_sd(p.name)} for p in _inexact(rig)]}
-
-
-def _numbers_text(rig: 'Rig') -> list[str]:
-    from pam_sim.units import behind_number
-    lines = [f'  {p.name}: unknown, {p.allowed}' for p in rig.number_list
-             if p.name in rig.unknown]
-    return lines + [
-        f'  {p.name}: {rig.number(p.name):.6g} ± {_short(rig.prior_sd(p.name))}'
-        f'{behind_number(p.unit)}{_as_gauge(rig, p.name)}' for p in _inexact(rig)]
-
-
-def _exact_text(rig: 'Rig') -> list[str]:
-    from pam_sim.units import behind_number
-    return [f'  {p.name}: {rig.number(p.name):.6g}{behind_number(p.unit)}'
-            f'{_as_gauge(rig, p.name)}, exact' for p in _exact(rig)]
-
-
-def _stated_text(rig: 'Rig') -> list[str]:
-    """Return a line on each effect of a rig, and one on what its sensors add."""
-    from pam_sim.effects.registry import effects
-    from pam_sim.units import behind_number
-
-    def said(parameters: 'Sequence[Any]', values: 'Mapping[str, float]') -> str:
-        return ', '.join(f'{p.name} {values[p.name]:.6g}{behind_number(p.unit)}'
-                         for p in parameters)
-    lines = [f'  effect {one.name}: {said(effects()[one.name].parameters, one.parameters)}'
-             for one in rig.effects]
-    added = _of_sensors(rig)
-    return lines + ([f'  sensors: {said(added, rig.sensors)}'] if added else [])
-
-
-def _of_sensors(rig: 'Rig') -> list[Any]:
-    """Return the settings of the sensors that are not nominal."""
-    from pam_sim.sensors import SENSOR_PARAMETERS
-    return [p for p in SENSOR_PARAMETERS if rig.sensors[p.name] != p.default]
-
-
-def _as_gauge(rig: 'Rig', name: str) -> str:
-    """Return the supply pressure once more as people read it; '' for another number."""
-    from pam_sim.units import gauge_kpa
-    return '' if name != 'supply_pa' else (
-        f' absolute ({gauge_kpa(rig.number(name)):.4g} kPa gauge)')
-
-
-def _short(sd: float) -> str:
-    """Return a standard deviation in three digits, without a power of ten where it is large."""
-    text = f'{sd:.3g}'
-    return f'{float(text):.0f}' if 'e+' in text else text
 
 
 def _law_text(rig: 'Rig') -> list[str]:
@@ -355,23 +298,3 @@ def _law_text(rig: 'Rig') -> list[str]:
         return []
     return ['  force law: its shape is exact, that of another muscle; with --unknown law it is '
             'found as well']
-
-
-def _of_this_valve(rig: 'Rig') -> list[Any]:
-    """Return the parameters of a rig without those of the other kind of valve."""
-    from pam_sim.valve import hsv, ppr
-    other = {p.name for p in (hsv if rig.valve == 'ppr' else ppr).PARAMETERS}
-    return [p for p in rig.number_list if p.name not in other]
-
-
-def _inexact(rig: 'Rig') -> list[Any]:
-    """Return the parameters of rig and valve that are neither unknown nor exact."""
-    return [p for p in _of_this_valve(rig) if p.name in rig.tolerance
-            and p.name not in rig.unknown and rig.prior_sd(p.name) > 0.0]
-
-
-def _exact(rig: 'Rig') -> list[Any]:
-    """Return the exact numbers of muscle, load and valve."""
-    from pam_sim.sensors import ZEROS
-    known = {p.name for p in (*_inexact(rig), *ZEROS, *rig.law_list)}
-    return [p for p in _of_this_valve(rig) if p.name not in known and p.name not in rig.unknown]

@@ -409,58 +409,6 @@ def test_the_next_command_works(capsys):
         assert "--rig 'my rig.yaml'" in capsys.readouterr().out
 
 
-def test_check_tells_what_is_unknown_and_how_well_the_rest_is_known(capsys):
-    new('--unknown', 'mass_kg', '--about', 'pressure_zero_pa=0±500')
-    capsys.readouterr()
-    assert main(['rig', 'check', 'made.yaml', '--json']) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told['unknown'] == ['mass_kg']
-    assert {'name': 'pressure_zero_pa', 'unit': 'Pa', 'value': 0.0, 'sd': 500.0} in told['about']
-    assert main(['rig', 'check', 'made.yaml']) == 0
-    printed = capsys.readouterr().out
-    assert 'mass_kg: unknown, 0.1 to 500 kg' in printed
-    assert 'force_map_gain: 1 ± 0.15\n' in printed and '± 2000 Pa/V\n' in printed
-    assert main(['rig', 'check']) == 2 and main(['rig', 'check', 'none.yaml']) == 2
-
-
-def test_check_shows_effects_and_sensors_with_their_numbers(folder, capsys):
-    (folder / 'pair.yaml').write_text(
-        'muscle: dmsp_20_300\nload: hanging_mass\nvalve: hsv\neffects:\n'
-        '  - {name: valve_dead_zone, parameters: {open_time_s: 0.0017, close_time_s: 0.002}}\n'
-        '  - {name: vent_asymmetry, parameters: {ratio_minus_1: -0.25}}\n'
-        'sensors: {pressure_noise_pa: 300.0}\n')
-    assert main(['rig', 'check', 'pair.yaml']) == 0
-    printed = capsys.readouterr().out
-    assert 'open_time_s 0.0017 s, close_time_s 0.002 s' in printed
-    assert '  effect vent_asymmetry: ratio_minus_1 -0.25\n' in printed
-    assert '  sensors: pressure_noise_pa 300 Pa\n' in printed
-    assert main(['rig', 'check', 'pair.yaml', '--json']) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told['effects']['valve_dead_zone']['close_time_s'] == 0.002
-    assert told['sensors'] == {'pressure_noise_pa': 300.0}
-
-
-def test_check_shows_what_is_exact_and_the_supply_as_gauge_too(folder, capsys):
-    (folder / 'slip.yaml').write_text(
-        'muscle: dmsp_10_250\nload: hanging_mass\nvalve: hsv\nparameters: {mass_kg: 4.0, '
-        'spring_n_per_m: 0.8, supply_pa: 600000.0}\ntolerance: {mass_kg: 0.0}\n')
-    assert main(['rig', 'check', 'slip.yaml']) == 0
-    printed = capsys.readouterr().out
-    assert 'muscle of 10 mm by 250 mm, load hanging_mass, valve hsv\n' in printed
-    assert '  mass_kg: 4 kg, exact\n' in printed and 'spring_n_per_m: 0.8 N/m, exact' in printed
-    assert 'supply_pa: 600000 ± 3000 Pa absolute (498.7 kPa gauge)\n' in printed
-    assert main(['rig', 'check', 'slip.yaml', '--json']) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert {'name': 'mass_kg', 'unit': 'kg', 'value': 4.0} in told['exact']
-    assert told['muscle'] == {'bore_m': 0.01, 'length_m': 0.25}
-    (folder / 'zero.yaml').write_text(
-        'rig: dmsp_5_300_hanging_mass\ntolerance: {pressure_zero_pa: 0.05, mass_kg: 0.05}\n')
-    assert main(['rig', 'check', 'zero.yaml']) == 0
-    printed = capsys.readouterr().out
-    assert '`pressure_zero_pa` is 0, and a tolerance of 0.05 is relative' in printed
-    assert '`mass_kg`' not in printed
-
-
 def test_questions_come_again_until_the_answer_is_possible():
     answers = iter(['dsmp', 'own', '5', '200', '', 'hanging_mass', '-1', 'unknown', '300±100',
                     'ppr', 'smc_itv1050', '0-10', '0:10', '', '200', '', ''])
