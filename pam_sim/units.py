@@ -60,6 +60,11 @@ def behind_number(unit: str) -> str:
     return '' if unit == '-' else f' {unit}'
 
 
+def often(count: int) -> str:
+    """Return how often something was, in words: ``never``, ``once``, ``3 times``."""
+    return {0: 'never', 1: 'once'}.get(count, f'{count} times')
+
+
 def allowed_range(lower: float, upper: float, unit: str = '', name: str = '') -> str:
     """
     Return a range in words, in the unit that is to be written: ``0.1 to 500 kg``.

@@ -30,6 +30,7 @@ from typing import Any
 from pam_actuation.messages import LEVEL_ERROR, Status
 from pam_sim.files import StrPath, write_text
 from pam_sim.joint.parameters import SIDES
+from pam_sim.units import often
 
 PLANNED, REACHED, ENDED, BECAUSE, VENTS = (
     'planned_length_s', 'reached_length_s', 'ended', 'ended_because', 'vented_meanwhile')
@@ -178,8 +179,8 @@ class EndWatch:
         found = []
         for name, vents in sorted(self._vents.items()):
             first_s, _, why = vents[0]
-            often = 'once' if len(vents) == 1 else f'{len(vents)} times'
-            found.append(f'{name} vented {often}, {sum(one[1] for one in vents):.1f} s in all, '
+            found.append(f'{name} vented {often(len(vents))}, '
+                         f'{sum(one[1] for one in vents):.1f} s in all, '
                          f'first at {first_s:.1f} s: {why}')
         return '; '.join(found)
 

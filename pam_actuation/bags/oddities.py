@@ -29,6 +29,7 @@ from pam_actuation.topics.table import BY_NAME, short_name
 from pam_sim.annotations import BoolArray, FloatArray, IntArray
 from pam_sim.run import Run
 from pam_sim.silence import silences
+from pam_sim.units import often
 
 # Messages of two senders, or of two threads, overtake each other by less.
 USUAL_BACK_S = 0.1
@@ -91,7 +92,7 @@ class Oddities:
         if backward:
             most_s = -1e-9 * float(steps_ns.min())
             (self.remarks if most_s > USUAL_BACK_S else self.notes).append(
-                f'{name}: the stamp goes back {backward} times, by up to {most_s:.3g} s; sorted '
+                f'{name}: the stamp goes back {often(backward)}, by up to {most_s:.3g} s; sorted '
                 'by stamp.')
         return backward > 0
 
@@ -139,7 +140,7 @@ def silent_remarks(heard: Mapping[str, IntArray]) -> list[str]:
                  for begin, end in silences(time_ns, end_ns)
                  if begin < last_ns or 1e-9 * (end - begin) > usual_end_s]
         if found:
-            more = f' and {len(found) - _MOST_SILENT} times more' * (len(found) > _MOST_SILENT)
+            more = f' and {often(len(found) - _MOST_SILENT)} more' * (len(found) > _MOST_SILENT)
             remarks.append(f'{name}: no value that can be used {", ".join(found[:_MOST_SILENT])}'
                            f'{more}, while others go on.')
     return remarks

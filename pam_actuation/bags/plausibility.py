@@ -26,7 +26,7 @@ from pam_actuation.topics.table import (
     BY_NAME, NEEDED, OF_A_RUN, OFTEN_EMPTY, RECORDED, RECORDED_OF_JOINT, short_name, Topic, USED)
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.muscle.geometry import MOST_STRAIN
-from pam_sim.units import allowed_range, gauge_kpa, P_ATM_PA
+from pam_sim.units import allowed_range, gauge_kpa, often, P_ATM_PA
 
 if TYPE_CHECKING:
     from pam_actuation.bags.topic_info import TopicInfo
@@ -243,7 +243,7 @@ def _time_remarks(info: 'TopicInfo', stamp_ns: IntArray, received_ns: IntArray) 
     name, row = info.name, BY_NAME.get(short_name(info.name))
     steady = row is not None and row.steady
     if info.stamps_backward:
-        remarks.append(f'{name}: the header stamp goes back {info.stamps_backward} times.')
+        remarks.append(f'{name}: the header stamp goes back {often(info.stamps_backward)}.')
     if info.stamps_repeated:
         remarks.append(f'{name}: {info.stamps_repeated} messages repeat a header stamp.')
     if steady and info.rate_hz is not None and info.rate_hz < (

@@ -21,6 +21,7 @@ import numpy as np
 from pam_actuation.tables.table import Table
 from pam_sim.annotations import IntArray
 from pam_sim.errors import InputError
+from pam_sim.units import often
 
 LATE_S = 1.0                # messages overtake one another by less; a recording begins anew
 MOST_CHANGES = 4            # from part to part in order of time, for each step back
@@ -103,7 +104,7 @@ def in_order(table: Table, read: Times, sort: bool = False, part: int = 0) -> Cl
                 0 < len(begins) < MOST_PARTS) else 'Split it here'
             raise InputError(
                 f'the time runs back by {(stamps[row - 1] - stamps[row]) * 1e-9:g} s '
-                f'({len(back)} times in all); two recordings in one file? {parts}, or add '
+                f'({often(len(back))} in all); two recordings in one file? {parts}, or add '
                 '--sort to put the rows in order', table.place(int(rows[row])))
         order = np.argsort(stamps, kind='stable')
         stamps, rows = stamps[order], rows[order]

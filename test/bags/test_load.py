@@ -213,7 +213,7 @@ def test_stamps_out_of_order_are_sorted_stably_and_said(tmp_path):
     one = run.topics['pressure']
     assert list(one.stamp_ns) == [0, 1, 1, 2, 3]
     assert list(one.values['pressure_pa'] - 2e5) == [0, 2, 3, 1, 4]
-    assert any('goes back 1 times' in note for note in run.notes)
+    assert any('goes back once' in note for note in run.notes)
     assert any('1 messages repeat' in note for note in run.notes)
     assert not run.remarks      # two senders overtake each other by so little
 

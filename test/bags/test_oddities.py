@@ -39,7 +39,7 @@ PRESSURE, CONTRACTION = '/muscle/pressure', '/muscle/contraction'
 # What is done to the pressure, the sentence and whether messages are lost.
 SPOILED = {
     'damaged': ('messages are not sensor_msgs/msg/FluidPressure, left out', True),
-    'stepped': (f'{PRESSURE}: the stamp goes back 1 times, by up to 5', False),
+    'stepped': (f'{PRESSURE}: the stamp goes back once, by up to 5', False),
     'unstamped': (f'{PRESSURE}: no message has a header stamp', False)}
 
 
@@ -137,7 +137,7 @@ def test_what_is_harmless_is_no_remark(tmp_path):
     run = load_run(write_bag(tmp_path / 'bag', 20, change=change))
     assert recording_remarks([run]) == []
     assert [one.partition(': ')[2] for one in run.notes] == [
-        'the stamp goes back 1 times, by up to 0.005 s; sorted by stamp.',
+        'the stamp goes back once, by up to 0.005 s; sorted by stamp.',
         '1 messages repeat the stamp before, kept.']
     assert np.all(np.diff(run['pressure'].stamp_ns) >= 0)
 

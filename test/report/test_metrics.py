@@ -14,6 +14,7 @@
 
 """Figures of merit on runs whose figures are known."""
 
+from dataclasses import replace
 import json
 
 import numpy as np
@@ -388,3 +389,13 @@ def test_roll_backs_are_counted_within_a_run():
     assert metrics.run_metrics(run).times_rolled_back == 4
     assert ('Rules rolled back', '4 times') in [
         (name, cell(metrics.run_metrics(run))) for name, cell in metrics_table._ROWS]
+
+
+@pytest.mark.parametrize('count, words', [(0, 'never'), (1, 'once'), (4, '4 times')])
+def test_how_often_is_told_in_words(count, words):
+    found = replace(metrics.run_metrics(tracking_run(SPOILED_M)), times_rolled_back=count,
+                    interruptions=(count, 0.25 * count))
+    cells = {name: cell(found) for name, cell in metrics_table._ROWS}
+    assert cells['Rules rolled back'] == words
+    (told,) = [cell for name, cell in cells.items() if name.startswith('Vented')]
+    assert told == (f'{words}, {0.25 * count:.2f} s in all' if count else 'never')

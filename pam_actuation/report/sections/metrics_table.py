@@ -21,7 +21,7 @@ from pam_actuation.report.errors import by_part
 from pam_actuation.report.page import paragraph, Section, signed, table
 from pam_actuation.report.steps import settling_text
 from pam_sim.annotations import FloatArray
-from pam_sim.units import RHO_REFERENCE
+from pam_sim.units import often, RHO_REFERENCE
 
 if TYPE_CHECKING:
     from pam_actuation.report.errors import Cycles
@@ -116,13 +116,13 @@ def interrupted_text(m: 'RunMetrics | JointMetrics') -> str | None:
     if m.interruptions is None:
         return None
     count, seconds = m.interruptions
-    return 'never' if not count else f'{count} times, {seconds:.2f} s in all'
+    return f'{often(count)}, {seconds:.2f} s in all' if count else often(0)
 
 
 def rolled_back_text(m: 'RunMetrics | JointMetrics') -> str | None:
     """Return in words how often rules were taken back; None where it does not tell."""
     count = m.times_rolled_back
-    return None if count is None else f'{count} times' if count else 'never'
+    return None if count is None else often(count)
 
 
 def told_of_learning(named: 'Sequence[tuple[str, RunMetrics | JointMetrics]]') -> str:
