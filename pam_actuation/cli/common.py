@@ -231,10 +231,11 @@ def tell_remarks(args: SimpleNamespace | argparse.Namespace, experiment: 'Experi
 def _of_no_use(args: SimpleNamespace | argparse.Namespace, experiment: 'Experiment',
                controller: Any) -> list[str]:
     """Return a sentence where options of the controller change nothing."""
-    from pam_actuation.rigging.layouts import NO_CONTROLLER
-    given = [f'--{name}' for name in ('controller', 'rules', 'freeze')
-             if getattr(args, name, None) not in (None, False, NO_CONTROLLER)]
+    given = [f'--{name}' for name in ('controller', 'rules', 'freeze') if getattr(args, name, '')]
     if given and not experiment.asks_for_motion:
+        from pam_actuation.rigging.layouts import NO_CONTROLLER
+        if getattr(args, 'controller', '') == NO_CONTROLLER:        # it asks for what happens
+            return []
         return [f'experiment "{experiment.name}" runs without a controller, so '
                 f'{" and ".join(given)} {"change" if len(given) > 1 else "changes"} nothing']
     if '--freeze' in given and controller is not None and not controller.learns:
