@@ -27,6 +27,7 @@ from pam_sim.records import cells, fields, zeros
 from pam_sim.rollout import kernel
 from pam_sim.rollout.layout import INPUT, OUTPUT, PARAMETERS, STATE
 from pam_sim.rollout.simulate import told_by_own_file
+from pam_sim.shared_memory import SharedMemory
 
 if TYPE_CHECKING:
     from pam_sim.rig import Rig
@@ -37,9 +38,11 @@ def all_finite(row: FloatArray) -> bool:
     return math.isfinite(row.dot(row))      # beyond 1e154 nothing is physical either
 
 
-class Plant:
+class Plant(SharedMemory):
     """
     A rig that is stepped from outside; its steps equal those of ``Rig.simulate`` to the bit.
+
+    ``copy.deepcopy`` gives one that goes on from the same state by itself.
 
     Parameters
     ----------

@@ -26,13 +26,14 @@ from pam_actuation.control.static_inverse import inverse_to_mapping
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.records import zeros
+from pam_sim.shared_memory import SharedMemory
 from pam_sim.units import P_ATM_PA
 
 if TYPE_CHECKING:
     from pam_actuation.control.sofc.rule_table import RuleBase
 
 
-class CompiledController:
+class CompiledController(SharedMemory):
     """
     A control law as a class: owner of the arrays its compiled step works on.
 

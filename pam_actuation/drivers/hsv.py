@@ -27,6 +27,7 @@ from pam_actuation.drivers.hsv_model import STATE
 from pam_actuation.drivers.unmoved import SWALLOWED
 from pam_sim.annotations import FloatArray
 from pam_sim.records import cells, fields, zeros
+from pam_sim.shared_memory import SharedMemory
 from pam_sim.units import P_ATM_PA
 
 
@@ -43,7 +44,7 @@ def initial_state() -> FloatArray:
     return state
 
 
-class HsvLaw:
+class HsvLaw(SharedMemory):
     """The law as an object: ``step`` each PWM period, ``hold`` for imposed duties."""
 
     def __init__(self, config: HsvConfig | None = None) -> None:

@@ -32,6 +32,7 @@ from pam_sim.annotations import FloatArray
 from pam_sim.compiled import compiled, entry_point
 from pam_sim.parameters import check_parameters
 from pam_sim.records import cells, record, values_of, zeros
+from pam_sim.shared_memory import SharedMemory
 from pam_sim.units import P_ATM_PA
 from pam_sim.valve.ppr import MAX_VOLTAGE_V, PARAMETERS as OF_THE_RIG
 
@@ -145,7 +146,7 @@ class PprConfig:
             'highest_v': self.highest_v, 'largest_change_v': slew})
 
 
-class PprLaw:
+class PprLaw(SharedMemory):
     """The law as an object: ``step`` for each tick, ``force`` for an imposed signal."""
 
     def __init__(self, config: PprConfig | None = None) -> None:

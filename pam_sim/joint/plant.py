@@ -28,6 +28,7 @@ from pam_sim.joint.statics import told_by_own_file_of
 from pam_sim.joint.step import Arrays
 from pam_sim.plant import all_finite, Plant
 from pam_sim.records import cells, zeros
+from pam_sim.shared_memory import SharedMemory
 
 if TYPE_CHECKING:
     from pam_sim.joint.rig import JointRig
@@ -47,9 +48,11 @@ class JointMuscle(Plant):
         return self.state, self.par, self._inp, self._out
 
 
-class JointPlant:
+class JointPlant(SharedMemory):
     """
     A joint that is stepped from outside; its steps equal those of ``JointRig.simulate``.
+
+    ``copy.deepcopy`` gives one that goes on from the same state by itself.
 
     Parameters
     ----------

@@ -23,6 +23,7 @@ from pam_actuation.control.modes.tracked import Tracked
 from pam_actuation.control.sofc.rule_table import RuleBase
 from pam_actuation.control.static_inverse import static_inverse
 from pam_sim.annotations import FloatArray
+from pam_sim.shared_memory import SharedMemory
 from pam_sim.units import P_ATM_PA
 
 
@@ -36,7 +37,7 @@ def in_mode(rig_name: str, mode: str) -> str:
     return rig_name if rig_name.endswith(f'/{mode}') else f'{rig_name}/{mode}'
 
 
-class WrappedLaw:
+class WrappedLaw(SharedMemory):
     """
     What all modes share: the law is inside, rules and learning are its own.
 

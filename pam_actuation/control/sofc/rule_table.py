@@ -43,6 +43,7 @@ from pam_actuation.control.sofc.rule_text import NAMES, save_rules
 from pam_actuation.control.sofc.words import FADING
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import compiled
+from pam_sim.shared_memory import SharedMemory
 from pam_sim.short_repr import short_repr
 
 # Feedback, feed-forward, motion and path rules.
@@ -158,7 +159,7 @@ def _not_given() -> FloatArray:
 
 @short_repr
 @dataclass
-class RuleBase:
+class RuleBase(SharedMemory):
     """
     The rules of one controller, what they were at first, and how often they fired.
 
