@@ -32,8 +32,8 @@ from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.tuning.cost import tracking_cost
 from pam_actuation.tuning.loop_parts import DISTURBANCE, Driver
 from pam_actuation.tuning.loop_setup import (
-    DriverLaw, first_periodic_tick, fresh_rise, learning_mask, Learns, PHYSICS_S,
-    sensor_noise, steps_per_tick)
+    check_seed, Course, DriverLaw, first_periodic_tick, fresh_rise, latency_steps,
+    learning_mask, Learns, PHYSICS_S, sampled, sensor_noise, steps_per_tick)
 from pam_actuation.tuning.sampled_reference import SampledReference
 from pam_actuation.tuning.tracking_errors import Cycles, TrackingErrors
 from pam_sim.annotations import FloatArray
@@ -52,8 +52,6 @@ if TYPE_CHECKING:
 # The module with ``KIND_rollout``, the compiled loop of a law.
 ROLLOUTS = {'sofc': 'rollouts', 'pid': 'rollouts', 'lqi': 'rollouts',
             'ilc': 'baseline_rollouts', 'mpc': 'baseline_rollouts'}
-
-Course = Callable[[float], float]        # of the time [s]
 
 
 @short_repr
@@ -109,9 +107,9 @@ class MuscleLoop:
         Seed of the sensor noise.
     rate_hz : float
         Controller rate; a whole number of physics steps per period.
-    latency_s : float
-        From the measurement to the new valve signal, below one period (transport and
-        scheduling of the live nodes).
+    latency_s : float, optional
+        From the measurement to the new valve signal, in whole milliseconds below one period. By
+        default 0.003 as of the live nodes (transport and scheduling), or the longest that fits.
     external_force_n : callable or None
         Force [N] against contraction as a function of time [s]; by default the disturbance of
         the experiment.
@@ -129,14 +127,15 @@ class MuscleLoop:
     Raises
     ------
     InputError
-        The experiment is not in contraction, or the rate does not fit the physics step.
+        The experiment is not in contraction, the rate does not fit the physics step, or a seed,
+        latency, preview, force or supply pressure is not what is allowed.
 
     """
 
     DOMAIN: str
 
     def __init__(self, rig: 'Rig', experiment: 'Experiment', seed: int = 0, rate_hz: float = 200.0,
-                 latency_s: float = 0.003, external_force_n: Course | None = None,
+                 latency_s: float | None = None, external_force_n: Course | None = None,
                  driver: 'DriverConfig | None' = None, supply_pa: Course | None = None,
                  preview_s: float = math.inf, slow_start: bool = False) -> None:
         self._arguments = (
@@ -147,6 +146,7 @@ class MuscleLoop:
                 f'experiment {experiment.name} is in {experiment.domain}; this loop tracks '
                 f'{self.DOMAIN}')
         steps = steps_per_tick(rate_hz)
+        check_seed(seed)
         self.rig = rig
         self.rate_hz = rate_hz
         self.experiment = experiment
@@ -165,12 +165,14 @@ class MuscleLoop:
         disturbances['supply_pa'] = rig.parameters['supply_pa']
         if external_force_n is None and experiment.disturbance:
             external_force_n = experiment.external_force_n
-        for name, course in (('external_force_n', external_force_n), ('supply_pa', supply_pa)):
+        times_s = [k * (1.0 / rate_hz) for k in range(self.ticks)]
+        for name, course, lowest in (('external_force_n', external_force_n, -math.inf),
+                                     ('supply_pa', supply_pa, 0.0)):
             if course is not None:
-                disturbances[name] = [course(k * (1.0 / rate_hz)) for k in range(self.ticks)]
+                disturbances[name] = sampled(course, times_s, name, lowest)
         fields(self._state, layout.STATE).supply_pa = disturbances['supply_pa'][0]
         self._driver = DriverLaw(rig, driver or driver_config(rig), rate_hz)
-        self._steps = steps, min(int(round(latency_s / PHYSICS_S)), steps - 1)
+        self._steps = steps, latency_steps(latency_s, steps)
 
     @property
     def reference_m(self) -> FloatArray:

@@ -24,8 +24,8 @@ import numpy as np
 import numpy.typing as npt
 from pam_actuation.control.modes.force import FORCE_INPUT
 from pam_actuation.control.modes.tracked import FORCE, Tracked, tracked_by
-from pam_actuation.tuning.closed_loop import Course, MuscleLoop
-from pam_actuation.tuning.loop_setup import fresh_rise, learning_mask, Learns
+from pam_actuation.tuning.closed_loop import MuscleLoop
+from pam_actuation.tuning.loop_setup import Course, fresh_rise, learning_mask, Learns
 from pam_actuation.tuning.mode_result import ModeResult
 from pam_sim.errors import InputError
 from pam_sim.load import LOADS

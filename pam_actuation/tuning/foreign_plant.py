@@ -29,9 +29,9 @@ import numpy.typing as npt
 from pam_actuation.control.following import FOLLOWS, LESS
 from pam_actuation.drivers import hsv_kernel, hsv_model, ppr
 from pam_actuation.slow_rise import SlowRise
-from pam_actuation.tuning.closed_loop import ClosedLoop, Course
+from pam_actuation.tuning.closed_loop import ClosedLoop
 from pam_actuation.tuning.loop_parts import DISTURBANCE, READINGS, WANTED
-from pam_actuation.tuning.loop_setup import learning_mask, Learns, PHYSICS_S
+from pam_actuation.tuning.loop_setup import Course, learning_mask, Learns, PHYSICS_S
 from pam_sim.annotations import FloatArray
 from pam_sim.declared import shown
 from pam_sim.errors import InputError

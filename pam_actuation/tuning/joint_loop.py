@@ -27,13 +27,12 @@ import numpy.typing as npt
 from pam_actuation.control.modes.joint import COMMANDS, JOINT_INPUT
 from pam_actuation.control.modes.tracked import JOINT
 from pam_actuation.drivers.for_rig import driver_config
-from pam_actuation.tuning.closed_loop import Course
 from pam_actuation.tuning.cost import tracking_cost
 from pam_actuation.tuning.force_loop import check_controller
 from pam_actuation.tuning.loop_parts import Driver, JOINT_READINGS, READINGS
 from pam_actuation.tuning.loop_setup import (
-    DriverLaw, first_periodic_tick, fresh_rise, learning_mask, Learns, PHYSICS_S,
-    sensor_noise, steps_per_tick)
+    check_seed, Course, DriverLaw, first_periodic_tick, fresh_rise, latency_steps,
+    learning_mask, Learns, PHYSICS_S, sampled, sensor_noise, steps_per_tick)
 from pam_actuation.tuning.mode_result import ModeResult
 from pam_actuation.tuning.sampled_reference import SampledReference
 from pam_sim.annotations import FloatArray
@@ -63,8 +62,8 @@ class JointLoop:
         Seed of the sensor noise.
     rate_hz : float
         Controller rate; a whole number of milliseconds per period.
-    latency_s : float
-        From the measurement to the new valve signals, below one period.
+    latency_s : float, optional
+        From the measurement to the new valve signals; as of ``closed_loop.MuscleLoop``.
     external_torque_n_m : callable or None
         Torque [N m] on the limb, flexion positive, as a function of time [s].
     angle_noise_rad, angle_step_rad : float
@@ -80,13 +79,13 @@ class JointLoop:
     Raises
     ------
     InputError
-        The experiment is in something else, leaves the range of the joint, or the rate does
-        not fit.
+        The experiment is in something else, leaves the range of the joint, the rate does
+        not fit, or a seed, latency, preview or torque is not what is allowed.
 
     """
 
     def __init__(self, joint: 'JointRig', experiment: 'Experiment', seed: int = 0,
-                 rate_hz: float = 200.0, latency_s: float = 0.003,
+                 rate_hz: float = 200.0, latency_s: float | None = None,
                  external_torque_n_m: Course | None = None,
                  angle_noise_rad: float = ANGLE_NOISE_RAD, angle_step_rad: float = ANGLE_STEP_RAD,
                  drivers: 'Sequence[DriverConfig] | None' = None,
@@ -97,6 +96,7 @@ class JointLoop:
                 f'{JOINT.topic}')
         experiment.check_reachable(joint)
         steps = steps_per_tick(rate_hz)
+        check_seed(seed)
         self.joint, self.experiment, self.rate_hz = joint, experiment, rate_hz
         self.slow_start = slow_start
         self._reference = SampledReference(experiment, rate_hz, preview_s)
@@ -114,14 +114,15 @@ class JointLoop:
                 steps_of[f'{side}_{name}'] = fields(step, READINGS)[name]
         self._torque = np.zeros(self.ticks)
         if external_torque_n_m is not None:
-            self._torque[:] = [external_torque_n_m(k / rate_hz) for k in range(self.ticks)]
+            self._torque[:] = sampled(external_torque_n_m, [
+                k / rate_hz for k in range(self.ticks)], 'external_torque_n_m')
         self._arguments = (joint, experiment, seed, rate_hz, latency_s, external_torque_n_m,
                            angle_noise_rad, angle_step_rad, drivers, preview_s, slow_start)
         configs = drivers or [driver_config(rig) for rig in sides.values()]
         self._drivers = [DriverLaw(rig, config, rate_hz)
                          for rig, config in zip(sides.values(), configs)]
         self._plant = joint.plant(dt_s=PHYSICS_S)
-        self._steps = steps, min(int(round(latency_s / PHYSICS_S)), steps - 1)
+        self._steps = steps, latency_steps(latency_s, steps)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle what it is made of: a cluster gets kilobytes, not the arrays."""

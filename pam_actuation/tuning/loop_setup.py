@@ -14,8 +14,9 @@
 
 """What a closed loop gets: timing, reference, sensor noise, where rules learn, driver laws."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,6 +27,7 @@ from pam_actuation.drivers.hsv_config import check_pulses
 from pam_actuation.slow_rise import LONGEST_STEP_S
 from pam_actuation.tuning.loop_parts import Driver, READINGS, RISE
 from pam_sim.annotations import FloatArray
+from pam_sim.declared import shown
 from pam_sim.errors import InputError
 from pam_sim.records import fields, zeros
 from pam_sim.units import P_ATM_PA
@@ -37,6 +39,7 @@ if TYPE_CHECKING:
     from pam_sim.rig import Rig
 
 PHYSICS_S = 0.001
+LATENCY_S = 0.003           # of the live nodes
 _PERIOD = 'hsv.period_s'
 # Noise and step of a sensor, by what it reads.
 _SENSORS = {'pressure_pa': ('pressure_noise_pa', 'pressure_step_pa'),
@@ -44,6 +47,7 @@ _SENSORS = {'pressure_pa': ('pressure_noise_pa', 'pressure_step_pa'),
             'force_n': ('force_noise_n', 'force_step_n')}
 
 Learns = bool | Callable[[float], bool]       # whether, or a function of the time [s]
+Course = Callable[[float], float]             # of the time [s]
 
 
 def steps_per_tick(rate_hz: float) -> int:
@@ -56,7 +60,7 @@ def steps_per_tick(rate_hz: float) -> int:
         It is no whole number.
 
     """
-    steps = round(1.0 / (rate_hz * PHYSICS_S))
+    steps = round(1.0 / (rate_hz * PHYSICS_S)) if rate_hz > 0.0 else 0
     if steps < 1 or abs(steps * PHYSICS_S * rate_hz - 1.0) > 1e-9:
         second = round(1.0 / PHYSICS_S)
         rates = [rate for rate in range(20, second + 1) if second % rate == 0]
@@ -64,6 +68,67 @@ def steps_per_tick(rate_hz: float) -> int:
             f'is {rate_hz:g} Hz; a rollout needs a whole number of {PHYSICS_S * 1e3:g} ms steps '
             f'in a period, such as {", ".join(map(str, rates))} Hz', 'rate_hz')
     return steps
+
+
+def latency_steps(latency_s: float | None, steps: int) -> int:
+    """
+    Return the physics steps from a measurement to the new valve signal.
+
+    Parameters
+    ----------
+    latency_s : float or None
+        Latency [s]. None is that of the live nodes, or the longest that fits.
+    steps : int
+        Physics steps in a controller period.
+
+    Raises
+    ------
+    InputError
+        It is below 0, or not below one period.
+
+    """
+    period_s = steps * PHYSICS_S
+    if latency_s is None:
+        latency_s = min(LATENCY_S, period_s - PHYSICS_S)
+    elif not 0.0 <= latency_s < period_s:
+        raise InputError(
+            f'is {latency_s:g} s; allowed is 0 to less than the period of the controller, '
+            f'{period_s:g} s', 'latency_s')
+    return min(round(latency_s / PHYSICS_S), steps - 1)
+
+
+def check_seed(seed: int) -> None:
+    """Raise InputError for a seed that is no whole number from 0 on."""
+    if not isinstance(seed, (int, np.integer)) or seed < 0:
+        raise InputError(f'is {seed!r}; a whole number, 0 or more, is needed', 'seed')
+
+
+def sampled(course: Course, times_s: Sequence[float], name: str,
+            lowest: float = -math.inf) -> FloatArray:
+    """
+    Return the values of a function of time at N times, shape (N,).
+
+    Raises
+    ------
+    InputError
+        It is no function, or a value is no finite number or below ``lowest``.
+
+    """
+    if not callable(course):
+        raise InputError(f'is {shown(course)}; give a function of the time [s], such as '
+                         f'`lambda time_s: {shown(course)}`', name)
+    values = np.empty(len(times_s))
+    for place, time_s in enumerate(times_s):
+        value = course(time_s)
+        try:
+            values[place] = value
+        except (TypeError, ValueError):
+            values[place] = math.nan
+        if not lowest <= values[place] < math.inf:
+            raise InputError(f'is {shown(value)} at {time_s:g} s; a finite number'
+                             + (f' from {lowest:g} on' if lowest > -math.inf else '')
+                             + ' is needed', name)
+    return values
 
 
 def fresh_rise(slow_start: bool, rate_hz: float) -> FloatArray:

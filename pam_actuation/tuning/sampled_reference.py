@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pam_actuation.tuning.loop_parts import WANTED
 from pam_sim.annotations import FloatArray
+from pam_sim.errors import InputError
 from pam_sim.records import size_of
 
 if TYPE_CHECKING:
@@ -46,10 +47,17 @@ class SampledReference:
     ticks : int
         Length of the experiment.
 
+    Raises
+    ------
+    InputError
+        A preview that is no number from 0 on.
+
     """
 
     def __init__(self, experiment: 'Experiment', rate_hz: float,
                  preview_s: float = math.inf) -> None:
+        if not preview_s >= 0.0:
+            raise InputError(f'is {preview_s:g} s; allowed is 0 or more', 'preview_s')
         self.ticks = int(round(experiment.duration_s * rate_hz))
         self._rate_hz = rate_hz
         self._known_ticks = preview_s * rate_hz

@@ -173,3 +173,35 @@ def test_what_cannot_be_run_is_refused(loop):
         ClosedLoop(loop.rig, loop.experiment, rate_hz=170.0)
     with pytest.raises(InputError, match='contraction'):
         ClosedLoop(loop.rig, load_experiment('pressure_identification'))
+
+
+@pytest.mark.parametrize('wrong, told', [
+    ({'latency_s': 0.01}, r'latency_s: is 0.01 s; allowed is 0 to less than .* 0.005 s'),
+    ({'latency_s': -0.001}, 'latency_s: is -0.001 s'),
+    ({'latency_s': np.nan}, 'latency_s: is nan s'),
+    ({'preview_s': -0.1}, 'preview_s: is -0.1 s; allowed is 0 or more'),
+    ({'preview_s': np.nan}, 'preview_s: is nan s'),
+    ({'rate_hz': 0.0}, 'rate_hz: is 0 Hz'),
+    ({'rate_hz': np.nan}, 'rate_hz: is nan Hz'),
+    ({'seed': -1}, 'seed: is -1; a whole number, 0 or more'),
+    ({'seed': 1.5}, 'seed: is 1.5'),
+    ({'external_force_n': 5.0}, 'external_force_n: is 5.0; give a function of the time'),
+    ({'external_force_n': lambda time_s: np.nan if time_s > 1.0 else 0.0},
+     'external_force_n: is nan at 1.005 s; a finite number is needed'),
+    ({'external_force_n': lambda time_s: None}, 'external_force_n: is None at 0 s'),
+    ({'supply_pa': lambda time_s: -1.0}, 'supply_pa: is -1.0 at 0 s; a finite number from 0 on'),
+])
+def test_timing_noise_and_courses_that_cannot_be_are_refused_by_name(loop, wrong, told):
+    with pytest.raises(InputError, match=told):
+        ClosedLoop(loop.rig, loop.experiment, **wrong)
+
+
+def test_the_latency_is_that_of_the_live_nodes_or_the_longest_that_fits(loop):
+    rig, short = loop.rig, load_experiment(STEPS)
+    runs = [ClosedLoop(rig, short, latency_s=latency_s).run(controller_of(loop)).contraction_m
+            for latency_s in (None, 0.003, 0.0)]
+    assert (runs[0] == runs[1]).all()
+    assert (runs[0] != runs[2]).any()
+    ClosedLoop(rig, short, rate_hz=1000.0)
+    with pytest.raises(InputError, match='less than .* 0.001 s'):
+        ClosedLoop(rig, short, rate_hz=1000.0, latency_s=0.003)
