@@ -82,6 +82,11 @@ class Series:
         Stamp of ``time_s`` = 0. A run sets it to its own start, the same for all its topics;
         without a run it is the first stamp.
 
+    Raises
+    ------
+    InputError
+        Stamps that are no whole numbers, such as seconds; a field with another number of samples.
+
     """
 
     stamp_ns: IntArray
@@ -89,6 +94,20 @@ class Series:
     unit: dict[str, str] = field(default_factory=dict)
     start_ns: int | None = field(default=None, compare=False)
     held: bool | None = field(default=None, compare=False)
+
+    def __post_init__(self) -> None:
+        """Refuse what is no series."""
+        stamp_ns = np.asarray(self.stamp_ns)
+        if stamp_ns.ndim != 1 or stamp_ns.size and stamp_ns.dtype.kind not in 'iu':
+            raise InputError(
+                f'has shape {stamp_ns.shape} and type {stamp_ns.dtype}; whole nanoseconds in one '
+                'row are needed; `np.round(1e9 * time_s).astype(np.int64)` makes them of seconds',
+                'stamp_ns')
+        self.stamp_ns = stamp_ns.astype(np.int64, copy=False)
+        for name, samples in self.values.items():
+            if np.shape(samples) != self.stamp_ns.shape:
+                raise InputError(f'has shape {np.shape(samples)}; one number for each of '
+                                 f'{len(self)} stamps is needed', name)
 
     def __len__(self) -> int:
         """Return the number of messages."""
@@ -222,10 +241,11 @@ class Run:
         """
         Resample topics on one common time grid.
 
-        Measurements are interpolated linearly; commands, references and
-        controller states are held, however long. Before its first message a
-        held signal has its first value. Of several messages with one stamp the
-        first counts, of a held signal the last.
+        Measurements are interpolated linearly, and NaN before their first and
+        after their last message. Commands, references and controller states are
+        held, however long. Before its first message a held signal has its first
+        value. Of several messages with one stamp the first counts, of a held
+        signal the last.
 
         Parameters
         ----------
@@ -233,7 +253,7 @@ class Run:
             Grid step, s.
         start_ns, end_ns : int, optional
             Ends of the grid; by default the span common to ``topics``.
-        topics : iterable of str, optional
+        topics : str or iterable of str, optional
             Which topics; all with messages by default.
         max_gap_s : float, optional
             Measurements are NaN on the grid between two messages further apart
@@ -250,9 +270,10 @@ class Run:
             the grid would have no or too many points.
 
         """
-        if not dt_s > 0.0:
+        if not 0.0 < dt_s < np.inf:
             raise InputError(f'a grid step of {dt_s} s; give one above 0', 'dt_s')
-        names = list(topics) if topics is not None else [n for n in self.topics if n in self]
+        names = ([n for n in self.topics if n in self] if topics is None
+                 else [topics] if isinstance(topics, str) else list(topics))
         series = {name: self.require(name) for name in names}
         if not series:
             raise InputError('has no messages', self.path)
@@ -289,7 +310,7 @@ class Run:
 
         Parameters
         ----------
-        topics : collection of str, optional
+        topics : str or collection of str, optional
             Short names; all with messages by default.
 
         Raises
@@ -306,8 +327,9 @@ class Run:
                 else max(series, key=ends_ns.__getitem__))
 
     def _chosen(self, topics: Collection[str] | None) -> dict[str, Series]:
+        names = [topics] if isinstance(topics, str) else topics
         series = {name: self.require(name)
-                  for name in topics or [name for name in self.topics if name in self]}
+                  for name in names or [name for name in self.topics if name in self]}
         if not series:
             raise InputError('has no messages', self.path or 'run')
         return series
@@ -326,7 +348,7 @@ class Run:
             Rows at equal distances, as ``on_grid``, from and to ``ends_of_table``. By default
             there is a row for each stamp of any topic, and NaN where a topic has no message at
             that stamp. A held value is NaN after a long silence of its topic, as of ``silences``.
-        topics : collection of str, optional
+        topics : str or collection of str, optional
             Short names; all with messages by default.
 
         Raises
@@ -429,6 +451,8 @@ def _interpolated(
     first = np.append(True, np.diff(stamp_s) > 0.0)
     stamp_s, samples = stamp_s[first], samples[first]
     values = np.interp(time_s, stamp_s, samples)
+    # A nanosecond of slack: the first and the last message may lie on grid points.
+    values[(time_s < stamp_s[0] - 1e-9) | (time_s > stamp_s[-1] + 1e-9)] = np.nan
     if max_gap_s is not None:
         for i in np.flatnonzero(np.diff(stamp_s) > max_gap_s):
             # The two messages at its ends are there, with the same slack.

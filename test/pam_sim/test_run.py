@@ -83,6 +83,7 @@ def test_of_repeated_stamps_a_held_signal_takes_the_last():
 
 @pytest.mark.parametrize('wanted, said', [
     ({'dt_s': 0.0}, 'dt_s: a grid step of 0.0 s'), ({'dt_s': float('nan')}, 'grid step of nan'),
+    ({'dt_s': float('inf')}, 'grid step of inf'),
     ({'dt_s': 1e-9}, 'a grid of 490000001 points'),
     ({'start_ns': 0, 'end_ns': 2**62}, 'at most 100000000')])
 def test_impossible_grids_are_refused(wanted, said):
@@ -105,3 +106,30 @@ def test_topics_without_common_time_are_refused():
     late = Series(run.topics['pressure'].stamp_ns + 10**12, run.topics['pressure'].values)
     with pytest.raises(InputError, match='common time'):
         Run({'a': run.topics['pressure'], 'b': late}).on_grid()
+
+
+def test_a_measurement_is_nan_outside_its_messages():
+    run = make_run()
+    begin_ns = run.start_ns
+    grid = run.on_grid(0.001, begin_ns - 10_000_000, run.end_ns + 10_000_000)
+    pressure, valve = grid['pressure', 'pressure_pa'], grid['valve_signal', 'ppr_voltage']
+    assert list(np.flatnonzero(np.isnan(pressure))) == [*range(10), *range(506, 516)]
+    assert pressure[10] == 1e5 and pressure[505] == pytest.approx(1e5 + 990.0)
+    assert valve[0] == 0.0 and valve[-1] == pytest.approx(4.9)
+
+
+def test_one_topic_may_be_given_by_its_name():
+    run = make_run()
+    assert list(run.on_grid(topics='pressure').values) == ['pressure']
+    for frame in (run.to_dataframe(topics='pressure'), run.to_dataframe(100.0, 'pressure')):
+        assert list(frame) == ['stamp_ns', 'time_s', 'pressure.pressure_pa']
+
+
+def test_stamps_in_seconds_and_fields_of_another_length_are_refused():
+    for wrong in ([0.0, 0.01, 0.02], [0.0, 1e9, np.nan], np.zeros((3, 1), int)):
+        with pytest.raises(InputError, match=r'stamp_ns: .*whole nanoseconds .*np.round\(1e9'):
+            Series(wrong, {'pressure_pa': np.ones(3)})
+    with pytest.raises(InputError, match=r'force_n: has shape \(2,\); .* each of 3 stamps'):
+        Series(np.arange(3), {'force_n': np.ones(2)})
+    assert Series([0, 10**9], {'force_n': np.ones(2)}).stamp_ns.dtype == np.int64
+    assert Series(np.array([]), {'force_n': np.array([])}).stamp_ns.dtype == np.int64
