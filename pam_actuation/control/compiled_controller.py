@@ -16,7 +16,7 @@
 
 from collections.abc import Callable, Mapping
 import math
-from typing import Any, TYPE_CHECKING
+from typing import Any, TYPE_CHECKING, TypeVar
 
 import numpy as np
 from pam_actuation.control.controller_text import controller_to_yaml
@@ -31,6 +31,8 @@ from pam_sim.units import P_ATM_PA
 
 if TYPE_CHECKING:
     from pam_actuation.control.sofc.rule_table import RuleBase
+
+_Law = TypeVar('_Law', bound='CompiledController')
 
 
 class CompiledController(SharedMemory):
@@ -164,10 +166,12 @@ class CompiledController(SharedMemory):
         """
         Return a fresh controller of the same law and rig with other settings.
 
+        It asks the same of the driver, see ``driver``.
+
         Parameters
         ----------
         settings : mapping of str
-            All settings.
+            Those to change, the others stay.
         rules : RuleBase, optional
             Rules to start from; by default its own, where the settings leave them their meaning.
 
@@ -179,6 +183,12 @@ class CompiledController(SharedMemory):
         """
         raise InputError(f'a {self.kind} controller takes no other settings; `with_settings` of '
                          f'{type(self).__name__} is to be written', 'controller')
+
+    def _hand_on(self, fresh: _Law) -> _Law:
+        """Return a fresh controller with what this one is made for and asks of the driver."""
+        fresh.made_for, fresh.driver = self.made_for, self.driver
+        fresh.other_rig, fresh.other_valve = self.other_rig, self.other_valve
+        return fresh
 
     def learning_reason(self) -> str:
         """Return in words whether the last tick learned, or why not."""

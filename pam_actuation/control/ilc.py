@@ -337,7 +337,8 @@ class IlcController(FixedLawController):
     def with_settings(self, settings: Mapping[str, object], rules: 'RuleBase | None' = None
                       ) -> 'IlcController':
         """Return a fresh controller with other settings; see ``CompiledController``."""
-        return IlcController(self.static_inverse, settings, self.rig_name)
+        return self._hand_on(IlcController(
+            self.static_inverse, {**self.settings, **settings}, self.rig_name))
 
     def learning_reason(self) -> str:
         """Return in words whether the last tick learned, or why not."""

@@ -272,7 +272,8 @@ class LqiController(FixedLawController):
     def with_settings(self, settings: Mapping[str, object], rules: 'RuleBase | None' = None
                       ) -> 'LqiController':
         """Return a fresh controller with other settings; see ``CompiledController``."""
-        return LqiController(self.model, settings, self.rig_name)
+        return self._hand_on(LqiController(
+            self.model, {**self.settings, **settings}, self.rig_name))
 
     def file_entries(self) -> dict[str, object]:
         """Return linear model and gains; an LQI controller has no static inverse."""

@@ -332,7 +332,8 @@ class MpcController(FixedLawController):
     def with_settings(self, settings: Mapping[str, object], rules: 'RuleBase | None' = None
                       ) -> 'MpcController':
         """Return a fresh controller with other settings; see ``CompiledController``."""
-        return MpcController(self.model, self.static_inverse, settings, self.rig_name)
+        return self._hand_on(MpcController(
+            self.model, self.static_inverse, {**self.settings, **settings}, self.rig_name))
 
     def file_entries(self) -> dict[str, object]:
         """Return linear model, gains and static inverse."""

@@ -245,4 +245,5 @@ class PidController(FixedLawController):
     def with_settings(self, settings: Mapping[str, object], rules: 'RuleBase | None' = None
                       ) -> 'PidController':
         """Return a fresh controller with other settings; see ``CompiledController``."""
-        return PidController(self.static_inverse, settings, self.rig_name)
+        return self._hand_on(PidController(
+            self.static_inverse, {**self.settings, **settings}, self.rig_name))

@@ -22,7 +22,8 @@ from pam_actuation.control.config import load_controller
 from pam_actuation.control.laws import LAWS
 from pam_actuation.control.pid import PidController, SETTINGS as PID_SETTINGS
 from pam_actuation.control.sofc.settings import SETTINGS as SOFC_SETTINGS
-from pam_actuation.tuning.closed_loop import _rollout_of, ROLLOUTS
+from pam_actuation.experiments import load_experiment
+from pam_actuation.tuning.closed_loop import _rollout_of, ClosedLoop, ROLLOUTS
 from pam_actuation.tuning.problem import rebuild
 from pam_actuation.tuning.space import AXES_OF, default_axes
 from pam_sim import load_rig
@@ -163,6 +164,24 @@ def test_a_law_without_axes_or_loop_is_refused_in_a_sentence():
         default_axes(controller)
     with pytest.raises(InputError, match='no compiled loop of a relay controller'):
         _rollout_of('relay')
+
+
+@pytest.mark.parametrize('name', ['pid', 'lqi', 'ilc_ppr', 'mpc_ppr', 'sofc_ppr'])
+def test_with_settings_changes_those_that_are_named(name):
+    controller = load_controller(name, load_rig('dmsp_5_300_realistic'))
+    assert controller.with_settings({}).settings == controller.settings
+    changed = controller.with_settings({'max_pressure_gauge_pa': 4e5})
+    assert changed.settings == {**controller.settings, 'max_pressure_gauge_pa': 4e5}
+    assert changed.made_for == controller.made_for is not None
+
+
+def test_other_settings_ask_the_same_of_the_driver():
+    rig = load_rig('dmsp_5_300_realistic', valve='hsv')
+    controller = load_controller('sofc_model_hsv', rig)
+    loop = ClosedLoop(rig, load_experiment('short_sine'))
+    fresh = controller.with_settings({})
+    assert fresh.driver == controller.driver and fresh.driver
+    assert loop.cost(fresh) == loop.cost(controller)
 
 
 def test_a_law_without_with_settings_is_refused_in_a_sentence(monkeypatch):
