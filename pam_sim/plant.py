@@ -22,11 +22,13 @@ from typing import Any, TYPE_CHECKING
 
 import numpy as np
 from pam_sim.annotations import FloatArray
+from pam_sim.declared import shown
 from pam_sim.errors import InputError
+from pam_sim.load import LOADS
 from pam_sim.records import cells, fields, zeros
 from pam_sim.rollout import kernel
 from pam_sim.rollout.layout import INPUT, OUTPUT, PARAMETERS, STATE
-from pam_sim.rollout.simulate import told_by_own_file
+from pam_sim.rollout.simulate import STRAIN_RANGE, told_by_own_file
 from pam_sim.shared_memory import SharedMemory
 
 if TYPE_CHECKING:
@@ -36,6 +38,12 @@ if TYPE_CHECKING:
 def all_finite(row: FloatArray) -> bool:
     """Return whether all numbers are finite; in a third of the time of ``np.isfinite``."""
     return math.isfinite(row.dot(row))      # beyond 1e154 nothing is physical either
+
+
+def check_steps(steps: int) -> None:
+    """Raise InputError for a count of steps that is no whole number from 1 on."""
+    if not isinstance(steps, (int, np.integer)) or steps < 1:
+        raise InputError(f'is {shown(steps)}; a whole number, 1 or more, is needed', 'steps')
 
 
 class Plant(SharedMemory):
@@ -87,22 +95,25 @@ class Plant(SharedMemory):
         Parameters
         ----------
         signal : float or sequence of float
-            PPR: voltage [V] (or a tuple of it); HSV: (fill duty, vent duty), 0..1.
+            PPR: voltage [V] (or a tuple of it); HSV: (fill duty, vent duty), 0..1. What is
+            beyond the range of the valve acts as the end of it.
         external_force_n : float
             Force on the load, N, against contraction positive.
         contraction_m : float, optional
-            Contraction at the end of the step for a driven load, m; held if not given.
+            Contraction at the end of the step for a driven or isometric load, m; held if not
+            given.
         steps : int
             How many, 1 or more; faster than as many calls, with the same numbers.
 
         Raises
         ------
         InputError
-            The number of signals does not fit the valve, or a number is not finite, given
-            or computed.
+            The number of signals does not fit the valve, a contraction is none of the muscle or
+            of a load that moves freely, ``steps`` is no whole number from 1 on, or a number is
+            not finite, given or computed.
 
         """
-        self._take(signal, external_force_n, contraction_m)
+        self._take(signal, external_force_n, contraction_m, steps)
         for _ in range(steps):
             self._kernel.step(self.state, self.par, self._inp, self._out)
         self._check()
@@ -119,7 +130,7 @@ class Plant(SharedMemory):
         ndarray, shape (steps, size of ``layout.OUTPUT``)
 
         """
-        self._take(signal, external_force_n, contraction_m)
+        self._take(signal, external_force_n, contraction_m, steps)
         inputs = np.empty((steps, len(self._inp)))
         inputs[:] = self._inp
         outputs = np.empty((steps + 1, len(self._out)))
@@ -129,8 +140,11 @@ class Plant(SharedMemory):
         return outputs[1:]
 
     def _take(self, signal: float | Sequence[float], external_force_n: float,
-              contraction_m: float | None) -> None:
+              contraction_m: float | None, steps: int) -> None:
         """Set the inputs of the next steps."""
+        check_steps(steps)
+        if contraction_m is not None:
+            self._check_contraction(contraction_m)
         values = tuple(signal) if hasattr(signal, '__iter__') else (signal,)
         if len(values) != len(self._signal):
             raise InputError(f'valve `{self.rig.valve}` takes {len(self._signal)} numbers, got '
@@ -142,6 +156,16 @@ class Plant(SharedMemory):
             self._given.contraction_m[...] = contraction_m
         if not all_finite(self._inp):
             raise InputError('is not finite', 'valve signal, force or contraction')
+
+    def _check_contraction(self, contraction_m: float) -> None:
+        """Refuse what is no contraction of this muscle, as ``Rig.simulate`` does."""
+        if LOADS[self.rig.load].MOVES_FREELY:
+            raise InputError(f'load `{self.rig.load}` moves freely; use a driven rig',
+                             'contraction_m')
+        low, high = (share * self.rig.muscle.length_m for share in STRAIN_RANGE)
+        if not low <= contraction_m <= high:
+            raise InputError(f'is {contraction_m:g}; allowed {low:g} to {high:g} m',
+                             'contraction_m')
 
     def _check(self) -> None:
         """Refuse outputs that are not finite."""

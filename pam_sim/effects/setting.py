@@ -18,11 +18,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TYPE_CHECKING
 
+from pam_sim.declared import shown
 from pam_sim.effects.registry import get_effect
 from pam_sim.errors import InputError
 
 if TYPE_CHECKING:
     from pam_sim.rig import Rig
+
+FORM = "write `[{'name': NAME, 'parameters': {NUMBER: VALUE}}]`"
 
 
 @dataclass(frozen=True)
@@ -52,12 +55,14 @@ class EffectSetting:
         Raises
         ------
         InputError
-            Unknown effect or parameter, value out of bounds.
+            Unknown effect or parameter, value out of bounds, or nothing of this kind.
 
         """
         if isinstance(item, str):
             item = {'name': item}
         if not isinstance(item, EffectSetting):
+            if not isinstance(item, Mapping) or not isinstance(item.get('name'), str):
+                raise InputError(f'has {shown(item)}; {FORM}', 'effects')
             item = cls(item['name'], item.get('parameters') or {}, dict(item.get('source') or {}))
         return cls(item.name, get_effect(item.name).values(item.parameters), dict(item.source))
 
@@ -70,9 +75,11 @@ def settings_of(items: Iterable[EffectSetting | Mapping[str, Any] | str],
     Raises
     ------
     InputError
-        As of ``EffectSetting.of``, or an effect is listed twice.
+        As of ``EffectSetting.of``, no list, or an effect is listed twice.
 
     """
+    if isinstance(items, (str, Mapping)):
+        raise InputError(f'is {shown(items)}; a list is needed: {FORM}', 'effects')
     kept = {id(setting): setting for setting in checked}
     settings = [kept.get(id(item)) or EffectSetting.of(item) for item in items]
     seen = set()

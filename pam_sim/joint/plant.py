@@ -26,7 +26,7 @@ from pam_sim.joint.packing import pack_joint
 from pam_sim.joint.parameters import SIDES
 from pam_sim.joint.statics import told_by_own_file_of
 from pam_sim.joint.step import Arrays
-from pam_sim.plant import all_finite, Plant
+from pam_sim.plant import all_finite, check_steps, Plant
 from pam_sim.records import cells, zeros
 from pam_sim.shared_memory import SharedMemory
 
@@ -39,6 +39,11 @@ class JointMuscle(Plant):
 
     def step(self, signal: float | Sequence[float], external_force_n: float = 0.0,
              contraction_m: float | None = None, steps: int = 1) -> None:
+        """Refuse: the joint prescribes the contraction."""
+        raise InputError('is stepped by its joint', self.rig.name)
+
+    def roll(self, signal: float | Sequence[float], external_force_n: float = 0.0,
+             contraction_m: float | None = None, steps: int = 1) -> FloatArray:
         """Refuse: the joint prescribes the contraction."""
         raise InputError('is stepped by its joint', self.rig.name)
 
@@ -123,10 +128,11 @@ class JointPlant(SharedMemory):
         Raises
         ------
         InputError
-            The number of signals does not fit the valve, or a number is not finite, given
-            or computed.
+            The number of signals does not fit the valve, ``steps`` is no whole number from 1 on,
+            or a number is not finite, given or computed.
 
         """
+        check_steps(steps)
         sent = []
         for side, signal in (('flexor', flexor_signal), ('extensor', extensor_signal)):
             values = tuple(signal) if isinstance(signal, Iterable) else (signal,)

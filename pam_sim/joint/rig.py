@@ -17,8 +17,8 @@
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from pam_sim.annotations import FloatArray, Number
-
+from numpy.typing import ArrayLike
+from pam_sim.annotations import Number
 from pam_sim.effects.registry import get_effect
 from pam_sim.errors import InputError
 from pam_sim.joint.parameters import NAME, PARAMETERS, SIDES
@@ -191,8 +191,8 @@ class JointRig:
                                           extensor_pressure_pa)) / (2.0 * step)
 
     # -- dynamics --------------------------------------------------------------------------
-    def simulate(self, flexor_signal: FloatArray, extensor_signal: FloatArray,
-                 external_torque_n_m: FloatArray | None = None, dt_s: float = 0.001,
+    def simulate(self, flexor_signal: ArrayLike, extensor_signal: ArrayLike,
+                 external_torque_n_m: ArrayLike | None = None, dt_s: float = 0.001,
                  **initial: float) -> 'JointResponse':
         """
         Simulate with recorded or made-up inputs, each held from sample i to i + 1.

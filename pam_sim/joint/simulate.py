@@ -17,7 +17,9 @@
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pam_sim.annotations import FloatArray
+from pam_sim.declared import shown
 from pam_sim.errors import InputError
 from pam_sim.joint import kernel, layout
 from pam_sim.joint.parameters import SIDES
@@ -32,8 +34,8 @@ if TYPE_CHECKING:
 MAX_TORQUE_N_M = 1e4
 
 
-def simulate_joint(joint: 'JointRig', flexor_signal: FloatArray, extensor_signal: FloatArray,
-                   external_torque_n_m: FloatArray | None, dt_s: float,
+def simulate_joint(joint: 'JointRig', flexor_signal: ArrayLike, extensor_signal: ArrayLike,
+                   external_torque_n_m: ArrayLike | None, dt_s: float,
                    initial: dict[str, Any]) -> JointResponse:
     """Return the JointResponse; arguments and errors as of ``JointRig.simulate``."""
     inputs = input_array(joint, flexor_signal, extensor_signal, external_torque_n_m)
@@ -52,8 +54,8 @@ def simulate_joint(joint: 'JointRig', flexor_signal: FloatArray, extensor_signal
     return JointResponse(*rows)
 
 
-def input_array(joint: 'JointRig', flexor_signal: FloatArray, extensor_signal: FloatArray,
-                external_torque_n_m: FloatArray | None = None) -> FloatArray:
+def input_array(joint: 'JointRig', flexor_signal: ArrayLike, extensor_signal: ArrayLike,
+                external_torque_n_m: ArrayLike | None = None) -> FloatArray:
     """
     Return the inputs of a rollout, N rows of ``INPUT``; arguments as of ``JointRig.simulate``.
 
@@ -81,7 +83,11 @@ def input_array(joint: 'JointRig', flexor_signal: FloatArray, extensor_signal: F
         for field in ('signal_0', 'signal_1'):
             given[f'{side}_{field}'] = columns(one, muscle.INPUT)[field]
     if external_torque_n_m is not None:
-        torque = np.asarray(external_torque_n_m, dtype=float)
+        try:
+            torque = np.asarray(external_torque_n_m, dtype=float)
+        except (TypeError, ValueError):
+            raise InputError(f'is no array of numbers: {shown(external_torque_n_m)}',
+                             'external_torque_n_m') from None
         if torque.ndim != 0 and torque.shape != (len(inputs),):
             raise InputError(f'has shape {torque.shape}; one number or {len(inputs)} expected',
                              'external_torque_n_m')

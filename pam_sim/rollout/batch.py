@@ -21,7 +21,7 @@ simulated. A run does not depend on the others: results equal those of ``Rig.sim
 in order, with any number of workers.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 import os
@@ -31,6 +31,7 @@ from typing import Any, TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 from pam_sim.annotations import FloatArray
+from pam_sim.declared import shown
 from pam_sim.errors import InputError
 from pam_sim.records import size_of
 from pam_sim.response import COLUMNS, Response
@@ -88,7 +89,7 @@ AllMeasured = Sequence[Measured] | Sequence[Sequence[Measured]]
 
 def simulate_batch(rigs: 'Rig | list[Rig] | tuple[Rig, ...]',
                    records: Record | list[Record] | tuple[Record, ...], workers: int | None = None,
-                   keep: Sequence[str] | None = None, every: int = 1,
+                   keep: str | Sequence[str] | None = None, every: int = 1,
                    spread: Spread | None = None) -> list[Response]:
     """
     Simulate many runs.
@@ -102,7 +103,7 @@ def simulate_batch(rigs: 'Rig | list[Rig] | tuple[Rig, ...]',
         the other. For every rig on every record, pair them with ``itertools.product``.
     workers : int, optional
         Threads; by default one per core this process may use.
-    keep : sequence of str, optional
+    keep : str or sequence of str, optional
         Signals of the Response to keep, for instance ``('pressure_pa', 'force_n')``;
         all by default.
     every : int
@@ -120,10 +121,11 @@ def simulate_batch(rigs: 'Rig | list[Rig] | tuple[Rig, ...]',
     ------
     InputError
         As of ``Rig.simulate``, with the number of the run, counted from 0; numbers of
-        rigs and records that do not fit; an unknown signal; ``every`` or ``workers`` that is
-        no whole number from 1 on.
+        rigs and records that do not fit, or something else in place of one; an unknown
+        signal; ``every`` or ``workers`` that is no whole number from 1 on.
 
     """
+    keep = (keep,) if isinstance(keep, str) else keep
     names = tuple(COLUMNS) if keep is None else tuple(keep)
     for name in names:
         if name not in COLUMNS:
@@ -248,8 +250,14 @@ def _pairs(
         rigs: 'Rig | list[Rig] | tuple[Rig, ...]',
         records: Record | list[Record] | tuple[Record, ...]) -> 'list[tuple[Rig, Record]]':
     """Return the (rig, record) of every run."""
-    rigs = list(rigs) if isinstance(rigs, (list, tuple)) else [rigs]
-    records = list(records) if isinstance(records, (list, tuple)) else [records]
+    from pam_sim.rig import Rig
+    rigs = list(rigs) if isinstance(rigs, Iterable) else [rigs]
+    records = list(records) if isinstance(records, Iterable) else [records]
+    for given, kind, name in ((rigs, Rig, 'rigs'), (records, Record, 'records')):
+        for one in given:
+            if not isinstance(one, kind):
+                raise InputError(
+                    f'has {shown(one)}; a {kind.__name__} is needed for each run', name)
     count = max(len(rigs), len(records))
     if min(len(rigs), len(records)) == 0 or {len(rigs), len(records)} - {1, count}:
         raise InputError(f'{len(rigs)} rigs and {len(records)} records; equal numbers or one of '

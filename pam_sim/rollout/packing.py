@@ -15,12 +15,13 @@
 """Turn a rig into the arrays of the kernel."""
 
 import math
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import interpreted
+from pam_sim.declared import shown
 from pam_sim.effects.effect import Numbers
 from pam_sim.effects.registry import all_effects, own_files
 from pam_sim.errors import InputError
@@ -91,6 +92,7 @@ def _pack_effects(rig: 'Rig', numbers: Numbers, state: FloatArray, par: FloatArr
 def _numbers(rig: 'Rig', dt_s: float, pressure: float, contraction: float | None,
              signal: ArrayLike | None) -> Numbers:
     value = rig.parameters
+    dt_s, pressure = _number(dt_s, 'dt_s'), _number(pressure, 'initial_pressure_pa')
     for name, number, lower, upper, unit in (
             ('dt_s', dt_s, 1e-6, 0.02, 's'),
             ('initial_pressure_pa', pressure, 0.5 * P_ATM_PA, 2e6, 'Pa absolute')):
@@ -98,6 +100,7 @@ def _numbers(rig: 'Rig', dt_s: float, pressure: float, contraction: float | None
             raise InputError(f'`{name}` is {number:g}; allowed {lower:g} to {upper:g} {unit}')
     if contraction is None:
         contraction = value.get('contraction_m', 0.0)
+    contraction = _number(contraction, 'initial_contraction_m')
     top = rig.muscle.stroke_m
     moves = LOADS[rig.load].MOVES_FREELY
     if not (0.0 <= contraction <= top if moves else math.isfinite(contraction)):
@@ -106,7 +109,10 @@ def _numbers(rig: 'Rig', dt_s: float, pressure: float, contraction: float | None
         signal = ((ppr.voltage_v(pressure - P_ATM_PA, value),) if rig.valve == 'ppr'
                   else (0.0, 0.0))
     else:
-        signal = np.atleast_1d(np.asarray(signal, dtype=float))
+        try:
+            signal = np.atleast_1d(np.asarray(signal, dtype=float))
+        except (TypeError, ValueError):
+            raise InputError(f'`initial_signal` is no array of numbers: {shown(signal)}') from None
         lower, upper, unit = rig.signal_range
         if signal.shape != (len(rig.signal_names),):
             raise InputError(f'`initial_signal` has {signal.size} numbers; valve `{rig.valve}` '
@@ -120,6 +126,14 @@ def _numbers(rig: 'Rig', dt_s: float, pressure: float, contraction: float | None
         rig.fidelity if rig.valve == 'hsv' else 'averaged',
         {**value, 'p_atm': P_ATM_PA}, tuple(map(float, signal)),
         float(pressure), float(contraction), rig.force_at_start_n(contraction), rig.muscle)
+
+
+def _number(value: Any, name: str) -> float:
+    """Return a number; refuse what is none."""
+    try:
+        return float(value + 0.0)
+    except (TypeError, ValueError):
+        raise InputError(f'`{name}` is {shown(value)}; a number is needed') from None
 
 
 def damping_of_effects(rig: 'Rig') -> float:

@@ -103,6 +103,8 @@ def test_mistakes_in_a_call():
             ('flexor_signal: has shape', lambda: joint.simulate(np.zeros((10, 2)), ten)),
             ('extensor_signal: has 9 samples', lambda: joint.simulate(ten, ten[1:])),
             ('external_torque_n_m: has shape', lambda: joint.simulate(ten, ten, ten[1:])),
+            ("external_torque_n_m: is no array of numbers: 'x'",
+             lambda: joint.simulate(ten, ten, 'x')),
             ('external_torque_n_m: is nan at sample 0; allowed -10000 to 10000 N m',
              lambda: joint.simulate(ten, ten, np.nan)),
             ('extensor_signal: ppr_voltage is inf at sample 0; allowed -1 to 12 V',

@@ -97,7 +97,10 @@ def test_live_joint_refuses_what_does_not_fit():
         plant.step((0.0, 0.0), 3.0)
     with pytest.raises(InputError, match='not finite'):
         plant.step((0.0, 0.0), (np.nan, 0.0))
-    with pytest.raises(InputError, match='stepped by its joint'):
-        plant.flexor.step((0.0, 0.0))
+    for alone in (plant.flexor.step, plant.flexor.roll):
+        with pytest.raises(InputError, match='stepped by its joint'):
+            alone((0.0, 0.0))
+    with pytest.raises(InputError, match='steps: is 0; a whole number, 1 or more'):
+        plant.step((0.0, 0.0), (0.0, 0.0), steps=0)
     plant.step((0.1, 0.0), (0.0, 0.0))
     assert np.all(np.isfinite(plant.outputs))

@@ -139,11 +139,24 @@ def test_a_mistake_names_its_run_whatever_the_workers():
         assert caught.value.where == 'run 5: ppr_voltage'
 
 
+def test_rigs_may_come_one_by_one_and_one_signal_by_its_name():
+    record = ppr_records()[0]
+    runs = simulate_batch((rig for rig in rigs()), record, keep='force_n')
+    for run, rig in zip(runs, rigs(), strict=True):
+        whole = simulate_batch(rig, record)[0]
+        assert list(run.as_dict()) == ['force_n']
+        assert (run.force_n == whole.force_n).all()
+
+
 @pytest.mark.parametrize('make, words', [
     (lambda: simulate_batch(rigs(), ppr_records()[:2]), '3 rigs and 2 records'),
     (lambda: simulate_batch([], ppr_records()), '0 rigs'),
     (lambda: simulate_batch(rigs(), ppr_records(), keep=('speed',)), '`speed` is no signal'),
     (lambda: simulate_batch(rigs(), ppr_records(), every=0), 'every: is 0'),
+    (lambda: simulate_batch(rigs(), [[4.0] * 10]),
+     r'records: has \[4\.0, .*; a Record is needed for each run'),
+    (lambda: simulate_batch({'heavy': rigs()[0]}, ppr_records()),
+     "rigs: has 'heavy'; a Rig is needed for each run"),
     (lambda: simulate_batch(rigs(), ppr_records(), workers=0), 'workers: is 0'),
     (lambda: simulate_batch(rigs(), ppr_records(), every=1.5), 'every: is 1.5; a whole number'),
     (lambda: simulate_batch(rigs(), ppr_records(), workers=1.5),

@@ -59,6 +59,30 @@ def test_plant_refuses_what_does_not_fit():
         plant.step((np.nan, 0.0))
     plant.step((0.1, 0.0))
     assert np.all(np.isfinite(plant.outputs))
+    for steps in (0, -2, 2.5):
+        for advance in (plant.step, plant.roll):
+            with pytest.raises(InputError, match=f'steps: is {steps}; a whole number, 1 or more'):
+                advance((0.1, 0.0), steps=steps)
+    with pytest.raises(InputError, match='contraction_m: load `hanging_mass` moves freely'):
+        plant.step((0.1, 0.0), contraction_m=0.01)
+
+
+def test_a_held_muscle_is_moved_within_what_it_can_contract():
+    plant = load_rig('dmsp_5_300_driven').plant()
+    for wrong in (0.2, -0.1, np.nan):
+        with pytest.raises(InputError, match=f'contraction_m: is {wrong}; allowed -0.015 to 0.15'):
+            plant.step(3.0, contraction_m=wrong)
+    plant.step(3.0, contraction_m=0.01)         # none of what was refused is left
+    assert plant.contraction_m == 0.01
+
+
+def test_a_signal_beyond_the_range_of_the_valve_acts_as_the_end_of_it():
+    for valve, beyond, end in (('ppr', 100.0, 6.0), ('hsv', (80.0, -1.0), (1.0, 0.0))):
+        rig = load_rig('dmsp_5_300_realistic', valve=valve)
+        plants = rig.plant(), rig.plant()
+        for plant, signal in zip(plants, (beyond, end)):
+            plant.step(signal, steps=200)
+        assert plants[0].pressure_pa == plants[1].pressure_pa
 
 
 def test_nominal_sensors_add_nothing():

@@ -62,11 +62,27 @@ def test_a_saturated_voltage_is_no_mistake():
     ({'initial_signal': np.nan}, 'initial_signal` is nan; allowed -1 to 12 V'),
     ({'dt_s': np.nan}, 'dt_s` is nan; allowed 1e-06 to 0.02 s'),
     ({'dt_s': 0.0}, 'dt_s` is 0; allowed'),
+    ({'dt_s': 'x'}, "`dt_s` is 'x'; a number is needed"),
+    ({'initial_pressure_pa': None}, '`initial_pressure_pa` is None; a number is needed'),
+    ({'initial_contraction_m': 'x'}, "`initial_contraction_m` is 'x'; a number is needed"),
+    ({'initial_signal': 'x'}, "`initial_signal` is no array of numbers: 'x'"),
 ])
 def test_other_inputs_are_refused_by_name_and_range(given_inputs, words):
     with pytest.raises(InputError) as caught:
         load_rig(RIG).simulate([1.0, 2.0], **given_inputs)
     assert words in str(caught.value)
+
+
+@pytest.mark.parametrize('effects, words', [
+    ('hysteresis', "effects: is 'hysteresis'; a list is needed: write `[{'name': NAME"),
+    ({'name': 'hysteresis'}, "effects: is {'name': 'hysteresis'}; a list is needed"),
+    ([{'hysteresis': {}}], "effects: has {'hysteresis': {}}; write `[{'name': NAME"),
+    ([7], 'effects: has 7; write'),
+])
+def test_effects_of_another_form_are_refused_with_the_form(effects, words):
+    with pytest.raises(InputError) as caught:
+        load_rig(RIG).with_(effects=effects)
+    assert str(caught.value).startswith(words)
 
 
 @pytest.mark.parametrize('path', [[0.0, np.nan, 0.0], [0.0, 0.01, 0.4], [-0.1, 0.0, 0.0]])
