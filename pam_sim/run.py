@@ -347,7 +347,8 @@ class Run:
         rate_hz : float, optional
             Rows at equal distances, as ``on_grid``, from and to ``ends_of_table``. By default
             there is a row for each stamp of any topic, and NaN where a topic has no message at
-            that stamp. A held value is NaN after a long silence of its topic, as of ``silences``.
+            that stamp. At a rate, a value is NaN in a long silence of its topic, as of
+            ``silences``; a held one after the time for which it counts.
         topics : str or collection of str, optional
             Short names; all with messages by default.
 
@@ -380,12 +381,13 @@ class Run:
 
 
 def _counts(name: str, series: Series, stamp_ns: IntArray) -> BoolArray:
-    """Return at which stamps the value of a topic counts: a held one not after a long silence."""
-    if not is_held(name, series):
-        return np.ones(len(stamp_ns), dtype=bool)
+    """Return at which stamps the value of a topic counts: not in a long silence of it."""
     own_ns = np.sort(series.stamp_ns)
     last_ns = own_ns[np.clip(np.searchsorted(own_ns, stamp_ns, 'right') - 1, 0, None)]
-    counts: BoolArray = stamp_ns - last_ns <= most_held_ns(own_ns)
+    until_ns = stamp_ns     # a held value counts for a while, one between two messages does not
+    if not is_held(name, series):
+        until_ns = own_ns[np.clip(np.searchsorted(own_ns, stamp_ns), None, len(own_ns) - 1)]
+    counts: BoolArray = until_ns - last_ns <= most_held_ns(own_ns)
     return counts
 
 

@@ -53,6 +53,7 @@ def add_arguments(parser: Parser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write the table and say what is in it."""
     from pam_actuation.bags.load_joint import load_recording
+    from pam_actuation.bags.oddities import recording_remarks
     from pam_actuation.tables.export import check_ending, write_table
     check_ending(args.out)
     check_outputs(args, args.out)
@@ -62,7 +63,8 @@ def run(args: argparse.Namespace) -> int:
     frame = loaded.to_dataframe(args.rate, topics)
     write_table(frame, args.out)
     columns = [str(name) for name in frame.columns]
-    remarks = _left_out(loaded, topics) if args.rate else []
+    remarks = recording_remarks([loaded])
+    remarks += _left_out(loaded, topics) if args.rate else []
     emit(args, {'table': args.out, 'rows': len(frame), 'columns': columns, 'remarks': remarks},
          '\n'.join([f'wrote {len(frame)} rows and {len(columns)} columns',
                     *(f'remark: {text}' for text in remarks), f'table: {args.out}',

@@ -86,7 +86,7 @@ def asked(verb, bag, folder):
     return [str(word) for word in {
         'replay': ('replay', bag, '--only', 'plant'),
         'report': ('report', bag, '--out', folder / 'page.html'),
-        'rules': ('rules', bag),
+        'rules': ('rules', bag), 'export': ('export', bag, '--out', folder / 'table.csv'),
         'gap': ('gap', bag, '--seconds', 1, '--effects', 'coulomb_friction',
                 '--out', folder / 'gap'),
         'identify': ('identify', bag, '--rig', 'dmsp_5_300_hanging_mass', '--unknown', 'mass_kg',
@@ -95,14 +95,15 @@ def asked(verb, bag, folder):
     }[verb]]
 
 
-VERBS = {'replay': '', 'report': 'page.html', 'rules': '', 'gap': 'gap/report.html',
+VERBS = {'replay': '', 'report': 'page.html', 'rules': '', 'export': '', 'gap': 'gap/report.html',
          'identify': 'identify/report.html', 'tune': 'tuned.html'}
 
 
 @pytest.mark.parametrize('how, verb', [
     *(('damaged', verb) for verb in VERBS),
     # All tell by the same function.
-    *((how, verb) for how in ('stepped', 'unstamped') for verb in ('replay', 'report', 'rules'))])
+    *((how, verb) for how in ('stepped', 'unstamped')
+      for verb in ('replay', 'report', 'rules', 'export'))])
 def test_every_verb_tells_what_is_odd(bags, how, verb, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr('pam_actuation.cli.gap.SAID_EVERY_S', 0.0)
     page, (sentence, lost) = VERBS[verb], SPOILED[how]

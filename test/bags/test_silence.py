@@ -71,3 +71,14 @@ def test_a_table_is_empty_after_a_long_silence(topic, stamp_ns, is_empty):
     held = frame[f'{topic}.one'].notna()
     assert held[frame.time_s < 12.9].all() and held[frame.time_s > 13.1].any() != is_empty
     assert run.on_grid(0.1, topics=[topic, 'contraction'])[topic, 'one'][-1] == 3.0
+
+
+def test_a_table_makes_up_no_measurement_in_a_long_silence():
+    stamp_ns = np.where(STAMP_NS < 10e9, STAMP_NS, STAMP_NS + 3_600_000_000_000)
+    run = Run({topic: Series(stamp_ns, {field: 1e-12 * stamp_ns}) for topic, field in (
+        ('pressure', 'pressure_pa'), ('contraction', 'contraction_m'))})
+    frame = run.to_dataframe(10.0)
+    empty = (frame.time_s > 9.991) & (frame.time_s < 3609.999)
+    for name in ('pressure.pressure_pa', 'contraction.contraction_m'):
+        assert (frame[name].isna() == empty).all()
+    assert not np.isnan(run.on_grid(0.1)['pressure', 'pressure_pa']).any()
