@@ -239,6 +239,8 @@ def read_series(short: str, topic: TopicData, odd: Oddities,
     stamp_ns, received_ns = stamp_ns[keep], topic.log_time_ns[keep]
     values = {name: column[keep] for name, column in values.items()}
     odd.heard[topic.name] = heard_ns(received_ns, values)
+    if short in _STAMPED_AT_ONCE:
+        odd.tell_ahead(topic.name, stamp_ns, received_ns)
     if odd.goes_back(topic.name, stamp_ns):
         order = np.argsort(stamp_ns, kind='stable')
         stamp_ns = stamp_ns[order]

@@ -91,10 +91,24 @@ class Oddities:
         backward = int((steps_ns < 0).sum())
         if backward:
             most_s = -1e-9 * float(steps_ns.min())
-            (self.remarks if most_s > USUAL_BACK_S else self.notes).append(
-                f'{name}: the stamp goes back {often(backward)}, by up to {most_s:.3g} s; sorted '
-                'by stamp.')
+            told = (f'{name}: the stamp goes back {often(backward)}, by up to {most_s:.3g} s; '
+                    'sorted by stamp')
+            if most_s > USUAL_BACK_S:
+                self.remarks.append(f'{told}, which mixes what was recorded before and after.')
+            else:
+                self.notes.append(f'{told}.')
         return backward > 0
+
+    def tell_ahead(self, name: str, stamp_ns: IntArray, log_time_ns: IntArray) -> None:
+        """Tell of the stamps of a topic that go ahead while hardly any time passes."""
+        if _receipts_tell(stamp_ns, log_time_ns):
+            more_ns = np.diff(stamp_ns) - np.diff(log_time_ns)
+            ahead_ns = more_ns[np.minimum(more_ns, np.diff(stamp_ns)) > _far_ns(stamp_ns)]
+            if ahead_ns.size:
+                self.remarks.append(
+                    f'{name}: the stamp goes ahead {often(ahead_ns.size)}, by up to '
+                    f'{1e-9 * float(ahead_ns.max()):.3g} s more than passed between the '
+                    'receipts, as where a clock is set.')
 
     def tell_repeated(self, name: str, stamp_ns: IntArray) -> None:
         """Tell of the stamps of a topic, in their order, that repeat."""
@@ -172,13 +186,28 @@ def stray(stamp_ns: IntArray, log_time_ns: IntArray) -> BoolArray:
     none = np.zeros(len(stamp_ns), dtype=bool)
     if len(stamp_ns) < 5 or not (np.diff(stamp_ns) < 0).any() and not _ends_jump(stamp_ns):
         return none
-    delay_ns = log_time_ns - stamp_ns
-    period_ns = float(np.median(np.abs(np.diff(stamp_ns))))
-    if 2.0 * float(np.median(np.abs(np.diff(delay_ns)))) > period_ns:
-        return none             # receive times that tell nothing
-    far_ns = max(1e9 * STRAY_S, STRAY_PERIODS * period_ns)
-    found: BoolArray = (_off_ns(stamp_ns) > far_ns) & (_off_ns(delay_ns) > far_ns)
+    if not _receipts_tell(stamp_ns, log_time_ns):
+        return none
+    far_ns = _far_ns(stamp_ns)
+    found: BoolArray = (_off_ns(stamp_ns) > far_ns) & (_off_ns(log_time_ns - stamp_ns) > far_ns)
     return found if found.sum() <= max(1, STRAY_SHARE * len(found)) else none
+
+
+def _period_ns(stamp_ns: IntArray) -> float:
+    return float(np.median(np.abs(np.diff(stamp_ns))))
+
+
+def _far_ns(stamp_ns: IntArray) -> float:
+    """Return how far a stamp is from those around it that is none of a steady topic."""
+    return max(1e9 * STRAY_S, STRAY_PERIODS * _period_ns(stamp_ns))
+
+
+def _receipts_tell(stamp_ns: IntArray, log_time_ns: IntArray) -> bool:
+    """Return whether a message is received about when it is stamped."""
+    if len(stamp_ns) < 5:
+        return False
+    delay_ns = log_time_ns - stamp_ns
+    return 2.0 * float(np.median(np.abs(np.diff(delay_ns)))) <= _period_ns(stamp_ns)
 
 
 def _off_ns(times_ns: IntArray) -> IntArray:

@@ -40,6 +40,7 @@ PRESSURE, CONTRACTION = '/muscle/pressure', '/muscle/contraction'
 SPOILED = {
     'damaged': ('messages are not sensor_msgs/msg/FluidPressure, left out', True),
     'stepped': (f'{PRESSURE}: the stamp goes back once, by up to 5', False),
+    'ahead': (f'{PRESSURE}: the stamp goes ahead once, by up to 3.6e+03 s more', False),
     'unstamped': (f'{PRESSURE}: no message has a header stamp', False)}
 
 
@@ -51,6 +52,8 @@ def spoiled_message(how, data, k, count):
     stamp_ns = one.stamp_ns
     if how == 'stepped':
         stamp_ns -= 5_000_000_000 * (k > count // 2)
+    elif how == 'ahead':
+        stamp_ns += 3_600_000_000_000 * (k > count // 2)
     else:
         stamp_ns = 0
     return encode('pressure', messages.Pressure(stamp_ns, one.pressure_pa))
@@ -103,7 +106,7 @@ VERBS = {'replay': '', 'report': 'page.html', 'rules': '', 'export': '', 'gap': 
     *(('damaged', verb) for verb in VERBS),
     # All tell by the same function.
     *((how, verb) for how in ('stepped', 'unstamped')
-      for verb in ('replay', 'report', 'rules', 'export'))])
+      for verb in ('replay', 'report', 'rules', 'export')), ('ahead', 'export')])
 def test_every_verb_tells_what_is_odd(bags, how, verb, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr('pam_actuation.cli.gap.SAID_EVERY_S', 0.0)
     page, (sentence, lost) = VERBS[verb], SPOILED[how]
