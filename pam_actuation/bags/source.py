@@ -41,12 +41,15 @@ from pam_sim.errors import InputError
 from pam_sim.files import refuse_pipe, StrPath
 from pam_sim.short_repr import short_repr
 
+# A file, and the first and last time of a topic in it [ns].
+_Span = tuple[str, int, int]
 # Whether to keep the messages of a topic, by its name, message type and encoding.
 Wanted = Callable[[str, str, str], bool]
 # Behind the name of a topic in whose place another one is read; no topic of ROS ends so.
 REPLACED = ' (replaced)'
 SQLITE = 'sqlite3'
 _STORAGES = {'.mcap': layout.STORAGE_IDENTIFIER, '.db3': SQLITE}
+SHARED = 0.5                # parts of one recording have less of their times in common
 _MOST = 3                   # topics that a remark lists
 _RECOVER = ('or keep that beginning: `pam info --recover` repairs the bag, and in Python '
             'recover=True reads it as it is')
@@ -138,7 +141,8 @@ def read_bag(path: StrPath, recover: bool = False, wanted: Wanted | None = None,
     Raises
     ------
     InputError
-        Nothing there, not a bag, damaged, or ended early (says how much is readable).
+        Nothing there, not a bag, damaged, ended early (says how much is readable), or several
+        recordings in a directory without metadata.yaml.
 
     """
     path = Path(path)
@@ -226,6 +230,7 @@ def _read_files(path: Path, files: Sequence[Path], storage: str, how: _How,
     """Return what files hold; ``records`` are known already, those of the files count before."""
     bag = Bag(path=path, storage=storage, records=dict(records or {}), given_names=how.names)
     pieces: dict[str, list[MessageColumns]] = {}
+    spans: dict[str, list[_Span]] = {}
     for file in files:
         with unpacked_file(file) as plain:
             names = None
@@ -240,10 +245,30 @@ def _read_files(path: Path, files: Sequence[Path], storage: str, how: _How,
             bag.remarks.append(
                 f'{file.name} ended early or is damaged ({content.damage}); '
                 f'{_readable(content)}.')
+        known = {name: len(some) for name, some in pieces.items()}
         _add_content(bag, content, pieces)
+        if records is None:         # no metadata.yaml says that they are one recording
+            _refuse_another(path, file, spans, {
+                name: some[known.get(name, 0):] for name, some in pieces.items()})
     for topic in bag.topics.values():
         _join(topic, pieces[topic.name])
     return bag
+
+
+def _refuse_another(path: Path, file: Path, spans: dict[str, list[_Span]],
+                    pieces: Mapping[str, Sequence[MessageColumns]]) -> None:
+    """Refuse a file that has a topic at the times of another file; note its times in ``spans``."""
+    for name, some in pieces.items():
+        times_ns = joined([messages.log_time_ns for messages in some])
+        if not len(times_ns):
+            continue
+        begin_ns, end_ns = int(times_ns.min()), int(times_ns.max())
+        for other, first_ns, last_ns in spans.setdefault(name, []):
+            both_ns = min(end_ns, last_ns) - max(begin_ns, first_ns)
+            if both_ns > SHARED * min(end_ns - begin_ns, last_ns - first_ns):
+                raise InputError(f'{other} and {file.name} have messages of {name} at the same '
+                                 'times, so they are two recordings; give one of the files', path)
+        spans[name].append((file.name, begin_ns, end_ns))
 
 
 def _scan_mcap(file: Path, plain: Path, keep: Wanted | None, recover: bool) -> McapContent:

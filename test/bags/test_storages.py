@@ -187,3 +187,15 @@ def test_a_folder_with_compressed_files_is_repaired_once_they_are_unpacked(kille
     packed.with_suffix('').write_bytes(zstandard.decompress(packed.read_bytes()))
     assert recover_bag(killed).messages == 120
     assert read_bag(killed).counts == {'/muscle/pressure': 120}
+
+
+def test_two_recordings_in_one_folder_are_refused(tmp_path):
+    for name in ('one', 'other'):
+        write_bag(tmp_path / name, 30)
+        file, = (tmp_path / name).glob('*.mcap')
+        (tmp_path / 'both').mkdir(exist_ok=True)
+        shutil.copy(file, tmp_path / 'both' / f'{name}.mcap')
+    with pytest.raises(InputError, match='one.mcap and other.mcap have messages of /muscle/'
+                       '.* at the same times, so they are two recordings; give one of the files'):
+        load_run(tmp_path / 'both')
+    assert load_run(tmp_path / 'both' / 'one.mcap').duration_s > 0.0
