@@ -29,6 +29,7 @@ from typing import Any, TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 from pam_actuation.drivers.for_rig import driver_config
+from pam_actuation.messages import VALVE_NAMES
 from pam_actuation.tuning.cost import tracking_cost
 from pam_actuation.tuning.loop_parts import DISTURBANCE, Driver
 from pam_actuation.tuning.loop_setup import (
@@ -44,6 +45,7 @@ from pam_sim.rollout.kernel import refuse_terms
 from pam_sim.short_repr import short_repr
 
 if TYPE_CHECKING:
+    import pandas as pd
     from pam_actuation.control.compiled_controller import CompiledController
     from pam_actuation.drivers.config import DriverConfig
     from pam_actuation.experiments.experiment import Experiment
@@ -91,6 +93,15 @@ class LoopResult(TrackingErrors):
     def cycle_rmse_m(self) -> FloatArray:
         """Return the root mean square error [m] of every cycle, shape (cycles,)."""
         return self.cycle_rmse()
+
+    def to_dataframe(self) -> 'pd.DataFrame':
+        """Return all signals as one pandas table, a row for each tick, in SI."""
+        import pandas as pd     # takes a second to load
+        names = VALVE_NAMES['hsv' if self.signal.shape[1] == 2 else 'ppr']
+        return pd.DataFrame({
+            **{name: getattr(self, name) for name in (
+                'time_s', 'reference_m', 'contraction_m', 'pressure_pa', 'command_pa', 'force_n')},
+            **dict(zip(names, self.signal.T))})
 
 
 class MuscleLoop:
@@ -237,7 +248,7 @@ class ClosedLoop(MuscleLoop):
         log = self.run_raw(controller, learn)
         n = self.ticks
         return LoopResult(
-            np.arange(n) / self.rate_hz, self.reference_m, log['contraction_m'],
+            np.arange(n) / self.rate_hz, self.reference_m.copy(), log['contraction_m'],
             log['pressure_pa'], log['command_pa'], log['force_n'],
             np.column_stack([log[name] for name in ('signal_0', 'signal_1')[:1 + self.hsv]]),
             self.experiment.cycles, controller)

@@ -120,7 +120,7 @@ class ForceLoop(MuscleLoop):
         """
         log = self.run_raw(controller, learn)
         return ModeResult(
-            'n', np.arange(self.ticks) / self.rate_hz, self._reference.values,
+            'n', np.arange(self.ticks) / self.rate_hz, self._reference.values.copy(),
             log['force_n'],
             {name: log[name] for name in ('contraction_m', 'pressure_pa', 'command_pa')},
             self.experiment.cycles)

@@ -185,7 +185,7 @@ class JointLoop:
         """
         log = self.run_raw(controller, learn)
         return ModeResult(
-            'rad', np.arange(self.ticks) / self.rate_hz, self._reference.values,
+            'rad', np.arange(self.ticks) / self.rate_hz, self._reference.values.copy(),
             log['angle_rad'],
             {name: log[name] for name in log.dtype.names or () if name != 'angle_rad'},
             self.experiment.cycles)

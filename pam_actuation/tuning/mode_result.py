@@ -15,10 +15,14 @@
 """What a closed loop of force mode or joint mode returns."""
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from pam_actuation.tuning.tracking_errors import Cycles, TrackingErrors
 from pam_sim.annotations import FloatArray
 from pam_sim.short_repr import short_repr
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @short_repr
@@ -43,3 +47,14 @@ class ModeResult(TrackingErrors):
     def error(self) -> FloatArray:
         """Return reference minus what was reached, in ``unit``."""
         return self.reference - self.value
+
+    def to_dataframe(self) -> 'pd.DataFrame':
+        """
+        Return all signals as one pandas table, a row for each tick, in SI.
+
+        Reference and value are called ``reference_n`` and ``value_n``, or ``_rad``.
+        """
+        import pandas as pd     # takes a second to load
+        return pd.DataFrame({
+            'time_s': self.time_s, f'reference_{self.unit}': self.reference,
+            f'value_{self.unit}': self.value, **self.signals})

@@ -205,3 +205,16 @@ def test_the_latency_is_that_of_the_live_nodes_or_the_longest_that_fits(loop):
     ClosedLoop(rig, short, rate_hz=1000.0)
     with pytest.raises(InputError, match='less than .* 0.001 s'):
         ClosedLoop(rig, short, rate_hz=1000.0, latency_s=0.003)
+
+
+def test_a_result_is_a_table_and_owns_its_numbers(loop):
+    small = ClosedLoop(loop.rig, load_experiment(STEPS))
+    result = small.run(controller_of(loop), learn=False)
+    frame = result.to_dataframe()
+    signals = ['ppr_voltage'] if loop.rig.valve == 'ppr' else ['fill_duty', 'vent_duty']
+    assert list(frame) == ['time_s', 'reference_m', 'contraction_m', 'pressure_pa', 'command_pa',
+                           'force_n', *signals]
+    assert len(frame) == small.ticks and (frame[signals].to_numpy() == result.signal).all()
+    before = result.rmse_m()
+    result.reference_m *= 1e3       # a person who wants millimetres
+    assert small.run(controller_of(loop), learn=False).rmse_m() == before

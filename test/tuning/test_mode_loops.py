@@ -85,6 +85,9 @@ def test_an_angle_is_tracked_and_learned_with_the_co_contraction_held(name, limb
         np.full(len(late), P_ATM_PA + controller.co_contraction_gauge_pa), abs=1.0)
     again = loop.run(load_controller(f'sofc_{name}_{valve}', joint))
     assert np.array_equal(again.value, result.value)
+    frame = result.to_dataframe()
+    assert list(frame)[:3] == ['time_s', 'reference_rad', 'value_rad'] and len(frame) == loop.ticks
+    assert (frame.flexor_command_pa == result.signals['flexor_command_pa']).all()
 
 
 def sampled(loop):
