@@ -136,8 +136,17 @@ class Rig:
 
         That of an unknown one is half of its range, see :func:`pam_sim.tolerance.prior_sd`.
         A coefficient ``law.NAME`` is a parameter, too.
+
+        Raises
+        ------
+        InputError
+            Unknown name.
+
         """
-        parameter = next(p for p in self.number_list if p.name == name)
+        parameter = next((p for p in self.number_list if p.name == name), None)
+        if parameter is None:
+            raise InputError(f'unknown parameter `{name}`; allowed: '
+                             + ', '.join(p.name for p in self.number_list), self.name)
         return prior_sd(parameter, self.number(name), self.tolerance[name])
 
     @property

@@ -45,6 +45,8 @@ def test_a_number_is_known_relatively_absolutely_or_not_at_all(tmp_path):
     assert rig.prior_sd('T_m') == 0.004 and rig.prior_sd('K_m') == pytest.approx(10e3)
     # A scale from 0.1 to 500 kg: half of the range of its logarithm.
     assert rig.prior_sd('mass_kg') == pytest.approx(3.2 * math.log(5000.0) / 2)
+    with pytest.raises(InputError, match='unknown parameter `mass`; allowed: .*mass_kg'):
+        rig.prior_sd('mass')
     assert load_rig('dmsp_5_300_hanging_mass').unknown == ()
 
 
