@@ -96,6 +96,9 @@ class CompiledController(SharedMemory):
         """
         Run one tick.
 
+        Contraction and reference are finite. What is not stays in the state, so that commands
+        are NaN until ``pause``: do not call it without a measurement, and vent.
+
         Parameters
         ----------
         x_m : float
