@@ -23,6 +23,7 @@ controller it shows how the experiment would have gone with that one on the mode
 
 from array import array
 from collections.abc import Callable, Collection, Mapping
+import copy
 from dataclasses import dataclass
 from functools import partial
 import math
@@ -300,7 +301,8 @@ def replay_chain(run: Run,
         A loaded bag that names its rig.
     controller : optional
         By default the recording's own. Another one (an object, or what ``load_controller``
-        takes) answers how the experiment would have gone with it.
+        takes) answers how the experiment would have gone with it. Of an object a copy is
+        stepped.
 
     Raises
     ------
@@ -360,6 +362,6 @@ def _controller(run: Run, rig: Rig | JointRig,
     if isinstance(controller, (str, os.PathLike)):
         return load_controller(controller, rig)
     if controller is not None:
-        return controller
+        return copy.deepcopy(controller)
     assert own is not None      # what ran is repeated, whatever it was made for
     return load_controller(own, rig, accept_other_rig=True)

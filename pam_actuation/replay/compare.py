@@ -173,6 +173,8 @@ def replay_run(run: 'RecordedRun', controller: 'Controller | str | os.PathLike[s
         What was asked for cannot be replayed, or nothing can; the controller is unusable.
 
     """
+    if only is not None and only not in PARTS:
+        raise InputError(f'is `{only}`; allowed: {", ".join(PARTS)}', 'only')
     preview = () if chain else preview_remark(run, controller)
     result = Replay(counterfactual=controller is not None, start_ns=run.start_ns,
                     remarks=(*recording_remarks([run]), *other_model(run, model),

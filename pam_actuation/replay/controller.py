@@ -22,6 +22,7 @@ and internals bit for bit.
 
 from collections import Counter
 from collections.abc import Callable, Sequence
+import copy
 from dataclasses import dataclass, field
 import math
 import os
@@ -49,6 +50,7 @@ if TYPE_CHECKING:
 # Topic of an input of a tick -> field of its messages.
 _MEASURED = {'contraction': 'contraction_m', 'pressure': 'pressure_pa', 'force': 'force_n'}
 _PROGRESS_EVERY = 2000    # ticks
+SAME_RATE = 0.1           # share by which the ticks of a recording may come otherwise
 
 
 @short_repr
@@ -114,7 +116,7 @@ def replay_controller(run: 'Run', controller: 'Controller | str | os.PathLike[st
     controller : optional
         By default the recording's own, built from its metadata. Another one (an object, or
         what ``load_controller`` takes) answers what it *would* have commanded; its internals
-        are then not compared.
+        are then not compared. A copy of an object is stepped.
     keep_states : bool
         Also return every internal number of every tick.
     progress : callable, optional
@@ -128,7 +130,8 @@ def replay_controller(run: 'Run', controller: 'Controller | str | os.PathLike[st
     ------
     InputError
         The recording has no controller ticks, does not begin with the first tick, lacks
-        ticks or measurements that were used, or the rules were exchanged on the way.
+        ticks or measurements that were used, or the rules were exchanged on the way; another
+        controller that runs at another rate.
 
     """
     states = run.require('controller_state')
@@ -138,6 +141,8 @@ def replay_controller(run: 'Run', controller: 'Controller | str | os.PathLike[st
     columns = _columns(states, tracked, run.path)
     order = np.argsort(columns['tick'], kind='stable')
     check_complete(columns, order, run.path)
+    if controller is not None:
+        check_rate(chosen, states, run.path)
 
     rises_slowly = HELD_BACK in states.values       # versions before did not
     nearly_pa = nearly_in(as_recorded(run.metadata, run.path))
@@ -175,7 +180,7 @@ def _chosen(run: 'Run', controller: 'Controller | str | os.PathLike[str] | None'
     if isinstance(controller, (str, os.PathLike)):
         rig_text = run.metadata.get('rig')
         return load_controller(controller, load_rig(rig_text) if rig_text else None)
-    return controller
+    return copy.deepcopy(controller)
 
 
 def _compared(names: Sequence[str], columns: dict[str, FloatArray], path: str
@@ -247,6 +252,18 @@ def _columns(states: 'Series', tracked: Tracked, path: str) -> dict[str, FloatAr
             f'controller_state is not from a controller of this project: it lacks {missing[0]}',
             path)
     return columns
+
+
+def check_rate(controller: 'Controller', states: 'Series', path: str) -> None:
+    """Raise InputError for a controller that runs at another rate than the recorded ticks."""
+    steps_ns = np.diff(np.sort(states.stamp_ns))
+    if not len(steps_ns) or not (usual_ns := float(np.median(steps_ns))) > 0.0:
+        return
+    if abs(usual_ns * 1e-9 * controller.rate_hz - 1.0) > SAME_RATE:
+        raise InputError(
+            f'the controller runs at {controller.rate_hz:g} Hz, the recorded ticks at '
+            f'{1e9 / usual_ns:.4g} Hz; give it the same rate, or repeat the experiment with '
+            '`--chain` (in Python: chain=True)', path)
 
 
 def check_complete(columns: dict[str, FloatArray], order: IntArray, path: str) -> None:

@@ -107,6 +107,20 @@ def test_another_controller_answers_what_it_would_have_done(run):
     assert result.max_abs_difference_pa > 100.0
 
 
+def test_a_controller_that_is_asked_stays_as_it_is(run):
+    other = sofc({'proportional_pa_per_m': 2e6})
+    before, (first, second) = other.to_yaml(), (replay_controller(run, other) for _ in range(2))
+    assert np.array_equal(first.replayed_pa, second.replayed_pa)
+    assert first.controller.rules.digest() != other.rules.digest() and other.to_yaml() == before
+
+
+def test_a_controller_of_another_rate_is_refused(run):
+    with pytest.raises(InputError, match='the controller runs at 100 Hz, the recorded ticks at '
+                       '200 Hz; give it the same rate'):
+        replay_controller(run, load_controller('pid', StraightRig()).with_settings(
+            {'rate_hz': 100.0}))
+
+
 def cut(run, topic, keep):
     series = run.topics[topic]
     part = Series(series.stamp_ns[keep], {k: v[keep] for k, v in series.values.items()})
