@@ -197,9 +197,12 @@ def _choose_namespace(bag: Bag, wanted: str | None) -> str:
         if len(candidates) == 1:
             return candidates[0]
         if candidates:
+            of_joint = any(f'{name.rpartition("/")[0]}/joint_state' in bag.topics
+                           for name in candidates)
             raise InputError(
-                f'the bag has several muscles, {_listed(candidates)}; choose one with {NAMESPACE}',
-                bag.path)
+                f'the bag has several muscles, {_listed(candidates)}; choose one with {NAMESPACE}'
+                + of_joint * ', or in Python read the joint as a whole with `load_recording` of '
+                'pam_actuation.bags.load_joint', bag.path)
     names = ', '.join(sorted(bag.topics)) or 'none at all'
     types = {name: topic.type_name for name, topic in bag.topics.items()}
     hints = filter(None, (renamed.may_be(short, types) for short in ('pressure', 'contraction')))

@@ -108,3 +108,6 @@ def test_quantisation():
     assert p == pytest.approx(400_000.0) and x == pytest.approx(0.0123) and f == 1.23456
     with pytest.raises(InputError, match='allowed'):
         SensorChain({'pressure_noise_pa': -1.0})
+    for seed in (-1, 1.5, 'x'):
+        with pytest.raises(InputError, match=f'seed: is {seed!r}; a whole number, 0 or more'):
+            SensorChain(seed=seed)
