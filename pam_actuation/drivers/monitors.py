@@ -31,15 +31,19 @@ _SAFE_ROOM = 1.5
 LEAST_CHANGE, SHORTEST = 0.1, 0.3
 MOST_RELAPSES, RELAPSES_WITHIN_S = 5, 30.0
 MOST_RESTARTS = 2           # of the model of the air, within the same time
+_DAY_NS = 86_400 * NS_PER_S
 WARNING_HOLD_S = 1.0        # a warning stays in the message after its last cause
 
 
 def stamp_problem(stamp_ns: int, now_ns: int, oldest_s: float, ahead_s: float) -> str:
     """Return why a stamp cannot be used at ``now_ns``, or '' if it can."""
     age_ns = now_ns - stamp_ns
+    if age_ns > oldest_s * NS_PER_S and stamp_ns == 0:
+        return 'came without a time stamp (header.stamp is 0)'
+    if abs(age_ns) > _DAY_NS:
+        return (f'is stamped {abs(age_ns) / _DAY_NS:.0f} days '
+                f'{"ago" if age_ns > 0 else "in the future"}, so by another clock than this one')
     if age_ns > oldest_s * NS_PER_S:
-        if stamp_ns == 0:
-            return 'came without a time stamp (header.stamp is 0)'
         return f'came {age_ns * 1e-6:.0f} ms old (limit {oldest_s * 1e3:.0f} ms)'
     if -age_ns > ahead_s * NS_PER_S:
         return f'is stamped {-age_ns * 1e-6:.0f} ms in the future (limit {ahead_s * 1e3:.0f} ms)'

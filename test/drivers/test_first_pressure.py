@@ -17,10 +17,13 @@
 import math
 
 from pam_actuation.drivers.decision import OK, VENTED, WAITING
+from pam_actuation.drivers.monitors import stamp_problem
 from pam_actuation.drivers.safety import SafetySupervisor
 from pam_sim.units import P_ATM_PA
 import pytest
 from test_safety import Bench, FAST, MS, START
+
+NOW_NS = 1_700_000_000 * 10 ** 9
 
 
 @pytest.mark.parametrize('bad, word', [
@@ -49,3 +52,14 @@ def test_a_sensor_whose_clock_is_off_is_not_the_same_as_none():
         safety.on_command(now, P_ATM_PA + 300e3)
         decision = safety.tick(now)
     assert decision.state == VENTED and 'came 5000 ms old' in decision.message
+
+
+@pytest.mark.parametrize('stamp_ns, says', [
+    (NOW_NS, ''), (NOW_NS - 200 * MS, 'came 200 ms old (limit 100 ms)'),
+    (NOW_NS + 200 * MS, 'is stamped 200 ms in the future (limit 20 ms)'),
+    (0, 'came without a time stamp (header.stamp is 0)'),
+    (4321 * 10 ** 9, 'is stamped 19676 days ago, so by another clock than this one'),
+    (2 * NOW_NS, 'is stamped 19676 days in the future, so by another clock than this one')])
+def test_a_stamp_of_another_clock_is_told_as_one(stamp_ns, says):
+    """One since the start of a computer, as of a board, is not 1700000000000 ms old."""
+    assert stamp_problem(stamp_ns, NOW_NS, 0.1, 0.02) == says
