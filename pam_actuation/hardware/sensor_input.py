@@ -19,6 +19,7 @@ A back end is a class made from ``SensorInput``. The node ``hardware_sensors`` a
 reading of each of its topics, once per period.
 """
 
+import time
 from typing import Any
 
 from pam_actuation.hardware.failures import device_error
@@ -31,8 +32,10 @@ TOPICS = {
 PLACE = 'place'         # in ``values``, beside the parameters
 # Of a muscle or joint: highest speed [1/s], smallest step that is no noise, unit of the sentence.
 FASTEST = {'contraction': (1.0, 0.003, 1e3, 'mm'), 'joint_state': (30.0, 0.1, 1.0, 'rad')}
-JUMP_SHOWN_NS = 60_000_000_000
+SHOWN_NS = 60_000_000_000               # a jump, or a read that waited
 LONGEST_WAIT_NS = 1_000_000_000         # for a new value
+ANOTHER_CLOCK_NS = 60_000_000_000       # so far off a time is not that of this computer
+LONGEST_READ_S = 0.1                    # then the driver vents
 Reading = float | tuple[float, int] | None
 
 
@@ -99,11 +102,15 @@ class NewReadings:
     ----------
     jumps : int
         How often a reading changed faster than any muscle or joint moves.
+    waits : int
+        How often the back end took 0.1 s or more for a reading.
 
     """
 
-    jumps = 0
+    jumps = waits = 0
     _jump, _jumped_ns = '', 0
+    _wait, _waited_s, _waited_ns = '', 0.0, 0
+    _timed, _timed_ns = '', 0
 
     def __init__(self, sensors: SensorInput, begin_ns: int) -> None:
         self._sensors = sensors
@@ -120,10 +127,14 @@ class NewReadings:
             The sensor does not answer, or has had no new value for a second.
 
         """
+        begin_s = time.monotonic()
         try:
-            reading = self._sensors.read(topic)
+            try:
+                reading = self._sensors.read(topic)
+            finally:
+                self._look_for_wait(topic, time.monotonic() - begin_s, now_ns)
             read, stamp_ns = reading if isinstance(reading, tuple) else (reading, now_ns)
-            value = None if read is None else float(read)
+            value, stamp_ns = None if read is None else float(read), int(stamp_ns)
         except KeyboardInterrupt:
             raise
         except BaseException as error:      # of a back end of somebody else
@@ -136,6 +147,12 @@ class NewReadings:
             if now_ns - self._newest_ns[topic] > LONGEST_WAIT_NS:
                 raise DeviceError(f'no new value for {LONGEST_WAIT_NS // 10 ** 9} s', topic)
             return None
+        if abs(now_ns - stamp_ns) > ANOTHER_CLOCK_NS:
+            # Published all the same: of a pressure that arrives and is too old, the driver vents.
+            self._timed = self.another_clock(now_ns) or (       # no flood of numbers
+                f'{topic} is stamped {stamp_ns} ns, which is not the time of this computer, and '
+                'counts for nobody: a reading has the time.time_ns() at which it was measured')
+            self._timed_ns = now_ns
         if last is not None and topic in FASTEST:
             self._look_for_jump(topic, value - last[0], stamp_ns - last[1], now_ns)
         self._newest_ns[topic], self._last[topic] = now_ns, (value, stamp_ns)
@@ -152,4 +169,23 @@ class NewReadings:
 
     def jump(self, now_ns: int) -> str:
         """Return a sentence on a jump in the last minute, '' if there was none."""
-        return self._jump if 0 <= now_ns - self._jumped_ns <= JUMP_SHOWN_NS else ''
+        return self._jump if 0 <= now_ns - self._jumped_ns <= SHOWN_NS else ''
+
+    def another_clock(self, now_ns: int) -> str:
+        """Return a sentence on readings of the last second stamped by another clock, else ''."""
+        return self._timed if 0 <= now_ns - self._timed_ns <= LONGEST_WAIT_NS else ''
+
+    def _look_for_wait(self, topic: str, waited_s: float, now_ns: int) -> None:
+        if waited_s < LONGEST_READ_S:
+            return
+        self.waits += 1
+        if waited_s > self._waited_s or not self.wait(now_ns):      # the longest that is shown
+            self._waited_s = waited_s
+            self._wait = (
+                f'the back end took {waited_s:.1f} s to read {topic}, and no sensor was read '
+                'meanwhile: read must not wait, so read a slow device in a thread')
+        self._waited_ns = now_ns
+
+    def wait(self, now_ns: int) -> str:
+        """Return a sentence on the longest wait in the last minute, '' if there was none."""
+        return self._wait if 0 <= now_ns - self._waited_ns <= SHOWN_NS else ''

@@ -84,9 +84,10 @@ class HardwareSensors(ManagedNode):
         self.add_loop(1.0 / self.value('publish_rate_hz'))
 
     def diagnostic_values(self) -> Values:
-        """Add how often a sensor did not answer, and how often a reading jumped."""
-        jumps = () if self._readings is None else (('jumps', self._readings.jumps),)
-        return (*super().diagnostic_values(), ('read_failures', self.failures), *jumps)
+        """Add how often a sensor did not answer, a reading jumped, and the back end waited."""
+        seen = () if self._readings is None else (
+            ('jumps', self._readings.jumps), ('long_reads', self._readings.waits))
+        return (*super().diagnostic_values(), ('read_failures', self.failures), *seen)
 
     def tick(self) -> None:
         """Read each sensor and send what is new."""
@@ -103,11 +104,13 @@ class HardwareSensors(ManagedNode):
                 if new is not None:
                     value, stamp_ns = new
                     self.send(topic, topic_of(topic).content.message(stamp_ns, value))
-        jump = self._readings.jump(self.now_ns())
-        if problem:
-            self.diagnostics.update(ERROR, problem)
-        elif jump:
-            self.diagnostics.update(WARN, jump)
+        now_ns = self.now_ns()
+        problem = problem or self._readings.another_clock(now_ns)
+        # A sensor may seem silent because the back end waits for another one.
+        told = [self._readings.wait(now_ns), problem or self._readings.jump(now_ns)]
+        if any(told):
+            self.diagnostics.update(
+                ERROR if problem else WARN, '; '.join(text for text in told if text))
         else:
             self.diagnostics.update(OK, f'measuring {", ".join(self.sensors.topics)}')
 

@@ -14,7 +14,11 @@
 
 """Test analog inputs as sensors: straight lines, and refusals in one sentence."""
 
+from contextlib import suppress
+from types import SimpleNamespace
+
 from fake_sysfs import make_adc, put
+from pam_actuation.hardware import sensor_input
 from pam_actuation.hardware.back_ends import open_sensors, parameters_of, SENSOR_INPUTS
 from pam_actuation.hardware.sensor_input import NewReadings, SensorInput
 from pam_actuation.hardware.sysfs import DeviceError
@@ -140,6 +144,63 @@ def test_a_jump_that_is_no_motion_is_told_for_a_minute(topic, steps, sentence):
     assert readings.jump(now_ns).startswith(sentence) and readings.jumps == bool(sentence)
     assert bool(readings.jump(now_ns + 59_000 * ms)) == bool(sentence)
     assert readings.jump(now_ns + 61_000 * ms) == ''
+
+
+@pytest.mark.parametrize('stamp', [
+    1_700_000_000, 4321 * 10 ** 9, -5, 1_700_000_000_000_000, 1_700_000_061 * 10 ** 9,
+    1_700_000_000.5])
+def test_a_reading_with_the_time_of_another_clock_is_told(stamp):
+    """Seconds, the time since the start of the computer, microseconds, a minute ahead."""
+    now_ns = 1_700_000_000 * 10 ** 9
+    given = [(5.0, stamp), (5.0, stamp + 1), (5.0, now_ns)]
+    readings = NewReadings(SlowCell({'next': given}), now_ns)
+    assert readings.another_clock(now_ns) == ''
+    # The driver is to notice a pressure that is too old; without any it would drive a regulator.
+    assert readings.take('force', now_ns) == (5.0, int(stamp))
+    said = readings.another_clock(now_ns)
+    assert said.startswith(f'force is stamped {int(stamp)} ns, which is not') and 'time_ns' in said
+    readings.take('force', now_ns)
+    assert readings.another_clock(now_ns) == said       # no flood of numbers
+    assert readings.take('force', now_ns) == (5.0, now_ns)
+    assert readings.another_clock(now_ns + 2 * 10 ** 9) == ''
+
+
+@pytest.mark.parametrize('stamp', [float('nan'), None, 'now'])
+def test_a_stamp_that_is_no_number_is_told(stamp):
+    readings = NewReadings(SlowCell({'next': [(5.0, stamp)]}), 0)
+    with pytest.raises(DeviceError, match='back end SlowCell: (Value|Type)Error'):
+        readings.take('force', 10 ** 9)
+
+
+@pytest.mark.parametrize('fails', [False, True])
+def test_a_read_that_waits_is_told_for_a_minute(fails, monkeypatch):
+    cell, now_ns, clock_s = SlowCell({}), 1_700_000_000 * 10 ** 9, [0.0]
+    readings = NewReadings(cell, now_ns)
+    monkeypatch.setattr(sensor_input, 'time', SimpleNamespace(monotonic=lambda: clock_s[0]))
+
+    def read(waits_s):
+        def waiting(topic):
+            clock_s[0] += waits_s
+            if fails:
+                raise TimeoutError('no answer')
+            return 7.0
+
+        cell.read = waiting
+        with suppress(DeviceError):
+            readings.take('force', now_ns)
+
+    read(0.09)
+    assert readings.wait(now_ns) == '' and readings.waits == 0
+    read(2.0)
+    said = readings.wait(now_ns)
+    assert said.startswith('the back end took 2.0 s to read force') and readings.waits == 1
+    now_ns += 59 * 10 ** 9
+    read(0.2)
+    assert readings.wait(now_ns) == said and readings.waits == 2
+    now_ns += 61 * 10 ** 9
+    assert readings.wait(now_ns) == ''
+    read(0.3)
+    assert readings.wait(now_ns).startswith('the back end took 0.3 s')
 
 
 def test_garbage_of_a_board_is_told_with_its_parameters(tmp_path, monkeypatch):
