@@ -20,6 +20,9 @@ on the HSV pair. Then bags are checked with two independent readers and the cont
 A short offline tuning, the gap to the nominal model and one page follow. Every step is what the
 ``pam`` verbs do. The search of the gap and the independent readers take long. They begin as soon
 as their bag is there, and run at low priority beside the next live run.
+
+Where a computer stands still for some hundredths of a second, a watchdog vents, as it must. That
+live run is made once more, with nothing beside it; what interrupted it is told.
 """
 
 from collections.abc import Callable
@@ -28,7 +31,7 @@ import os
 from pathlib import Path
 import shlex
 import time
-from typing import Any
+from typing import Any, TypeVar
 
 import joblib
 from pam_actuation.bags.check import independent_readers
@@ -42,7 +45,7 @@ from pam_actuation.parallel import abandon, giving_way, in_processes, Results
 from pam_actuation.replay.controller import replay_controller, ReplayResult
 from pam_actuation.report.demo_page import demo_report, DemoPart
 from pam_actuation.report.gap import FILES, free_run_overlay, write_gap
-from pam_actuation.rigging.session import run_experiment
+from pam_actuation.rigging.session import Result, run_experiment
 from pam_actuation.tuning.tune import tune, TuneResult
 from pam_sim import load_rig
 from pam_sim.errors import InputError
@@ -50,6 +53,7 @@ from pam_sim.files import check_folder, make_folder, StrPath
 from pam_sim.gap import GapResult
 from pam_sim.run import Run
 
+R = TypeVar('R')
 Progress = Callable[[float], None]      # takes the share that is done, 0 to 1
 RIG = 'dmsp_5_300_realistic'
 NOMINAL = 'dmsp_5_300_hanging_mass'
@@ -57,6 +61,8 @@ SEED = 1
 GAP_SEARCH_S = 30.0         # longest; several effects of the realistic rig are missing
 QUICK_GAP_SEARCH_S = 5.0
 TUNING_ROLLOUTS = 150
+BUSY = ('a live run was interrupted twice, so this computer may be too busy for live nodes: close '
+        'other programs, then start the demo again')
 TITLES = {'ppr_learning': 'PPR, learning', 'ppr_frozen': 'PPR, rules frozen',
           'hsv_learning': 'HSV, learning'}
 TEXT_PPR = (
@@ -83,21 +89,57 @@ def gap_of_bag(bag: StrPath, folder: StrPath, seconds: float) -> GapResult:
     return write_gap([load_run(bag)], NOMINAL, folder, seconds=seconds)
 
 
+def interruptions(result: Result) -> list[str]:
+    """Return what interrupted a live run, a sentence each; [] of one that went as it should."""
+    told = [result.failure] if result.failure else (
+        [] if result.complete else [f'{result.missing} messages were not recorded'])
+    return told + result.findings
+
+
+def kept(results: Results[R]) -> Results[R]:
+    """Wait for the one result of ``in_processes``; return a generator that gives it."""
+    one, = results
+    return (again for again in (one,))
+
+
 @dataclass
 class DemoResult:
-    """What the demo made and found."""
+    """
+    What the demo made and found.
+
+    Attributes
+    ----------
+    folder, page : str
+        Where everything is, and the page in it.
+    bags : dict
+        Key of ``TITLES`` to the folder of a recording.
+    numbers : dict
+        Title to the main numbers of that run, SI.
+    findings : list of str
+        What is wrong.
+    repeated : list of str
+        Which live runs were made once more, and what interrupted the first ones.
+    busy : bool
+        A live run was interrupted the second time as well.
+    wall_s : float
+        Time that all took [s].
+
+    """
 
     folder: str
     page: str = ''
     bags: dict[str, str] = field(default_factory=dict)
     numbers: dict[str, dict[str, Any]] = field(default_factory=dict)
     findings: list[str] = field(default_factory=list)
+    repeated: list[str] = field(default_factory=list)
+    busy: bool = False
     wall_s: float = 0.0
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data for ``--json``."""
         return {'folder': self.folder, 'page': self.page, 'bags': self.bags,
-                'numbers': self.numbers, 'findings': self.findings, 'wall_s': self.wall_s}
+                'numbers': self.numbers, 'findings': self.findings, 'repeated': self.repeated,
+                'wall_s': self.wall_s}
 
     def text(self) -> str:
         """Return the result for people."""
@@ -108,9 +150,12 @@ class DemoResult:
                 lines.append(
                     f'{title}: tracking RMSE {1e3 * cycles[0]:.2f} mm in the first, '
                     f'{1e3 * cycles[-1]:.2f} mm in the last of {len(cycles)} cycles')
+        lines += [f'repeated: {text}' for text in self.repeated]
         lines += [f'finding: {text}' for text in self.findings]
         lines += [f'bag: {bag}' for bag in self.bags.values()]
         lines.append(f'page: {self.page}')
+        if self.busy:
+            lines.append(f'next: {BUSY}')
         if 'ppr_learning' in self.bags:
             out = os.path.join(self.folder, 'investigation')
             lines.append('next, record until it is clear what the nominal model misses: pam '
@@ -152,6 +197,7 @@ class Demo:
         # What runs beside: name of a bag to the readers' counts, and the gap of the first.
         self._read: dict[str, Results[dict[str, dict[str, int]]]] = {}
         self._found: Results[GapResult] | None = None
+        self._remark = ''           # on what is going on, beside the name of the step
 
     def run(self) -> DemoResult:
         """Run all steps and return the DemoResult."""
@@ -164,7 +210,8 @@ class Demo:
             for seconds, what, step in steps:
                 def inner(share: float, done: float = done, seconds: float = seconds,
                           what: str = what) -> None:
-                    self._progress((done + seconds * share) / total, what)
+                    self._progress((done + seconds * share) / total, what + self._remark)
+                self._remark = ''
                 inner(0.0)
                 step(inner)
                 done += seconds
@@ -188,22 +235,20 @@ class Demo:
         ]
 
     def _live(self, name: str, experiment: str, learning: bool, progress: Progress) -> None:
-        """Run one experiment on live nodes and load its bag."""
-        valve = name.split('_')[0]
-        result = run_experiment(
-            experiment, RIG, f'sofc_{valve}', valve, os.path.join(self.result.folder, name),
-            learning=learning, seed=SEED, progress=lambda done, whole: progress(done / whole))
-        if result.stopped:
-            raise KeyboardInterrupt
-        if not result.bag:
-            raise InputError(result.failure, TITLES[name])
+        """Run one experiment on live nodes, twice if it is interrupted, and load its bag."""
+        result = self._recorded(name, experiment, learning, progress)
+        first = interruptions(result)
+        if first and not result.failure:
+            self._remark = ', once more'
+            progress(0.0)
+            self._wait_for_what_runs_beside()
+            result = self._recorded(name, experiment, learning, progress, overwrite=True)
+            self.result.repeated.append(
+                f'{TITLES[name]}: the first run was interrupted, so the numbers are those of a '
+                f'second one. The first one said: {"; ".join(first)}')
+            self.result.busy |= bool(interruptions(result))
         self.result.bags[name] = result.bag
-        if result.failure:
-            self.result.findings.append(f'{TITLES[name]}: {result.failure}')
-        elif not result.complete:
-            lost = result.missing
-            self.result.findings.append(f'{TITLES[name]}: {lost} messages were not recorded')
-        self.result.findings += [f'{TITLES[name]}: {text}' for text in result.findings]
+        self.result.findings += [f'{TITLES[name]}: {text}' for text in interruptions(result)]
         self._read[name] = in_processes(2, [
             joblib.delayed(giving_way)(independent_readers, result.bag)])
         self._runs[name] = load_run(result.bag)
@@ -211,6 +256,27 @@ class Demo:
             self._found = in_processes(2, [joblib.delayed(giving_way)(
                 gap_of_bag, result.bag, os.path.join(self.result.folder, 'gap'),
                 self._gap_search_s)])
+
+    def _recorded(self, name: str, experiment: str, learning: bool, progress: Progress,
+                  overwrite: bool = False) -> Result:
+        """Run one experiment on live nodes; return its Result, which has a bag."""
+        valve = name.split('_')[0]
+        result = run_experiment(
+            experiment, RIG, f'sofc_{valve}', valve, os.path.join(self.result.folder, name),
+            learning=learning, seed=SEED, overwrite=overwrite,
+            progress=lambda done, whole: progress(done / whole))
+        if result.stopped:
+            raise KeyboardInterrupt
+        if not result.bag:
+            raise InputError(result.failure, TITLES[name])
+        return result
+
+    def _wait_for_what_runs_beside(self) -> None:
+        """Let the readers and the search of the gap end; their results are kept."""
+        for name, read in self._read.items():
+            self._read[name] = kept(read)
+        if self._found is not None:
+            self._found = kept(self._found)
 
     def _check(self, progress: Progress) -> None:
         """Open every bag with readers this project did not write, and count."""
@@ -270,4 +336,4 @@ class Demo:
         self.result.page = os.path.join(self.result.folder, 'report.html')
         self.result.numbers = demo_report(
             self.result.page, parts, tuning=self._tuning, gap=self._gap, checks=self._checks,
-            notes=self.result.findings)
+            notes=[f'Repeated: {text}.' for text in self.result.repeated] + self.result.findings)
