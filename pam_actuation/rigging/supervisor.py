@@ -22,6 +22,7 @@ from typing import Self, TYPE_CHECKING
 
 from pam_actuation.bags.ending import ERROR, FINISHED, tell_recorder
 from pam_actuation.drivers.decision import EMERGENCY_STOP
+from pam_actuation.drivers.faults import MAY_NOT_BE_VENTED
 from pam_actuation.messages import is_fault
 from pam_actuation.namespaces import node_name_of
 from pam_actuation.rigging.domain import own_domain
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
     from pam_actuation.rigging.processes import NodeProcess
 
 SILENT_S = 3.0            # without a status, which comes twice in a second
+_FAULT, _LATCHED, _NOT_VENTED = 1, 2, 3   # how grave the fault of a node is
 HEARD_S = 1.5             # a watchdog that sent a status within this time vents
 SETTLED_S = 1.0           # from the last node active to the first command and reading of all
 
@@ -69,7 +71,7 @@ class Supervisor:
                 **node.parameters, 'autostart': False})
             for node in nodes}, domain_id=domain_id)
         self.faults: list[str] = []
-        self._faulty: set[str] = set()
+        self._grades: dict[str, int] = {}       # of the fault that was told of a node
         self._silent: set[str] = set()
         self._unwatched: set[str] = set()       # drivers of which that was told
         self._from_start: set[str] = set()      # not well yet when the nodes became active
@@ -153,20 +155,19 @@ class Supervisor:
             told += [(name, *statuses[name][:2]) for name in self._from_start & statuses.keys()]
             self._from_start = set()
         for name, level, message in told:
-            faulty = is_fault(level, message)
-            if name in self._from_start and faulty:
+            grade, before = _grade(level, message, statuses[name][2]), self._grades.get(name, 0)
+            if name in self._from_start and grade:
                 continue
             self._from_start.discard(name)
-            if faulty == (name in self._faulty):
+            if grade <= before and bool(grade) == bool(before):
                 continue
-            if faulty:
-                self._faulty.add(name)
+            self._grades[name] = grade
+            if grade:
                 tell(f'{name}: {message}')
-                # An emergency stop is somebody's wish.
-                if statuses[name][2].get('state') != EMERGENCY_STOP:
+                # An emergency stop is somebody's wish; over-pressure latches in the same way.
+                if statuses[name][2].get('fault') != EMERGENCY_STOP or grade == _NOT_VENTED:
                     self.faults.append(f'{name}: {message}')
             else:
-                self._faulty.discard(name)
                 tell(f'{name} is well again: {message}')
 
     def _tell_silence(self, silent_s: Mapping[str, float], tell: Callable[[str], None]) -> None:
@@ -251,3 +252,12 @@ class Supervisor:
 def _watchdog(driver: str) -> str:
     """Return the full name of the node that watches a driver."""
     return f'{driver.rpartition("/")[0]}/{WATCHDOG}'
+
+
+def _grade(level: int, message: str, values: Mapping[str, str]) -> int:
+    """Return how grave a fault of a node is, 0 where it is well."""
+    if not is_fault(level, message):
+        return 0
+    if MAY_NOT_BE_VENTED in message:
+        return _NOT_VENTED
+    return _LATCHED if values.get('state') == EMERGENCY_STOP else _FAULT

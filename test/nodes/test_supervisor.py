@@ -97,6 +97,47 @@ def test_a_lost_reference_that_vents_is_told_and_a_finding(rig, name, lost, held
     assert rig.tell() == [f'{name} is well again: tracking']
 
 
+TRIP = 'over-pressure trip: 400 kPa gauge measured, trip at 325 kPa'
+REFUSES = 'the valve did not take its signal: no such device'
+UNVENTED = 'the device may not be vented: no such device'
+STOP, LATCHES = 'emergency stop: service call', {'state': 'emergency_stop'}
+
+
+def test_only_an_emergency_stop_latches_without_being_a_finding(rig):
+    rig.hear(DRIVER, 2, STOP, fault='emergency_stop', **LATCHES)
+    assert rig.tell() == [f'{DRIVER}: {STOP}'] and rig.supervisor.faults == []
+    rig.hear(DRIVER, 0, 'following the pressure command', state='ok', fault='')
+    assert len(rig.tell()) == 1
+    for fault, message in (('over_pressure', TRIP), ('device_refuses', REFUSES)):
+        rig.hear(DRIVER, 2, message, fault=fault, **LATCHES)
+        assert rig.tell() == [f'{DRIVER}: {message}'] == rig.supervisor.faults[-1:]
+        rig.hear(DRIVER, 0, 'following the pressure command', state='ok', fault='')
+        assert len(rig.tell()) == 1
+    assert len(rig.supervisor.faults) == 2
+
+
+def test_what_becomes_graver_is_told_though_a_fault_was_told_before(rig):
+    rig.hear(DRIVER, 2, 'vented because of something', state='vented', fault='pressure_timeout')
+    assert len(rig.tell()) == 1
+    rig.hear(DRIVER, 2, 'vented because of another thing', state='vented', fault='no_command')
+    assert rig.tell() == []
+    rig.hear(DRIVER, 2, TRIP, fault='over_pressure', **LATCHES)
+    assert rig.tell() == [f'{DRIVER}: {TRIP}']
+    rig.hear(DRIVER, 2, f'{TRIP}; {UNVENTED}', fault='over_pressure', **LATCHES)
+    assert rig.tell() == [f'{DRIVER}: {TRIP}; {UNVENTED}']
+    for message in (TRIP, f'{TRIP}; {UNVENTED}'):       # no flood of a device that comes and goes
+        rig.hear(DRIVER, 2, message, fault='over_pressure', **LATCHES)
+        assert rig.tell() == []
+    assert len(rig.supervisor.faults) == 3
+
+
+def test_an_emergency_stop_that_the_device_does_not_take_is_a_finding(rig):
+    rig.hear(DRIVER, 2, STOP, fault='emergency_stop', **LATCHES)
+    assert len(rig.tell()) == 1 and rig.supervisor.faults == []
+    rig.hear(DRIVER, 2, f'{STOP}; {UNVENTED}', fault='emergency_stop', **LATCHES)
+    assert rig.tell() == [f'{DRIVER}: {STOP}; {UNVENTED}'] == rig.supervisor.faults
+
+
 def test_a_rig_that_waits_for_its_first_reference_is_well(rig):
     rig.hear('/left/sofc_controller', 1, 'no reference yet')
     assert rig.tell() == [] == rig.supervisor.faults
