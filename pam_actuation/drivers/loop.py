@@ -159,7 +159,9 @@ class DriverLoop:
 
     def on_device(self, problem: str) -> None:
         """Tell how the valve's device took the last signal: what is wrong, '' if nothing."""
-        self.safety.on_device(problem)
+        decision = self.safety.on_device(problem)
+        if decision is not None:        # nothing is followed from now on, not from the next tick
+            self._decision, self._followed_pa = decision, _followed_pa(decision)
 
     def on_steady(self, steady_ns: int) -> None:
         """Tell, before a tick, the time [ns] of a clock that nobody sets."""

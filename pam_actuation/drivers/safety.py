@@ -155,11 +155,13 @@ class SafetySupervisor:
         """Tell that the driver vented and ticks no more: once it does it begins with a vent."""
         self._stopped = self._now_ns is not None
 
-    def on_device(self, problem: str) -> None:
-        """Tell how the device took the last signal: a problem latches, '' is all right."""
+    def on_device(self, problem: str) -> Decision | None:
+        """Tell how the device took the last signal: a problem latches; return what it changes."""
         self._device_problem = problem
-        if problem and self._latched is None:
-            self._latch('device_refuses', f'the valve did not take its signal: {problem}')
+        if not problem or self._latched is not None:
+            return None
+        return self._vent(self._latch(
+            'device_refuses', f'the valve did not take its signal: {problem}'))
 
     def law_failed(self, efforts: tuple[float, ...]) -> Decision:
         """Tell of a signal [V or duty] that is not finite; return the decision, which vents."""

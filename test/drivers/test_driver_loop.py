@@ -257,6 +257,20 @@ def test_a_signal_that_is_not_a_number_is_never_sent(valve):
     assert chain.pressures_kpa[-1] == pytest.approx(300.0, abs=3.0)
 
 
+@pytest.mark.parametrize('valve', ['ppr', 'hsv'])
+def test_a_device_that_refuses_is_told_with_the_signal_that_it_refused(valve):
+    """Not with the next one: its status said that the command is followed."""
+    chain = Chain(valve)
+    assert chain.run(2000).level == 0
+    chain.loop.on_device('no such device')
+    status = chain.loop.status()
+    values = dict(status.values)
+    assert status.level == 2 and values['fault'] == 'device_refuses' and values['vents'] == '1'
+    assert status.message.startswith('the valve did not take its signal: no such device')
+    assert chain.loop.followed().pressure_pa == P_ATM_PA
+    assert dict(chain.run(100).values)['vents'] == '1'
+
+
 def test_a_law_whose_model_runs_away_begins_anew():
     """As on a rig unlike the model: shut for one period, then the pressure is held again."""
     chain = Chain('hsv')
