@@ -79,6 +79,22 @@ def test_a_converter_around_zero_has_an_offset_and_may_share_its_scale(tmp_path)
     assert number_in(raw) == 2048 + round(1000.0 / DAC_SCALE_MV)
 
 
+@pytest.mark.parametrize('told', [True, False])
+def test_full_scale_is_the_highest_value(tmp_path, told):
+    """10 V behind an amplifier of 2 are all 4096 steps of 5 V; the highest value is 4095."""
+    raw = make_dac(tmp_path)
+    put(raw.with_name('out_voltage0_scale'), 5000.0 / 4096)
+    if not told:            # as the driver of the kernel for an MCP4725
+        raw.with_name('out_voltage0_raw_available').unlink()
+    config = DriverConfig.from_parameters({'ppr.highest_v': 10.0})
+    output = open_one(tmp_path, 'ppr', config=config, dac__amplification=2.0)
+    for volts, value in ((9.99, 4092), (10.0, 4095), (5.0, 2048), (0.0, 0)):
+        assert output.send((volts,)) == '' and number_in(raw) == value
+    assert output.close() == ''
+    with pytest.raises(InputError, match='10 V at .* raw value 8192, the converter has 0 to 4095'):
+        open_one(tmp_path, 'ppr', config=config)
+
+
 def test_duties_become_times_and_a_running_channel_is_taken_over(tmp_path):
     chip = make_pwm(tmp_path)
     output = open_one(tmp_path, 'hsv')
