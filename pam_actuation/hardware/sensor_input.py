@@ -19,11 +19,14 @@ A back end is a class made from ``SensorInput``. The node ``hardware_sensors`` a
 reading of each of its topics, once per period.
 """
 
+from collections.abc import Mapping
 import time
+from types import MappingProxyType
 from typing import Any
 
 from pam_actuation.hardware.failures import device_error
 from pam_actuation.hardware.sysfs import DeviceError
+from pam_actuation.hardware.waits import Waits
 from pam_sim.parameters import Parameter
 
 MUSCLE, JOINT = 'muscle', 'joint'           # where the sensors sit, and in whose namespace
@@ -32,10 +35,9 @@ TOPICS = {
 PLACE = 'place'         # in ``values``, beside the parameters
 # Of a muscle or joint: highest speed [1/s], smallest step that is no noise, unit of the sentence.
 FASTEST = {'contraction': (1.0, 0.003, 1e3, 'mm'), 'joint_state': (30.0, 0.1, 1.0, 'rad')}
-SHOWN_NS = 60_000_000_000               # a jump, or a read that waited
+SHOWN_NS = 60_000_000_000               # a jump
 LONGEST_WAIT_NS = 1_000_000_000         # for a new value
 ANOTHER_CLOCK_NS = 60_000_000_000       # so far off a time is not that of this computer
-LONGEST_READ_S = 0.1                    # then the driver vents
 Reading = float | tuple[float, int] | None
 
 
@@ -65,10 +67,12 @@ class SensorInput:
 
     PARAMETERS: tuple[Parameter, ...] = ()
     topics: tuple[str, ...] = ()
+    values: Mapping[str, Any] = MappingProxyType({})    # of one that does not call ``__init__``
+    place: str = MUSCLE
 
     def __init__(self, values: dict[str, Any]) -> None:
         self.values = values
-        self.place: str = values.get(PLACE, MUSCLE)
+        self.place = values.get(PLACE, MUSCLE)
 
     def read(self, topic: str) -> Reading:
         """
@@ -102,18 +106,17 @@ class NewReadings:
     ----------
     jumps : int
         How often a reading changed faster than any muscle or joint moves.
-    waits : int
-        How often the back end took 0.1 s or more for a reading.
+    waits : Waits
+        What the back end took long for.
 
     """
 
-    jumps = waits = 0
+    jumps = 0
     _jump, _jumped_ns = '', 0
-    _wait, _waited_s, _waited_ns = '', 0.0, 0
     _timed, _timed_ns = '', 0
 
     def __init__(self, sensors: SensorInput, begin_ns: int) -> None:
-        self._sensors = sensors
+        self._sensors, self.waits = sensors, Waits()
         self._newest_ns = dict.fromkeys(sensors.topics, begin_ns)
         self._last: dict[str, tuple[float, int]] = {}        # value and stamp
 
@@ -127,12 +130,12 @@ class NewReadings:
             The sensor does not answer, or has had no new value for a second.
 
         """
-        begin_s = time.monotonic()
+        begun_s = time.monotonic()
         try:
             try:
                 reading = self._sensors.read(topic)
             finally:
-                self._look_for_wait(topic, time.monotonic() - begin_s, now_ns)
+                self.waits.note(begun_s, f'read {topic}')
             read, stamp_ns = reading if isinstance(reading, tuple) else (reading, now_ns)
             value, stamp_ns = None if read is None else float(read), int(stamp_ns)
         except KeyboardInterrupt:
@@ -174,18 +177,3 @@ class NewReadings:
     def another_clock(self, now_ns: int) -> str:
         """Return a sentence on readings of the last second stamped by another clock, else ''."""
         return self._timed if 0 <= now_ns - self._timed_ns <= LONGEST_WAIT_NS else ''
-
-    def _look_for_wait(self, topic: str, waited_s: float, now_ns: int) -> None:
-        if waited_s < LONGEST_READ_S:
-            return
-        self.waits += 1
-        if waited_s > self._waited_s or not self.wait(now_ns):      # the longest that is shown
-            self._waited_s = waited_s
-            self._wait = (
-                f'the back end took {waited_s:.1f} s to read {topic}, and no sensor was read '
-                'meanwhile: read must not wait, so read a slow device in a thread')
-        self._waited_ns = now_ns
-
-    def wait(self, now_ns: int) -> str:
-        """Return a sentence on the longest wait in the last minute, '' if there was none."""
-        return self._wait if 0 <= now_ns - self._waited_ns <= SHOWN_NS else ''

@@ -19,10 +19,11 @@ A back end is a class made from ``ValveOutput``. The valve driver speaks to it
 through ``GuardedOutput`` only.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 import time
+from types import MappingProxyType
 from typing import Any, TYPE_CHECKING
 import weakref
 
@@ -31,6 +32,7 @@ from pam_actuation.hardware import sysfs
 from pam_actuation.hardware.claim import Claim
 from pam_actuation.hardware.failures import device_error
 from pam_actuation.hardware.sysfs import DeviceError
+from pam_actuation.hardware.waits import Waits
 from pam_sim.parameters import Parameter
 from pam_sim.valve import VALVES
 
@@ -67,6 +69,7 @@ class ValveOutput:
 
     VALVE_TYPES: tuple[str, ...] = VALVES
     PARAMETERS: tuple[Parameter, ...] = ()
+    values: Mapping[str, Any] = MappingProxyType({})    # of one that does not call ``__init__``
     safe_efforts: tuple[float, ...] = ()
     _claims: tuple[Claim, ...] = ()
 
@@ -137,8 +140,8 @@ class GuardedOutput:
     A valve output that vents when a write fails, and when nobody holds it any more.
 
     An output that was not closed vents when it is collected or when the interpreter
-    ends, whatever came before. ``failures`` counts; ``unvented`` is what is wrong with the newest
-    safe signal, '' if nothing.
+    ends, whatever came before. ``failures`` counts, ``waits`` notes what the device took long for.
+    ``unvented`` is what is wrong with the newest safe signal, '' if nothing.
 
     Parameters
     ----------
@@ -156,7 +159,7 @@ class GuardedOutput:
         self._last_resort = weakref.finalize(self, _vent_quietly, device)
         self._vented = False
         self.failures = 0
-        self.unvented = ''
+        self.unvented, self.waits = '', Waits()
 
     def send(self, efforts: tuple[float, ...]) -> str:
         """
@@ -216,6 +219,7 @@ class GuardedOutput:
         return problem
 
     def _try(self, action: Callable[..., Any]) -> str:
+        begun_s = time.monotonic()
         try:
             action()
         except KeyboardInterrupt:
@@ -223,6 +227,8 @@ class GuardedOutput:
         except BaseException as error:      # of a back end of somebody else
             self.failures += 1
             return str(device_error(error, type(self._device), self._device.values))
+        finally:
+            self.waits.note(begun_s, 'take a signal')
         return ''
 
 

@@ -33,6 +33,9 @@ from pam_actuation.nodes.runner import run
 from pam_actuation.topics.table import topic_of
 from pam_sim.errors import InputError
 
+WAITED = (', and no sensor was read meanwhile: read must not wait, so read a slow device in a '
+          'thread')
+
 
 class HardwareSensors(ManagedNode):
     """
@@ -86,7 +89,7 @@ class HardwareSensors(ManagedNode):
     def diagnostic_values(self) -> Values:
         """Add how often a sensor did not answer, a reading jumped, and the back end waited."""
         seen = () if self._readings is None else (
-            ('jumps', self._readings.jumps), ('long_reads', self._readings.waits))
+            ('jumps', self._readings.jumps), ('long_reads', self._readings.waits.count))
         return (*super().diagnostic_values(), ('read_failures', self.failures), *seen)
 
     def tick(self) -> None:
@@ -107,7 +110,8 @@ class HardwareSensors(ManagedNode):
         now_ns = self.now_ns()
         problem = problem or self._readings.another_clock(now_ns)
         # A sensor may seem silent because the back end waits for another one.
-        told = [self._readings.wait(now_ns), problem or self._readings.jump(now_ns)]
+        waited = self._readings.waits.says and f'{self._readings.waits.says}{WAITED}'
+        told = [waited, problem or self._readings.jump(now_ns)]
         if any(told):
             self.diagnostics.update(
                 ERROR if problem else WARN, '; '.join(text for text in told if text))

@@ -35,7 +35,7 @@ from pam_actuation.messages import Pressure
 from pam_actuation.messages import ValveSignal
 from pam_actuation.namespaces import node_name_of
 from pam_actuation.nodes import lockstep
-from pam_actuation.nodes.diagnostics import ERROR, Values
+from pam_actuation.nodes.diagnostics import ERROR, Values, WARN
 from pam_actuation.nodes.endpoints import PolledSubscription
 from pam_actuation.nodes.lockstep import TickInput
 from pam_actuation.nodes.managed import ManagedNode
@@ -206,7 +206,8 @@ class ValveDriver(ManagedNode):
         values = (*super().diagnostic_values(), ('backend', self.value('backend')))
         if self.output is None:
             return values
-        values = (*values, ('device_failures', self.output.failures))
+        values = (*values, ('device_failures', self.output.failures),
+                  ('device_long_calls', self.output.waits.count))
         for name, latency in self._latencies.items():
             values = (*values, *latency.values(f'{name}.latency'))
         vents = self.output.watchdog_vents
@@ -286,6 +287,10 @@ class ValveDriver(ManagedNode):
         if self.output.unvented:
             level = ERROR
             message += f'; {MAY_NOT_BE_VENTED}: {self.output.unvented}'
+        if self.output.waits.says and self.value('backend') not in NO_DEVICE:
+            level = max(level, WARN)
+            message += (f'; {self.output.waits.says}, and the driver stood still meanwhile: give '
+                        'write a short time-out')
         self.diagnostics.update(level, message, self.loop.values)
 
     def safe_stop(self, why: str) -> None:

@@ -223,3 +223,28 @@ def test_a_device_that_blocks_keeps_no_driver_alive(bench, rig):
     assert driver.wait(10.0), 'the driver does not end'
     assert driver.exit_code == 1
     assert driver.last_line().endswith('the device does not answer: NOT MADE SAFE')
+
+
+def test_a_write_that_waits_is_counted_and_told(bench, opened, monkeypatch):
+    def slow(device, efforts):
+        time.sleep(0.11)
+        raise TimeoutError('no answer')
+    output = opened()
+    assert output.waits.says == ''
+    with monkeypatch.context() as patch:
+        patch.setattr(WriteOnly, 'write', slow)
+        output.send((3.0,))
+    assert output.waits.says == 'the back end took 0.1 s to take a signal'
+    assert output.waits.count == 2          # the voltage and 0 V
+
+
+@pytest.mark.ros
+def test_a_device_that_blocked_for_a_moment_is_told_as_the_reason(bench, rig):
+    bench.breaks(BLOCKED)
+    time.sleep(1.0)
+    bench.is_well()
+    words = ' s to take a signal, and the driver stood still meanwhile: give write a'
+    rig.wait_for(lambda: words in rig.health['valve_driver'][-1].message, 5.0, 'the reason')
+    assert any('driver itself was stopped' in said.message and words in said.message
+               for said in rig.health['valve_driver'])
+    rig.follows()

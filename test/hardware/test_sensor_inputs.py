@@ -18,7 +18,7 @@ from contextlib import suppress
 from types import SimpleNamespace
 
 from fake_sysfs import make_adc, put
-from pam_actuation.hardware import sensor_input
+from pam_actuation.hardware import sensor_input, waits
 from pam_actuation.hardware.back_ends import open_sensors, parameters_of, SENSOR_INPUTS
 from pam_actuation.hardware.sensor_input import NewReadings, SensorInput
 from pam_actuation.hardware.sysfs import DeviceError
@@ -175,8 +175,10 @@ def test_a_stamp_that_is_no_number_is_told(stamp):
 @pytest.mark.parametrize('fails', [False, True])
 def test_a_read_that_waits_is_told_for_a_minute(fails, monkeypatch):
     cell, now_ns, clock_s = SlowCell({}), 1_700_000_000 * 10 ** 9, [0.0]
+    clock = SimpleNamespace(monotonic=lambda: clock_s[0])
+    for module in (sensor_input, waits):
+        monkeypatch.setattr(module, 'time', clock)
     readings = NewReadings(cell, now_ns)
-    monkeypatch.setattr(sensor_input, 'time', SimpleNamespace(monotonic=lambda: clock_s[0]))
 
     def read(waits_s):
         def waiting(topic):
@@ -188,19 +190,16 @@ def test_a_read_that_waits_is_told_for_a_minute(fails, monkeypatch):
         cell.read = waiting
         with suppress(DeviceError):
             readings.take('force', now_ns)
+        return readings.waits.says
 
-    read(0.09)
-    assert readings.wait(now_ns) == '' and readings.waits == 0
-    read(2.0)
-    said = readings.wait(now_ns)
-    assert said.startswith('the back end took 2.0 s to read force') and readings.waits == 1
-    now_ns += 59 * 10 ** 9
-    read(0.2)
-    assert readings.wait(now_ns) == said and readings.waits == 2
-    now_ns += 61 * 10 ** 9
-    assert readings.wait(now_ns) == ''
-    read(0.3)
-    assert readings.wait(now_ns).startswith('the back end took 0.3 s')
+    assert read(0.09) == '' and readings.waits.count == 0
+    said = read(2.0)
+    assert said == 'the back end took 2.0 s to read force' and readings.waits.count == 1
+    clock_s[0] += 59.0
+    assert read(0.2) == said and readings.waits.count == 2      # the longest
+    clock_s[0] += 61.0
+    assert readings.waits.says == ''
+    assert read(0.3) == 'the back end took 0.3 s to read force'
 
 
 def test_garbage_of_a_board_is_told_with_its_parameters(tmp_path, monkeypatch):
