@@ -25,8 +25,9 @@ from pam_actuation.hardware.iio_adc import IioAdc
 from pam_actuation.hardware.iio_dac import IioDac
 from pam_actuation.hardware.other_packages import SENSOR_GROUP, VALVE_GROUP, with_others
 from pam_actuation.hardware.pwm_sysfs import PwmPair
-from pam_actuation.hardware.sensor_input import SensorInput
+from pam_actuation.hardware.sensor_input import MUSCLE, PLACE, SensorInput, TOPICS
 from pam_actuation.hardware.sim import SimulatedValve
+from pam_actuation.hardware.sysfs import DeviceError
 from pam_actuation.hardware.valve_output import GuardedOutput, ValveOutput
 from pam_sim.errors import InputError
 from pam_sim.parameters import Parameter
@@ -113,7 +114,17 @@ def open_sensors(name: str, values: dict[str, Any]) -> SensorInput:
 
     """
     back_end = SENSOR_INPUTS[name]
-    return _tell(lambda: back_end(values), back_end, values)
+
+    def opened() -> SensorInput:
+        sensors = back_end(values)
+        known, topics = TOPICS[values.get(PLACE, MUSCLE)], sensors.topics
+        if isinstance(topics, str) or not topics or len({*topics} & {*known}) != len(topics):
+            close_sensors(sensors)
+            raise DeviceError(
+                f'its topics are {topics!r}; needed is a tuple of names among {", ".join(known)}, '
+                f'each once, such as ({known[0]!r},)', f'back end {back_end.__name__}')
+        return sensors
+    return _tell(opened, back_end, values)
 
 
 def close_sensors(sensors: SensorInput) -> str:

@@ -202,6 +202,45 @@ def test_a_read_that_waits_is_told_for_a_minute(fails, monkeypatch):
     assert read(0.3) == 'the back end took 0.3 s to read force'
 
 
+def with_topics(topics):
+    """Return a back end that publishes some topics, and notes that it was closed."""
+    class Board(SensorInput):
+        closed = 0
+
+        def __init__(self, values):
+            self.topics = topics        # values are of no use here
+
+        def read(self, topic):
+            raise OSError('no such board')
+
+        def close(self):
+            Board.closed += 1
+
+    return Board
+
+
+@pytest.mark.parametrize('topics', [
+    'pressure', (), None, ('pressure', 'temperature'), ('pressure', 'pressure'),
+    ('joint_state',), ('pressure_command',), ([],)])
+def test_topics_that_no_sensor_of_a_muscle_has_are_refused(topics, monkeypatch):
+    board = with_topics(topics)
+    monkeypatch.setitem(SENSOR_INPUTS, 'board', board)
+    with pytest.raises(InputError) as told:
+        open_sensors('board', {})
+    if topics == ([],):
+        assert 'TypeError' in str(told.value)
+        return
+    assert str(told.value).startswith(f'back end Board: its topics are {topics!r}; needed is a')
+    assert "such as ('pressure',)" in str(told.value) and board.closed == 1
+
+
+def test_a_back_end_that_keeps_no_values_is_told_by_what_it_raises(monkeypatch):
+    monkeypatch.setitem(SENSOR_INPUTS, 'board', with_topics(('pressure', 'force')))
+    sensors = open_sensors('board', {})
+    with pytest.raises(DeviceError, match='back end Board: OSError: no such board'):
+        NewReadings(sensors, 0).take('pressure', 0)
+
+
 def test_garbage_of_a_board_is_told_with_its_parameters(tmp_path, monkeypatch):
     def garbage(self, topic):
         raise ConnectionError('no such board')
