@@ -20,7 +20,8 @@ import sys
 from typing import TYPE_CHECKING
 
 from pam_actuation.cli.common import (
-    add_other_rig_option, add_overwrite_option, emit, EXIT_DONE, EXIT_FINDING, tell_remarks)
+    add_other_rig_option, add_overwrite_option, emit, EXIT_DONE, EXIT_FINDING, say_remarks,
+    tell_remarks)
 from pam_actuation.cli.lasting import lasting_output
 from pam_actuation.cli.options import count, HIGHEST_SEED, number, out_path, Parser, source
 from pam_actuation.cli.viewed import add_view_option, viewed
@@ -111,7 +112,7 @@ def run(args: argparse.Namespace) -> int:
     nodes = _nodes(args)
     check_hardware(nodes)
     if args.params_file is not None:
-        check_users_file(args.params_file, nodes)
+        say_remarks(args, check_users_file(args.params_file, nodes))
     if args.policy is None:
         for node in nodes:
             if node.name == RECORDER:

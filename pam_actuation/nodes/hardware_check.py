@@ -59,9 +59,12 @@ def check_hardware(nodes: Iterable[NodeSpec]) -> None:
 
 
 def check_users_file(file: str, nodes: Iterable[NodeSpec],
-                     more: Mapping[str, object] | None = None, alone: bool = True) -> None:
+                     more: Mapping[str, object] | None = None, alone: bool = True) -> list[str]:
     """
     Check a file with parameters for any of the nodes, before one of them starts.
+
+    Returns a sentence for each entry that names one of these nodes in another namespace: that of
+    another rig, or a misspelt one.
 
     It may hold those of other nodes too, of a larger stack. ``more``: what every node that has
     such a parameter is started with besides those of its own. Not ``alone``: the file may be for
@@ -86,7 +89,7 @@ def check_users_file(file: str, nodes: Iterable[NodeSpec],
              if path}
     hardware = {name: _stated(name, trees[node.parameter_file]) for name, node in named.items()
                 if node.parameter_file}
-    none = True
+    none, elsewhere = True, []
     for words, holder, key in entries(tree):
         reached = {name: node for name, node in named.items() if matches(words, name)}
         if reached:
@@ -95,6 +98,9 @@ def check_users_file(file: str, nodes: Iterable[NodeSpec],
             _check_values(given, reached, more or {}, hardware)
         elif words[-1] not in (*ORDER, *WILDCARDS) and (near := did_you_mean(words[-1], kinds)):
             raise holder.error(f'unknown node `{words[-1]}`{near}', key)
+        elif words[-1] in kinds:
+            elsewhere.append(f'{holder.where(key)}: `{key}` names none of the nodes that are '
+                             'started, so what it states is not used here')
     timed = [name for name in named if True in _stated(name, tree).get(SIMULATED_TIME, ())]
     if timed and len(timed) < len(named) and not (more or {}).get(SIMULATED_TIME):
         others = ', '.join(name for name in named if name not in timed)
@@ -103,6 +109,7 @@ def check_users_file(file: str, nodes: Iterable[NodeSpec],
     if none and alone:
         raise tree.error(f'is for none of the nodes that are started: {", ".join(named)}')
     check_entries(tree, named)
+    return elsewhere if alone else []
 
 
 def _stated(full_name: str, tree: Located) -> dict[str, list[object]]:

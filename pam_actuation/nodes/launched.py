@@ -21,7 +21,7 @@ import signal
 import tempfile
 from typing import Any, TYPE_CHECKING
 
-from launch.actions import EmitEvent, RegisterEventHandler
+from launch.actions import EmitEvent, LogInfo, RegisterEventHandler
 from launch.event_handlers import OnProcessExit
 from launch.events import matches_action, Shutdown
 from launch.events.process import ShutdownProcess
@@ -150,7 +150,7 @@ def joint_nodes(given: Given, place: str, seed: int, name: str = '') -> 'list[No
 
 def users_file(given: Given, nodes: 'Iterable[NodeSpec]', alone: bool = True) -> list[Any]:
     """
-    Return the action that hands the file of ``params_file`` to all nodes, [] without a file.
+    Return the actions that hand the file of ``params_file`` to all nodes, [] without a file.
 
     Parameters
     ----------
@@ -170,8 +170,8 @@ def users_file(given: Given, nodes: 'Iterable[NodeSpec]', alone: bool = True) ->
     file = given('params_file')
     if not file:
         return []
-    check_users_file(file, nodes, {
+    remarks = check_users_file(file, nodes, {
         'learning': given('learning') == 'true',
         'use_sim_time': given('use_sim_time') == 'true',
         'realtime_priority': int(given('realtime_priority'))}, alone)
-    return [SetParametersFromFile(file)]
+    return [*(LogInfo(msg=f'remark: {text}') for text in remarks), SetParametersFromFile(file)]

@@ -227,7 +227,11 @@ def test_a_limit_that_misses_the_drivers_of_the_rig_is_refused(tmp_path, name, w
 def test_a_limit_of_another_rig_may_stand_in_the_file_of_a_stack(tmp_path, name):
     file, limit = tmp_path / 'mine.yaml', f'\n{LIMIT.replace("/**/valve_driver", name)}'
     file.write_text(STACK + limit)
-    check_users_file(str(file), layouts.knee('/left/knee'))
+    told = check_users_file(str(file), layouts.knee('/left/knee'))
+    # It may be a misspelt name as well, so it is told.
+    reached = name == '/left/knee/flexor/valve_driver'
+    assert any(f'`{name}` names none of the nodes' in one for one in told) is not reached
+    assert check_users_file(str(file), layouts.knee('/left/knee'), alone=False) == []
     file.write_text(DRIVER + SENSORS.replace(', place: muscle', '') + limit)
     check_hardware(layouts.knee('/left/knee', hardware=str(file)))
 
