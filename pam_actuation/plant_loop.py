@@ -125,12 +125,22 @@ class PlantClock:
         """Advance the plant by some steps."""
         raise NotImplementedError
 
+    def follow(self, now_ns: int) -> None:
+        """
+        Go on from a clock that went back by more than ``longest_catch_up_s``; else do nothing.
+
+        It begins anew where a recording is played again, or where the computer sets it.
+        """
+        present_ns = self.now_ns
+        if present_ns is not None and present_ns - now_ns > self.longest_catch_up_ns:
+            self._start_ns = now_ns - self.steps * self.dt_ns
+
     def advance_to(self, now_ns: int) -> int:
         """
         Step the physics up to ``now_ns``; return the number of steps done.
 
         The first call only sets the start time. A clock that goes back does nothing
-        until it has caught up.
+        until it has caught up, unless ``follow`` is told.
         """
         if self._start_ns is None:
             self._start_ns = now_ns

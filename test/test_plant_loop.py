@@ -47,6 +47,17 @@ def test_steps_to_the_clock():
     assert plant.plant.time_s == pytest.approx(0.010) and plant.steps == 10
 
 
+def test_the_plant_goes_on_from_a_clock_that_begins_anew():
+    plant = make()
+    plant.advance_to(START + 200 * MS)
+    before = plant.plant.time_s
+    plant.follow(START + 150 * MS)              # a little back: it waits
+    assert plant.now_ns == START + 200 * MS
+    plant.follow(START - 10_000 * MS)           # a recording is played again
+    assert plant.now_ns == START - 10_000 * MS and plant.plant.time_s == before
+    assert plant.advance_to(START - 9_990 * MS) == 10 and not plant.skipped_s
+
+
 def test_equals_the_rollout():
     """The same inputs through simulate give the same pressures to the bit."""
     plant = make('hsv', 'dmsp_5_300_realistic')

@@ -97,6 +97,7 @@ class PhysicsNode(ManagedNode):
             a moment after a standstill.
 
         """
+        self.plant.follow(now_ns)
         if self.simulated_time is None:
             taken = self._backlog.take(now_ns, arrived)
             if taken is None:
