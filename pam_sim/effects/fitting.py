@@ -104,6 +104,9 @@ class Fitting:
         Parameter of the model that does the same to all signals but a measured force.
     delay : str
         Parameter by which the effect is late as a whole, as behind the filter of a sensor.
+    pure_delay : bool
+        Whether ``delay`` delays the command of the valve and changes nothing else, so that no
+        recording tells it from a latency of all sensors.
     edges : tuple of str
         Parameters by which rising and falling edges are late, each by its own.
     sensor_signal, sensor_change : str
@@ -128,6 +131,7 @@ class Fitting:
     same_as: str = ''
     same_without_force: str = ''
     delay: str = ''
+    pure_delay: bool = False
     edges: tuple[str, ...] = ()
     sensor_signal: str = ''
     sensor_change: str = ''

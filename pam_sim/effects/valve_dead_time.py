@@ -68,7 +68,7 @@ EFFECT = Effect(
     order=90,               # after anything that changes the command itself
     fitting=Fitting(
         free=(FreeParameter('delay_s', 0.01, 0.0, 0.3, starts=DELAY_STARTS_S),),
-        delay='delay_s'),
+        delay='delay_s', pure_delay=True),
 )
 
 

@@ -100,7 +100,7 @@ EFFECT = Effect(
     fitting=Fitting(
         free=(FreeParameter('delay_s', 0.01, 0.0, 0.3),
               FreeParameter('vent_later_s', 0.01, -0.3, 0.3, starts=(0.01, -0.01))),
-        delay='delay_s'),
+        delay='delay_s', pure_delay=True),
 )
 
 

@@ -28,6 +28,7 @@ from pam_sim.gap.result import Calibrated, GapResult
 from pam_sim.gap.select.comparison import gap
 from pam_sim.gap.select.rival import NamedEffect, Rival
 from pam_sim.gap.select.search import Outcome
+from pam_sim.gap.subsystems.known import latency_sd_s
 from pam_sim.gap.verify.materiality import is_material
 from pam_sim.gap.verify.model import as_given, held_without, model_of, numbers_of
 from pam_sim.gap.verify.notice import Notice, notices, stamp_sd_s, supply_notice
@@ -96,12 +97,14 @@ def fill(result: GapResult, outcome: Outcome, validation: Validation) -> None:
     result.parameters = [c for c in result.calibration if c.name in free]
     model = model_of(estimator, final)
     settings = list(model.effects)
+    late_sd_s = latency_sd_s(k for p in estimator.problems for k in p.known)
     for w in outcome.named:
         place = next((i for i, c in enumerate(final.hypothesis.effects) if c.name == w.name), None)
         if place is None:
             continue
         numbers = effect_numbers(
-            model, final, place, precision, w, 1.0 - outcome.share.get(w.subsystem, 1.0))
+            model, final, place, precision, w, 1.0 - outcome.share.get(w.subsystem, 1.0),
+            late_sd_s)
         effect = get_effect(w.name)
         formulation = final.hypothesis.effects[place].effect
         result.effects.append({

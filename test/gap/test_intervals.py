@@ -19,6 +19,7 @@ import numpy as np
 from pam_sim import load_rig
 from pam_sim.gap import find_gap
 from pam_sim.gap.fit.profile import NORMAL_95, profile_ends
+from pam_sim.gap.subsystems.known import LATENCY_SD_S
 from pam_sim.gap.verify.together import known_together
 import pytest
 
@@ -154,6 +155,20 @@ def test_a_formulation_at_the_end_of_its_range_gives_way_to_one_that_explains_as
     effect, = result.effects
     assert set(effect['equivalent']) == {'open_time_s', 'close_time_s'}
     assert not any('at the end of its range' in remark for remark in result.remarks)
+
+
+@pytest.mark.parametrize('delay_s', [0.0115, 0.0155, 0.0204])
+def test_a_pure_delay_is_known_no_better_than_the_latency_of_the_sensors(delay_s):
+    # Whole steps or parts of one: the interval does not rest on how the simulation steps.
+    rig = nominal().with_(effects=[{
+        'name': 'valve_dead_time', 'parameters': {'delay_s': delay_s}}])
+    result = find_gap(recorded(rig, voltages(20.0), 500), nominal(),
+                      effects=['valve_dead_time'], unnamed=())
+    told = result.effects[0]['equivalent']['delay_s']
+    low, high = told['ci95']
+    assert low <= delay_s <= high
+    assert min(told['value'] - low, high - told['value']) >= NORMAL_95 * LATENCY_SD_S
+    assert_form(result)
 
 
 def test_a_number_has_the_interval_of_the_data_not_that_of_its_prior():

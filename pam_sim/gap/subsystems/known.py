@@ -14,6 +14,7 @@
 
 """Numbers with a prior: of the rig, and of the measurement of a recording."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 import math
 
@@ -22,6 +23,7 @@ from pam_sim.rig import Rig
 from pam_sim.tolerance import UNKNOWN
 from pam_sim.valve import hsv, ppr
 
+LATENCY = 'latency'
 LATENCY_PRIOR_S, LATENCY_SD_S, LATENCY_MAX_S = 1e-3, 1e-3, 3e-3
 SKEW_SD_S, SKEW_MAX_S = 0.5e-3, 1.5e-3
 UNSEEN_MEAN, UNSEEN_SD = 0.25, 0.3       # of the time in which a valve signal changed unseen
@@ -72,8 +74,17 @@ def latency(index: int, unseen_s: float) -> Known:
     where a slow loop sends it, with the message.
     """
     sd = math.hypot(LATENCY_SD_S, UNSEEN_SD * unseen_s)
-    return Known(of_run('latency', index), 's', LATENCY_PRIOR_S - UNSEEN_MEAN * unseen_s, sd,
+    return Known(of_run(LATENCY, index), 's', LATENCY_PRIOR_S - UNSEEN_MEAN * unseen_s, sd,
                  -unseen_s, LATENCY_MAX_S, False, GRID_S / sd)
+
+
+def latency_sd_s(known: Iterable[Known]) -> float:
+    """
+    Return how well the latency of recordings is known [s], 0 without one.
+
+    Filters of the sensors are the same in all recordings, so many tell it no better than one.
+    """
+    return min((k.sd for k in known if k.name.split('_')[0] == LATENCY), default=0.0)
 
 
 def of_run(name: str, index: int) -> str:

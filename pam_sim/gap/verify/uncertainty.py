@@ -18,9 +18,10 @@ How well the numbers of a named effect are known.
 There are three sources. The first is the tempered likelihood around the solution, or the
 difference between time blocks if that is larger; and how far a number may go, all others fitted
 again, before the errors rise. The second is what latency and skew of the measurement absorbed,
-since it may belong to the effect. The third is the form: no formulation is exactly that of the
-muscle. It is the spread over formulations of the same effect that explain about as much, and the
-rest of the gap. Results state quantities that mean the same in all formulations.
+since it may belong to the effect; a pure delay is known no better than that latency. The third is
+the form: no formulation is exactly that of the muscle. It is the spread over formulations of the
+same effect that explain about as much, and the rest of the gap. Results state quantities that mean
+the same in all formulations.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -53,7 +54,7 @@ Told = Callable[[FloatArray], Report]
 
 
 def effect_numbers(rig: Rig, found: Fit, place: int, precision: Precision, named: NamedEffect,
-                   rest: float) -> dict[str, Any]:
+                   rest: float, late_sd_s: float = 0.0) -> dict[str, Any]:
     """
     Return what gap.json says of the numbers of one effect of a fit.
 
@@ -71,6 +72,8 @@ def effect_numbers(rig: Rig, found: Fit, place: int, precision: Precision, named
         With the fits in other formulations.
     rest : float
         Share of the squared gap of its subsystem that the model leaves.
+    late_sd_s : float
+        How well the latency of the recordings is known, s. A pure delay is known no better.
 
     Returns
     -------
@@ -85,6 +88,7 @@ def effect_numbers(rig: Rig, found: Fit, place: int, precision: Precision, named
     spreads = [c[rows, rows] for c in (precision.likelihood, precision.blocks)]
     ends = precision.ends[rows, :, rows]
     held = precision.held[rows]
+    late = _late(candidate, late_sd_s)
     # What is left may be the effect's own: a formulation that is a little off.
     off = FORM * math.sqrt(max(rest, 0.0))
     scaled = [f in candidate.amplitudes or not candidate.amplitudes for f in candidate.free]
@@ -93,7 +97,8 @@ def effect_numbers(rig: Rig, found: Fit, place: int, precision: Precision, named
 
     def entries(told: Told, spread: Mapping[str, float]) -> dict[str, Entry]:
         pairs = [[[told(end) for end in pair]] for pair in ends]
-        moved = [_along_axes(told, theta, own) for own in spreads] + pairs
+        moved = [_along_axes(told, theta, own) for own in spreads] + pairs + [
+            [[told(theta + late), told(theta - late)]]]
         shifted = told(held)
         formed = [told(theta + sign * push) for sign in (-1.0, 1.0)]
         limits = [told(np.array(corner)) for corner in product(*(
@@ -132,6 +137,17 @@ def half_width(precision: Precision, place: int, value: float) -> float:
     """Return half the 95 % interval of one normalised number, what has no form left out."""
     variance = max(c[place, place] for c in (precision.likelihood, precision.blocks))
     return float(np.hypot(NORMAL_95 * np.sqrt(variance), HELD * (precision.held[place] - value)))
+
+
+def _late(candidate: Candidate, late_sd_s: float) -> FloatArray:
+    """
+    Return by how much a latency that is known so well may move the parameters of an effect.
+
+    Slopes do not tell it: a delay between two steps of the simulation also blurs the command.
+    """
+    fitting = get_effect(candidate.effect).fitting
+    return np.array([NORMAL_95 * late_sd_s / f.typical if (
+        fitting.pure_delay and f.name == fitting.delay) else 0.0 for f in candidate.free])
 
 
 def _pushed(pairs: Sequence[Sequence[Report]], name: str, value: float, sign: float) -> float:
