@@ -97,6 +97,17 @@ def test_the_cell_of_the_model_reads_the_weight_at_rest(simulated, rig):
     assert np.array_equal(bare.measured['force'], seen.measured['force'])
 
 
+def test_a_load_that_moves_far_from_its_stop_is_light_and_at_no_rest():
+    """There a line does not reach to zero contraction, and the stated mass is too heavy."""
+    t = np.arange(16_000) * 1e-3
+    u = np.where(t < 1.0, 0.0, 4.4 + 0.2 * np.sin(2.0 * np.pi * 0.5 * t))
+    light = recorded(nominal().with_(parameters={'mass_kg': 1.0}), u,
+                     initial_pressure_pa=101_325.0)
+    assert rest_of(light, nominal()) is None
+    real, _ = on_a_stop(recorded(nominal(), u, initial_pressure_pa=101_325.0))
+    assert rest_of(real, nominal()).weight_n == pytest.approx(WEIGHT_N)
+
+
 def test_a_light_load_on_a_spring_pulls_nothing_at_rest():
     """Its force begins at zero, so nothing is missing there."""
     truth = nominal().with_(parameters={'mass_kg': 0.1, 'spring_n_per_m': 3000.0})

@@ -77,8 +77,8 @@ def rest_of(run: Run, rig: Rig, criteria: Criteria = CRITERIA, added_kg: float =
 
     A force that is far below the weight at zero contraction may also be that of a lighter load, or
     of a spring. So it must be far below what the same load cell reads of the moving load. A
-    straight line carries that on to zero contraction. Where the mass is known, the force must be
-    far below its weight, too.
+    straight line carries that on to zero contraction; the median counts where the load moves too
+    far from there for a line. Where the mass is known, the force must be far below its weight, too.
 
     Parameters
     ----------
@@ -109,7 +109,8 @@ def rest_of(run: Run, rig: Rig, criteria: Criteria = CRITERIA, added_kg: float =
     known = least is not None
     if not known and line is None or np.count_nonzero(~resting) < LEAST_SAMPLES:
         return None
-    limit = criteria.greater_part * min(w for w in (least, line) if w is not None)
+    moving = float(np.median(force[~resting])) if line is None else line
+    limit = criteria.greater_part * min(w for w in (least, moving) if w is not None)
     low = resting & (force < limit - criteria.certain_sd * noise_sd(force))
     if limit <= 0.0 or _longest_s(low, stamp) < criteria.least_rest_s:
         return None
