@@ -23,6 +23,7 @@ from pam_actuation.report.pages import FOOTER
 from pam_actuation.report.sections.gap import interval, percent, quantity, size, VERDICT_TEXT
 from pam_actuation.report.sections.replay import SHOWN
 from pam_sim.gap.propose.surrogate import in_words
+from pam_sim.units import behind_number
 
 if TYPE_CHECKING:
     from pam_actuation.investigate.outcome import Outcome
@@ -106,8 +107,8 @@ def _effects(gap: dict[str, Any]) -> str:
 
 
 def _parameters(gap: dict[str, Any]) -> str:
-    rows = [[one['name'], f'{one["nominal"]:.5g} {one["unit"]}',
-             f'{one["value"]:.5g} {one["unit"]}', interval(one['ci95'])]
+    rows = [[one['name'], *(f'{one[key]:.5g}{behind_number(one["unit"])}'
+                            for key in ('nominal', 'value')), interval(one['ci95'])]
             for one in gap['parameters']]
     return table(['parameter', 'given', 'found', '95 % interval'], rows) if rows else ''
 

@@ -75,6 +75,14 @@ def test_no_gap_by_the_materiality_that_was_given_is_told_with_its_sizes():
         'The calibrated model misses 8 kPa of pressure. This is too small to matter by the '
         'materiality that was given.')
     assert 'within sensor noise' in said('no_gap', {'pressure': PRESSURE, 'force': FORCE})
+    # A gap that calibration closes is told with what closed it.
+    gain, mass = (Calibrated(*of) for of in (
+        ('force_map_gain', '-', 1.0, 1.05, (1.04, 1.06), 2.5), ('mass_kg', 'kg', 5.0, 5.02, (
+            5.01, 5.03), 0.2)))
+    for signals in ({'pressure': PRESSURE, 'force': FORCE}, {'pressure': PRESSURE}):
+        text = said('no_gap', signals, calibration=[mass, gain])
+        assert ('tolerance. Calibration moved force_map_gain from 1 to 1.05 (+2.5 of its '
+                'standard deviations).') in text
     slight = SubsystemVerdict('no_gap', (), 'force', FORCE, 1.0, is_slight=True)
     assert slight.text() == '0.191 N unexplained, too small to matter'
 
@@ -100,6 +108,18 @@ def test_the_time_for_unknown_numbers_counts(monkeypatch):
         spent.append(spent_s), GapResult('no_gap', ''))[-1])
     gap_report.gap_of([recorded(nominal(), voltages(6.0))], nominal())
     assert 0.2 <= spent[0] < 5.0
+
+
+def test_a_name_that_is_wrong_is_the_reason_why_nothing_is_named():
+    outcome = SimpleNamespace(named=[], share={'muscle': 0.99}, complete=True,
+                              mistaken={'coulomb_friction': 'smooth_friction'})
+    text = explain(GapResult('unknown', '', signals={'force': FORCE}), outcome)
+    assert 'explains 99 % in the muscle of the data that were searched, but its name' in text
+    assert 'numbers far from' not in text
+    assert text.endswith('Ask for that with `--effects smooth_friction`.')
+    outcome.share['valve'] = 0.95
+    assert 'numbers far from' in explain(
+        GapResult('unknown', '', signals={'force': FORCE}), outcome)
 
 
 def test_what_grows_rises_and_what_stays_stays():
@@ -183,8 +203,11 @@ def test_unknown_tells_of_fits_only_where_the_gap_is():
 
 def test_a_wrong_number_is_a_sentence_of_its_own():
     text = said('parameter', {'pressure': PRESSURE}, parameters=[MASS])
-    assert text == ('mass_kg = 5.75 kg instead of 5 kg (+15.0 %). With this the gap in pressure '
-                    'falls from 8 to 0.4 kPa.')
+    assert text == ('mass_kg = 5.75 kg instead of 5 kg (+15.0 %), 95 % 5.7 to 5.8. With this the '
+                    'gap in pressure falls from 8 to 0.4 kPa.')
+    gain = Calibrated('force_map_gain', '-', 1.0, 1.12, (1.11, 1.13), 6.0)
+    text = said('parameter', {'pressure': PRESSURE}, parameters=[gain])
+    assert text.startswith('force_map_gain = 1.12 instead of 1 (+12.0 %), 95 % 1.11 to 1.13. With')
 
 
 @pytest.mark.parametrize('ratio_minus_1, sentence', [
@@ -195,7 +218,8 @@ def test_the_sentence_on_venting_says_what_the_ratio_says(ratio_minus_1, sentenc
     named = NamedEffect('vent_asymmetry', 'valve', [], ('vent_asymmetry',))
     found = GapResult('effects', '', signals={'pressure': PRESSURE}, effects=[vent])
     text = explain(found, SimpleNamespace(named=[named], share={}, mistaken={}, complete=True))
-    assert text.startswith(f'{sentence} (vent_asymmetry: ')
+    assert text.startswith(f'{sentence} (vent_asymmetry: vent to fill time ratio 0.03, 95 % 0.02')
+    assert '>0.03<' in gap_section(found).body
 
 
 def test_a_number_without_a_unit_has_no_dash_behind_it():
@@ -217,7 +241,7 @@ def test_a_number_without_a_unit_has_no_dash_behind_it():
 def test_a_number_that_was_0_has_no_change_in_percent():
     spring = Calibrated('spring_n_per_m', 'N/m', 0.0, 400.0, (390.0, 410.0), 8.0)
     text = said('parameter', {'pressure': PRESSURE}, parameters=[spring])
-    assert text.startswith('spring_n_per_m = 400 N/m instead of 0 N/m. With this')
+    assert text.startswith('spring_n_per_m = 400 N/m instead of 0 N/m, 95 % 390 to 410. With this')
 
 
 def test_the_page_of_doubtful_effects_says_likeliest():

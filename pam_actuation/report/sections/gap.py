@@ -160,7 +160,9 @@ def _evidence(result: 'GapResult') -> str:
         'Every name was fitted to one part of the data and judged on another. t compares squared '
         f'errors block by block. From {CRITERIA.ahead_t:g} on a rival is left behind, from '
         f'{CRITERIA.behind_t:g} on one that explains at least '
-        f'{100 * CRITERIA.close_share:.0f} points less.', 'note')
+        f'{100 * CRITERIA.close_share:.0f} points less. A dash stands for no test: of the best '
+        'itself, of a name that makes another subsystem worse or that turns into a simpler one, '
+        'and where too few blocks differ.', 'note')
 
 
 def _next(result: 'GapResult', command: str) -> str:

@@ -17,7 +17,7 @@
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from pam_sim.effects.registry import effects
+from pam_sim.effects.registry import effects, get_effect
 from pam_sim.gap.data.signals import READABLE
 from pam_sim.gap.result import Calibrated, GapResult
 from pam_sim.gap.select.search import Outcome
@@ -30,6 +30,7 @@ BENT = 1.2                   # times the gap of the given model: calibration mad
 ENOUGH = 0.8                 # share of the gap that would be an explanation if it held
 LEAST_SHARE = 0.005
 ONE_SPEED = 'They all remember the past; only a second speed tells which it is.'
+MOVED = 1.0                  # deviations of its tolerance by which a number is moved
 WORTH_A_WORD = 0.2           # share of the squared gap that is left
 
 
@@ -44,13 +45,14 @@ def _told(result: GapResult, outcome: Outcome) -> str:
     if result.verdict == 'no_gap' and 'valve' in result.not_judged:
         return 'Muscle and load of the model, driven by the measured pressure, follow the ' \
             'recording within sensor noise and stamps, their numbers calibrated within their ' \
-            'tolerance.'
+            f'tolerance.{_shifted(result)}'
     if result.verdict == 'no_gap' and tuple(result.signals) == ('pressure',):
         return 'The valve of the model follows the recorded pressure within sensor noise and ' \
-            'stamps, its numbers calibrated within their tolerance. The muscle was not compared.'
+            f'stamps, its numbers calibrated within their tolerance.{_shifted(result)} The ' \
+            'muscle was not compared.'
     if result.verdict == 'no_gap':
         return 'The model follows the recording within sensor noise and stamps, its numbers ' \
-            'calibrated within their tolerance.'
+            f'calibrated within their tolerance.{_shifted(result)}'
     if result.verdict == 'parameter' and result.unexplained_fraction < WORTH_A_WORD:
         return f'{_numbers(result.parameters)}. With this {_shrink(result)}.'
     if result.verdict == 'unknown':
@@ -107,10 +109,28 @@ def _together(formulas: Iterable[str]) -> str:
 
 
 def _numbers(parameters: Iterable[Calibrated]) -> str:
-    return join([f'{c.name} = {c.value:.4g}{behind_number(c.unit)} instead of '
-                 f'{c.nominal:.4g}{behind_number(c.unit)}'
-                 + (f' ({100 * (c.value / c.nominal - 1):+.1f} %)' if c.nominal else '')
-                 for c in parameters])
+    return join([_number(one) for one in parameters])
+
+
+def _number(one: Calibrated) -> str:
+    """Return a wrong number, the given one, and its 95 % interval."""
+    unit, (low, high) = behind_number(one.unit), one.ci95
+    change = f' ({100 * (one.value / one.nominal - 1):+.1f} %)' if one.nominal else ''
+    return (f'{one.name} = {one.value:.4g}{unit} instead of {one.nominal:.4g}{unit}{change}, '
+            f'95 % {low:.4g} to {high:.4g}')
+
+
+def _shifted(result: GapResult) -> str:
+    """Return in a sentence which numbers calibration moved clearly, the farthest one first."""
+    moved = sorted((c for c in result.calibration if abs(c.prior_deviation) >= MOVED),
+                   key=lambda c: -abs(c.prior_deviation))
+    return f' Calibration moved {join([_moved(c) for c in moved])}.' if moved else ''
+
+
+def _moved(one: Calibrated) -> str:
+    unit = behind_number(one.unit)
+    return (f'{one.name} from {one.nominal:.4g} to {one.value:.4g}{unit} '
+            f'({one.prior_deviation:+.1f} of its standard deviations)')
 
 
 def _shrink(result: GapResult) -> str:
@@ -168,7 +188,8 @@ def _noticed(result: GapResult) -> str:
 
 def _mistaken(outcome: Outcome) -> str:
     return ''.join(f' It looks like {name}, but {relative} fits better: '
-                   f'{_sentence(relative)[:1].lower()}{_sentence(relative)[1:]}.'
+                   f'{_sentence(relative)[:1].lower()}{_sentence(relative)[1:]}. '
+                   f'Ask for that with `--effects {relative}`.'
                    for name, relative in outcome.mistaken.items())
 
 
@@ -184,6 +205,11 @@ def _nearest(result: GapResult, outcome: Outcome) -> str:
         return none
     if max(shares.values()) < ENOUGH:
         return f'{none}: the best fit explains {join(parts)}'
-    return (f'. A fit explains {join(parts)} of the data that were searched, but it does not '
-            'hold: it needs numbers far from their nominal values, or fails on the data of '
-            'the proof. So nothing is named')
+    fitted = f'. A fit explains {join(parts)} of the data that were searched, but '
+    # There a name holds, and another one holds better.
+    likened = {'valve' if get_effect(name).subsystem == 'valve' else 'muscle'
+               for name in outcome.mistaken}
+    if likened and all(s in likened for s, share in shares.items() if share >= ENOUGH):
+        return f'{fitted}its name would be wrong. So nothing is named'
+    return (f'{fitted}it does not hold: it needs numbers far from their nominal values, or fails '
+            'on the data of the proof. So nothing is named')
