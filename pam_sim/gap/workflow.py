@@ -34,6 +34,7 @@ from pam_sim.gap.propose.proposal import propose
 from pam_sim.gap.propose.surrogate import add_surrogate
 from pam_sim.gap.report.by_subsystem import add_place, subsystem_verdicts
 from pam_sim.gap.report.fingerprint import fingerprint
+from pam_sim.gap.report.late_force import late_force
 from pam_sim.gap.report.place import places
 from pam_sim.gap.report.reason import explain
 from pam_sim.gap.result import GapResult
@@ -239,6 +240,8 @@ def _answered(runs: Run | Sequence[Run], rig: Rig, certify: Run | None, options:
     result.fingerprint = fingerprint(estimator, validation.base, validation.final)
     result.minimum_detectable = sizes_or_reasons(
         outcome.screened, rig, [s for p in estimator.problems for s in p.signals], materiality)
+    if result.verdict in WANTING and (late := late_force(own_runs, criteria)):
+        result.remarks.append(late)
     result.reason = explain(result, outcome, harms)
     if not outcome.complete:
         result.reason += CUT_SHORT.format(options.seconds)
