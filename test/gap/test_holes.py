@@ -18,7 +18,7 @@ from gap_runs import nominal, NS, recorded, voltages
 import numpy as np
 from pam_sim.errors import InputError
 from pam_sim.gap import find_gap
-from pam_sim.gap.data.checked import checked_runs
+from pam_sim.gap.data.checked import by_recording, checked_runs
 from pam_sim.gap.data.holes import between, holes_in, stretches
 from pam_sim.gap.data.split import CERTIFY
 from pam_sim.identify import identify
@@ -145,3 +145,11 @@ def test_numbers_are_found_beside_a_hole():
     assert any('no pressure for 2.0 s' in text for text in found.remarks)
     assert [one['path'] for one in found.records] == [
         'bag, 5.0 to 9.0 s', 'bag, 0.0 to 3.0 s']
+
+
+def test_what_is_said_of_one_recording_names_it():
+    say = by_recording
+    assert say(['a', 'b'], [['one', 'both'], ['both']]) == ['recording a: one', 'both']
+    assert say(['a', 'b', 'c'], [['two'], ['two'], []]) == ['recordings a and b: two']
+    # Stretches of one recording, and recordings without a name, are not told apart.
+    assert say(['a', 'a'], [['one'], []]) == say(['', 'b'], [['one'], []]) == ['one']

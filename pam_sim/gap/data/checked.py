@@ -16,6 +16,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from pam_sim.errors import InputError
 from pam_sim.gap.criteria import CRITERIA, Criteria
@@ -77,9 +78,31 @@ def checked_runs(runs: Run | Sequence[Run], certify: Run | None, rig: Rig,
         runs, certify, criteria.min_duration_s, rig.is_driven)
     health = [check_for(run, rig, criteria)
               for run in [*runs, *([certify] if certify else [])]]
-    refusals += list(dict.fromkeys(p for h in health for p in h.problems))
-    remarks = told + holes + list(dict.fromkeys(r for h in health for r in h.remarks))
+    names = [Path(run.path).name for run in (*runs, *([certify] if certify else []))]
+    refusals += by_recording(names, [h.problems for h in health])
+    remarks = told + holes + by_recording(names, [h.remarks for h in health])
     return CheckedRuns(runs, certify, 0 if certify else first, refusals, remarks)
+
+
+def by_recording(names: Sequence[str], told: Sequence[Sequence[str]]) -> list[str]:
+    """
+    Return every sentence once, with the recordings it is of where it is not of all.
+
+    Parameters
+    ----------
+    names : list of str
+        Of the recordings; stretches of one have the same name.
+    told : list of list of str
+        The sentences on each.
+
+    """
+    found = []
+    for sentence in dict.fromkeys(one for own in told for one in own):
+        of = dict.fromkeys(name for name, own in zip(names, told) if sentence in own)
+        which = '' if set(of) == set(names) or '' in of else (
+            f'recording{"s" if len(of) > 1 else ""} {" and ".join(of)}: ')
+        found.append(f'{which}{sentence}')
+    return found
 
 
 def recording_of(run: Run, rig: Rig, criteria: Criteria = CRITERIA) -> Recording:
