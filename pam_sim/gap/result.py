@@ -247,7 +247,7 @@ class GapResult:
         """Return in one sentence where the disagreement lives; empty where there is none."""
         if not self.where:
             return ''
-        others = [s for s, one in self.subsystems.items()
+        others = ['a sensor' if s == 'sensor' else f'the {s}' for s, one in self.subsystems.items()
                   if one.names and s != self.where[0].subsystem]
         return self.where[0].text() + (
             f' Something is named in {" and ".join(others)} as well.' if others else '')
@@ -266,8 +266,13 @@ class GapResult:
     def text(self) -> str:
         """Return the result in lines for a person."""
         rows = [*self.model_lines, *self.first_lines, *([self.place] if self.place else []),
-                f'{self.verdict}: {self.reason}', *([OWN_INPUTS] if self.subsystems else []),
-                *(f'  {name}: {found.text()}' for name, found in self.subsystems.items())]
+                f'{self.verdict}: {self.reason}', *([OWN_INPUTS] if self.subsystems else [])]
+        told: list[SubsystemVerdict] = []
+        for name, found in self.subsystems.items():
+            # Where a gap lives is told beside the subsystem that leaves it.
+            same = ', the same as above' if any(found is one for one in told) else ''
+            rows.append(f'  {name}: {found.text()}{same}')
+            told.append(found)
         rows += [f'  {s}: not judged: {why}' for s, why in self.not_judged.items()]
         rows += [WHOLE_CHAIN] if self.signals else []
         for name, s in self.signals.items():

@@ -177,6 +177,20 @@ def test_an_unknown_load_is_told_of_by_subsystem():
     assert list(result.subsystems) == ['valve', 'muscle', 'load']
 
 
+@pytest.mark.parametrize('signal, of', [('contraction', 'muscle'), ('pressure', 'valve'),
+                                        ('force', 'muscle')])
+def test_what_a_sensor_leaves_is_in_its_own_signal(signal, of):
+    told = {'valve': SubsystemVerdict('unknown', (), 'pressure', WIDE, 1.0),
+            'muscle': SubsystemVerdict('unknown', (), 'contraction', MUSCLE['contraction'], 1.0)}
+    result = GapResult('unknown', 'Why.', where=[Share('sensor', signal, 'all', 1.0, 0.9)],
+                       subsystems=told)
+    add_place(result)
+    assert result.subsystems['sensor'] is told[of]
+    # The same gap is not told twice as if it were two.
+    assert f'  sensor: {told[of].text()}, the same as above' in result.text().split('\n')
+    assert result.text().count('the same as above') == 1
+
+
 def test_page_and_terminal_open_with_the_place():
     rig = nominal().with_(effects=[
         {'name': 'contraction_lag', 'parameters': {'time_constant_s': 0.02}}])
@@ -196,7 +210,7 @@ def test_the_first_sentence_tells_its_basis_and_what_else_is_named():
                        subsystems={'valve': one, 'muscle': replace(one, names=('creep',))})
     assert result.place.endswith(
         'in contraction, each subsystem on its own measured inputs. '
-        'Something is named in valve as well.')
+        'Something is named in the valve as well.')
     result.subsystems.pop('valve')
     assert 'as well' not in result.place
 

@@ -33,6 +33,7 @@ from pam_sim.gap.propose.ranges import ranges_of
 from pam_sim.gap.propose.search import candidate_of, ends_of
 from pam_sim.gap.propose.writing import EffectText
 from pam_sim.gap.result import GapResult
+from pam_sim.gap.share import Share
 from pam_sim.gap.subsystems.problems import subsystem_problems
 from pam_sim.gap.verify.validation import Validation
 import pytest
@@ -81,11 +82,11 @@ FORMS = [
     ('force_reading_term', 0, (terms.STOP, 2, 0.5), None, 1.0)]
 
 
-def asked(rig, **options):
+def asked(rig, where=(), **options):
     """Return the result of a look for a term in a recording of a rig, held to be `unknown`."""
     recording = Recording(recorded(rig, voltages(12.0)), 'ppr')
     estimator = Estimator(nominal(), subsystem_problems(nominal(), [recording], True, 0, CRITERIA))
-    result = GapResult('unknown', '', model_yaml=nominal().to_yaml())
+    result = GapResult('unknown', '', where=list(where), model_yaml=nominal().to_yaml())
     base = estimator.base
     propose(result, Validation(recording, False, estimator, base, base), **options)
     return result
@@ -94,14 +95,18 @@ def asked(rig, **options):
 @pytest.fixture(scope='module')
 def drag():
     """Return the result for a rig with drag that no effect of the library has."""
-    return asked(nominal().with_(effects=[DRAG]))
+    return asked(nominal().with_(effects=[DRAG]), [
+        Share('sensor', 'contraction', 'all', 1.0, 0.5)])
 
 
 def test_the_missing_term_is_found_and_says_what_it_is(drag):
     found = drag.proposal
     assert (found.subsystem, found.file) == ('muscle', 'proposed_effect.py')
     assert found.explained > 0.9 and set(found.ranges) == {'v'}
-    assert 'Unnamed, its form found from data; it holds for v' in drag.remarks[-1]
+    sentence, beside = drag.remarks[-2:]
+    assert 'Unnamed, its form found from data; it holds for v' in sentence
+    # What is told first was judged without the term.
+    assert beside.startswith('The term acts in the muscle, the place above is another one.')
     assert '\n    v (speed of contraction) ' in found.text
     assert_form(drag)
 

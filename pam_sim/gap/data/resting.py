@@ -78,7 +78,8 @@ def rest_of(run: Run, rig: Rig, criteria: Criteria = CRITERIA, added_kg: float =
     A force that is far below the weight at zero contraction may also be that of a lighter load, or
     of a spring. So it must be far below what the same load cell reads of the moving load. A
     straight line carries that on to zero contraction; the median counts where the load moves too
-    far from there for a line. Where the mass is known, the force must be far below its weight, too.
+    far from there for a line. Where the mass is known, the force must be far below its weight as
+    well.
 
     Parameters
     ----------

@@ -36,6 +36,8 @@ import yaml
 
 EFFECT_FILE, MODEL_FILE = f'{NAME}.py', 'proposed_model.yaml'
 NONE = 'No simple term explains the rest on the data of the proof, so none is proposed.'
+OTHER_PLACE = ('The term acts in {}, the place above is another one. The place is judged without '
+               'the term; the term is proved on data to which it was not fitted.')
 NO_TIME = 'The time ran out before a simple term was found that explains the rest.'
 
 
@@ -139,6 +141,10 @@ def propose(result: GapResult, validation: Validation,
                 and not proof.worse()):
             result.proposal = _written(found, proof)
             result.remarks.append(result.proposal.sentence)
+            own = result.proposal.subsystem
+            if result.where and result.where[0].subsystem != own:
+                result.remarks.append(OTHER_PLACE.format(
+                    'a sensor' if own == 'sensor' else f'the {own}'))
             return
     result.remarks.append(NO_TIME if out_of_time() else NONE)
 

@@ -84,11 +84,19 @@ def subsystem_verdicts(result: GapResult, named: list[NamedEffect], runs: OwnRun
 
 
 def add_place(result: GapResult) -> None:
-    """Add the subsystem of the first row of ``where`` where it is unknown and not yet told of."""
+    """
+    Add the subsystem of the first row of ``where`` where it is unknown and not yet told of.
+
+    What it leaves is what the subsystem leaves in which its signal is simulated.
+    """
     place = result.where[0].subsystem if result.where else ''
     if result.verdict == 'unknown' and place and place not in result.subsystems:
+        signal = result.where[0].signal
+        unknown = {s: one for s, one in result.subsystems.items() if one.verdict == 'unknown'}
+        own = unknown.get('valve' if signal == 'pressure' else 'muscle')
         found = {**result.subsystems, place: next(
-            one for one in result.subsystems.values() if one.verdict == 'unknown')}
+            (one for one in unknown.values() if one.signal == signal),
+            own or next(iter(unknown.values())))}
         result.subsystems = {s: found[s] for s in SUBSYSTEMS if s in found}
 
 
