@@ -66,6 +66,10 @@ PROOF_SEARCHED = (
     'the searched recordings show no clear gap, the recording for the proof does; so that one was '
     'searched as well, and the proof is on every fifth block of it; record that motion again and '
     'give it as --certify for a proof on data of its own')
+PROOF_ALONE = (
+    'the searched recordings show no clear gap, the recording for the proof alone does, and no '
+    'name holds for all of them; check that it is of the same rig, with the same load and the '
+    'same zeros of the sensors, or record more of its motion')
 CUT_SHORT = (' The search was cut short: its {:g} s ran out before all was tried, and more time '
              'may change this answer.')
 UNNAMED = ('term', 'surrogate')
@@ -149,6 +153,9 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
         if (both.effects or both.parameters) and both.verdict not in WANTING:
             both.remarks.insert(0, PROOF_SEARCHED)
             return _ended(both, options, progress)
+        if any(s.rmse_refit ** 2 > (1.0 + criteria.clear_rest) * s.noise_floor ** 2
+               for s in result.signals.values()):
+            result.remarks.insert(0, PROOF_ALONE)
     if 'term' in unnamed:
         propose(result, validation, context.out_of_time)
     progress(0.98)

@@ -110,6 +110,15 @@ def test_the_time_for_unknown_numbers_counts(monkeypatch):
     assert 0.2 <= spent[0] < 5.0
 
 
+def test_a_gap_of_the_proof_that_calibration_raises_is_told():
+    text = said('unknown', {'contraction': SignalGap('m', 2e-5, 4e-5, 1.39e-3, 1.39e-3),
+                            'force': FORCE})
+    assert text.endswith(
+        ' Calibration raises the gap in contraction of the proof from 0.04 to 1.39 mm: numbers '
+        'bend for what is missing, or the recordings are not of one rig.')
+    assert 'Calibration raises' not in said('unknown', {'force': FORCE})
+
+
 def test_a_name_that_is_wrong_is_the_reason_why_nothing_is_named():
     outcome = SimpleNamespace(named=[], share={'muscle': 0.99}, complete=True,
                               mistaken={'coulomb_friction': 'smooth_friction'})

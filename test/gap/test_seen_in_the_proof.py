@@ -18,7 +18,7 @@ from gap_runs import assert_form, nominal, recorded, voltages
 import numpy as np
 from pam_sim import load_rig
 from pam_sim.gap import find_gap
-from pam_sim.gap.workflow import PROOF_SEARCHED
+from pam_sim.gap.workflow import PROOF_ALONE, PROOF_SEARCHED
 import pytest
 
 SECONDS = 24.0
@@ -64,6 +64,19 @@ def test_what_no_name_explains_there_stays_unknown(leaking):
     result = find_gap(moving, GIVEN, held, effects=['dead_volume'], unnamed=())
     assert (result.verdict, result.effects) == ('unknown', [])
     assert PROOF_SEARCHED not in result.remarks
+
+
+def test_a_proof_of_another_rig_is_asked_after():
+    rigs = nominal(), nominal().with_(parameters={'mass_kg': 6.5})
+    runs = [recorded(rig, voltages(12.0, seed), seed=seed) for seed, rig in enumerate(rigs)]
+    result = find_gap(runs[0], nominal(), runs[1], effects=['coulomb_friction'], unnamed=())
+    assert_form(result)
+    assert result.verdict == 'unknown' and result.remarks[0] == PROOF_ALONE
+    # What the searched recording shows as well is no question of the proof.
+    stiff = nominal().with_(effects=[{'name': 'coulomb_friction', 'parameters': {'force_n': 3.0}}])
+    result = find_gap(*(recorded(stiff, voltages(12.0), seed=1), nominal(), recorded(
+        stiff, voltages(12.0, 4), seed=2)), effects=['dead_volume', 'creep'], unnamed=())
+    assert result.verdict == 'unknown' and PROOF_ALONE not in result.remarks
 
 
 def test_a_number_that_the_searched_motion_hardly_tells_is_found_in_that_of_the_proof():

@@ -56,8 +56,8 @@ def _told(result: GapResult, outcome: Outcome) -> str:
     if result.verdict == 'parameter' and result.unexplained_fraction < WORTH_A_WORD:
         return f'{_numbers(result.parameters)}. With this {_shrink(result)}.'
     if result.verdict == 'unknown':
-        return (f'{_missed(result)}{_nearest(result, outcome)}.{_noticed(result)}'
-                f'{_mistaken(outcome)}')
+        return (f'{_missed(result)}{_nearest(result, outcome)}.{_bent(result)}'
+                f'{_noticed(result)}{_mistaken(outcome)}')
     # Of several that are named, some may be certain.
     open_sets = list({frozenset(w.names): w.names for w in outcome.named
                       if len(w.names) > 1}.values())
@@ -169,6 +169,16 @@ def _missed(result: GapResult) -> str:
     if sizes:
         return f'The calibrated model misses {join(sizes)}'
     return 'The calibrated model leaves a gap that its free run hides'
+
+
+def _bent(result: GapResult) -> str:
+    """Return in a sentence which gap of the proof calibration made larger."""
+    bent = [f'in {k} of the proof from {s.rmse_before * READABLE[k][0]:.3g} to '
+            f'{s.rmse_refit * READABLE[k][0]:.3g} {READABLE[k][1]}'
+            for k, s in result.signals.items()
+            if s.rmse_refit > max(BENT * s.rmse_before, SEEN * s.noise_floor)]
+    return (f' Calibration raises the gap {join(bent)}: numbers bend for what is missing, or the '
+            'recordings are not of one rig.') if bent else ''
 
 
 def _noticed(result: GapResult) -> str:
