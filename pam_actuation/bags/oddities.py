@@ -40,6 +40,7 @@ STRAY_SHARE = 0.01
 # Nodes stop one after the other: a topic may end before the others by so much, or by such a share.
 USUAL_END_S, USUAL_END_SHARE = 5.0, 0.25
 _MOST_SILENT = 3                # times in a sentence
+_ALIKE_S = 0.5                  # between the ends of times in which all topics are silent
 
 
 @dataclass
@@ -134,7 +135,8 @@ def silent_remarks(heard: Mapping[str, IntArray]) -> list[str]:
     """
     Return a sentence on each topic that is silent for a long part, or ends long before the others.
 
-    A topic that rarely comes, such as a reference, is not judged.
+    A topic that rarely comes, such as a reference, is not judged. A time in which all are silent
+    is told once.
 
     Parameters
     ----------
@@ -147,17 +149,26 @@ def silent_remarks(heard: Mapping[str, IntArray]) -> list[str]:
     start_ns = min((int(one.min()) for one in heard.values() if len(one)), default=0)
     end_ns = max((int(one.max()) for one in steady.values()), default=0)
     usual_end_s = min(USUAL_END_S, USUAL_END_SHARE * 1e-9 * (end_ns - start_ns))
-    remarks = []
-    for name, time_ns in steady.items():
-        last_ns = int(time_ns.max())
-        found = [f'from {1e-9 * (begin - start_ns):.3f} s to {1e-9 * (end - start_ns):.3f} s'
-                 for begin, end in silences(time_ns, end_ns)
-                 if begin < last_ns or 1e-9 * (end - begin) > usual_end_s]
-        if found:
-            more = f' and {often(len(found) - _MOST_SILENT)} more' * (len(found) > _MOST_SILENT)
-            remarks.append(f'{name}: no value that can be used {", ".join(found[:_MOST_SILENT])}'
-                           f'{more}, while others go on.')
-    return remarks
+    found = {name: [(begin, end) for begin, end in silences(time_ns, end_ns)
+                    if begin < int(time_ns.max()) or 1e-9 * (end - begin) > usual_end_s]
+             for name, time_ns in steady.items()}
+
+    def none_goes_on(span: tuple[int, int]) -> bool:
+        return len(found) > 1 and all(any(
+            max(abs(span[0] - begin), abs(span[1] - end)) < _ALIKE_S * 1e9
+            for begin, end in own) for own in found.values())
+
+    def told(spans: list[tuple[int, int]]) -> str:
+        more = f' and {often(len(spans) - _MOST_SILENT)} more' * (len(spans) > _MOST_SILENT)
+        return 'no value that can be used ' + ', '.join(
+            f'from {1e-9 * (begin - start_ns):.3f} s to {1e-9 * (end - start_ns):.3f} s'
+            for begin, end in spans[:_MOST_SILENT]) + more
+
+    common = [span for span in next(iter(found.values()), []) if none_goes_on(span)]
+    alone = {name: [span for span in own if not none_goes_on(span)]
+             for name, own in found.items()}
+    return [*([f'all topics: {told(common)}.'] if common else []),
+            *(f'{name}: {told(own)}, while others go on.' for name, own in alone.items() if own)]
 
 
 def run_remarks(run: Run) -> list[str]:

@@ -47,6 +47,14 @@ def test_nodes_may_stop_one_after_the_other(name, end_s, is_told):
     assert len(told) == is_told and all(one.startswith(name) for one in told)
 
 
+def test_a_time_in_which_no_topic_goes_on_is_told_once():
+    hole = STAMP_NS[abs(STAMP_NS - 15e9) > 2e9]
+    more = hole[abs(hole - 24e9) > 1e9]
+    assert silent_remarks({PRESSURE: hole, SIGNAL: more}) == [
+        'all topics: no value that can be used from 12.990 s to 17.010 s.',
+        f'{SIGNAL}: no value that can be used from 22.990 s to 25.010 s, while others go on.']
+
+
 def test_entries_that_are_not_finite_tell_nothing(tmp_path):
     def change(short, i, message):
         lost = short == 'valve_signal' and 300 <= i < 900
