@@ -144,6 +144,10 @@ def test_what_grows_rises_and_what_stays_stays():
         assert (f'the gap in contraction of the given model, which calibration alone raises to '
                 f'3.71 mm, {told} from 2.06 to {1e3 * after:.3g} mm') in said(
                     'effects', {'contraction': bent}, named)
+    # Where nothing stands out of the noise before either, that is told.
+    hidden = SignalGap('N', 0.05, 0.05, 0.05, 0.04)
+    assert 'With this every signal stays within its noise floor, as it does without.' in said(
+        'effects', {'force': hidden}, named)
     # What was within noise and is no more is told as well.
     grown = SignalGap('N', 0.05, 0.05, 0.05, 0.5)
     assert 'rises from 0.05 to 0.5 N' in said('effects', {'force': grown}, named)

@@ -151,7 +151,8 @@ def _shrink(result: GapResult) -> str:
             else:
                 verb = 'rises' if s.rmse_after > first else 'falls'
                 parts.append(f'{what} {verb} from {before} to {after} {unit}')
-    return join(parts) if parts else 'every signal stays within its noise floor'
+    return join(parts) if parts else (
+        'every signal stays within its noise floor, as it does without')
 
 
 def _harm(harm: Harm) -> str:
