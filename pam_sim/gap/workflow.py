@@ -37,6 +37,7 @@ from pam_sim.gap.report.fingerprint import fingerprint
 from pam_sim.gap.report.late_force import late_force
 from pam_sim.gap.report.place import places
 from pam_sim.gap.report.reason import explain
+from pam_sim.gap.report.units_seen import unit_remarks
 from pam_sim.gap.result import GapResult
 from pam_sim.gap.select.beginnings import promise_of_more
 from pam_sim.gap.select.context import context_of, SearchContext
@@ -244,6 +245,7 @@ def _answered(runs: Run | Sequence[Run], rig: Rig, certify: Run | None, options:
     result.where = places(result, outcome, own_runs)
     add_place(result)
     result.traces, result.inputs = validation.traces(), validation.inputs()
+    result.remarks += unit_remarks(result.traces) if result.verdict != 'no_gap' else []
     result.fingerprint = fingerprint(estimator, validation.base, validation.final)
     result.minimum_detectable = sizes_or_reasons(
         outcome.screened, rig, [s for p in estimator.problems for s in p.signals], materiality)
