@@ -14,7 +14,7 @@
 
 """The verdict of a search and its validation, and the numbers that go with it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 import math
 
@@ -34,7 +34,7 @@ from pam_sim.gap.verify.model import as_given, held_without, model_of, numbers_o
 from pam_sim.gap.verify.notice import Notice, notices, stamp_sd_s, supply_notice
 from pam_sim.gap.verify.own_runs import OwnRuns
 from pam_sim.gap.verify.spread import spread_of_numbers
-from pam_sim.gap.verify.uncertainty import effect_numbers, half_width, NUMERICS
+from pam_sim.gap.verify.uncertainty import effect_numbers, FORM, half_width, NUMERICS
 from pam_sim.gap.verify.validation import Validation
 
 
@@ -92,8 +92,10 @@ def fill(result: GapResult, outcome: Outcome, validation: Validation) -> None:
     result.effects = []
     result.signals = validation.signals()
     precision = estimator.precision(final)
-    result.calibration = _calibrated(estimator, final, precision)
     free = set(final.hypothesis.numbers)
+    result.calibration = _calibrated(estimator, final, precision, {
+        name: 1.0 - outcome.share.get(p.subsystem, 1.0)
+        for p in estimator.problems for name in free if name in {k.name for k in p.known}})
     result.parameters = [c for c in result.calibration if c.name in free]
     model = model_of(estimator, final)
     settings = list(model.effects)
@@ -251,8 +253,14 @@ def _beyond(value: float, floor: float) -> float:
     return math.sqrt(max(value ** 2 - floor ** 2, 0.0))
 
 
-def _calibrated(estimator: Estimator, found: Fit, precision: Precision) -> list[Calibrated]:
-    """Return every known number of the rig as Calibrated."""
+def _calibrated(estimator: Estimator, found: Fit, precision: Precision,
+                rests: Mapping[str, float]) -> list[Calibrated]:
+    """
+    Return every known number of the rig as Calibrated.
+
+    ``rests``: of the numbers that are wrong, the share of the squared gap that is left. What
+    causes it may act on the number as a formulation that is a little off does on an effect.
+    """
     place = len(found.theta)
     numbers, _ = numbers_of(estimator, found)
     listed = []
@@ -261,7 +269,8 @@ def _calibrated(estimator: Estimator, found: Fit, precision: Precision) -> list[
             if known.of_rig:
                 value = numbers[known.name]
                 half = math.hypot(
-                    NUMERICS * value, known.sd * half_width(precision, place, float(z)))
+                    NUMERICS * value, known.sd * half_width(precision, place, float(z)),
+                    FORM * math.sqrt(max(rests.get(known.name, 0.0), 0.0)) * (value - known.value))
                 ends = (max(value - half, known.lower), min(value + half, known.upper))
                 listed.append(Calibrated(
                     known.name, known.unit, known.value, value, ends, float(z)))

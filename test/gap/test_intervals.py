@@ -178,3 +178,15 @@ def test_a_number_has_the_interval_of_the_data_not_that_of_its_prior():
     prior = NORMAL_95 * abs(gain.value - gain.nominal) / abs(gain.prior_deviation)
     assert gain.ci95[0] <= 0.97 <= gain.ci95[1]
     assert gain.ci95[1] - gain.ci95[0] < 0.5 * prior
+
+
+def test_what_is_left_beside_a_wrong_number_is_in_its_interval():
+    """Friction that nobody looks for may be some of the mass, as of a form that is off."""
+    widths = []
+    for effects in ([], [{'name': 'coulomb_friction', 'parameters': {'force_n': 0.15}}]):
+        rig = nominal().with_(parameters={'mass_kg': 5.75}, effects=effects)
+        result = find_gap(recorded(rig, voltages(11.0)), nominal(), effects=['creep'], unnamed=())
+        found, = result.parameters
+        assert found.name == 'mass_kg' and found.ci95[0] < 5.75 < found.ci95[1]
+        widths.append(found.ci95[1] - found.ci95[0])
+    assert widths[1] > 3.0 * widths[0]

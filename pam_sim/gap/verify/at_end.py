@@ -28,8 +28,9 @@ from pam_sim.gap.fit.hypothesis import Fit
 from pam_sim.gap.select.rival import NamedEffect
 from pam_sim.gap.verify.model import numbers_of
 from pam_sim.gap.words import in_words
+from pam_sim.units import behind_number
 
-AT_END = ('`{}` would need {} = {:.4g} {}, at the end of its range, so it is not named. Check '
+AT_END = ('`{}` would need {} = {:.4g}{}, at the end of its range, so it is not named. Check '
           'first whether the model is that of the recorded rig, and the zeros of the sensors.')
 
 
@@ -64,4 +65,4 @@ def at_end(named: Sequence[NamedEffect], estimator: Estimator, final: Fit
     for w in named:
         if w.name in told and len(w.names) == 1:
             name, value, unit = told[w.name]
-            yield w.name, AT_END.format(w.name, in_words(name), value, unit)
+            yield w.name, AT_END.format(w.name, in_words(name), value, behind_number(unit))
