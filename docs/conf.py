@@ -122,3 +122,5 @@ def setup(app):
     add_quick_navigation(app)
     app.add_domain(RememberingDomain, override=True)
     app.add_search_language(RememberingEnglish)
+    # At the end the interpreter would look for garbage among all pages.
+    app.connect('build-finished', lambda *_: gc.freeze())
