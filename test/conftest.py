@@ -148,3 +148,8 @@ def pytest_configure(config):
         config.pluginmanager.register(StallPlugin())
     elif config.getoption('markexpr') == f'not ({TIMED})':
         config.pluginmanager.register(CrowdPlugin())
+
+
+def pytest_unconfigure():
+    """Let the interpreter end without a look for garbage in all that was imported and tested."""
+    gc.freeze()
