@@ -93,7 +93,7 @@ class Options:
 
 
 def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
-             effects: Sequence[str] | None = None, seconds: float = 120.0,
+             effects: str | Sequence[str] | None = None, seconds: float = 120.0,
              materiality: float = 1.0, seed: int = 0,
              progress: Progress = lambda done: None,
              criteria: Criteria = CRITERIA, unnamed: Collection[str] = UNNAMED,
@@ -110,7 +110,7 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     certify : Run, optional
         Recording for the validation; by default every fifth block of the first run. If it alone
         shows a gap, it is searched too, as the first run.
-    effects : sequence of str, optional
+    effects : str or sequence of str, optional
         Names to try; all by default.
     seconds : float
         Time budget of the search. Validation and what follows come on top.
@@ -142,6 +142,7 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
 
     """
     started = time.perf_counter() - spent_s
+    effects = [effects] if isinstance(effects, str) else effects
     options = Options(effects, seconds, materiality, seed, criteria, started)
     result, found = _answered(runs, rig, certify, options, progress)
     if found is None:

@@ -50,8 +50,8 @@ Progress = Callable[[float], object]
 RETURNS = 4                  # to the fit, where a profile met a better solution
 
 
-def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
-             added_kg: Sequence[float] = (), seed: int = 0, advise: bool = True,
+def identify(runs: Run | Sequence[Run], rig: Rig, unknown: str | Sequence[str] = (),
+             added_kg: float | Sequence[float] = (), seed: int = 0, advise: bool = True,
              progress: Progress = lambda done: None,
              spare_certify: bool = False) -> Identification:
     """
@@ -64,10 +64,10 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
         contraction of muscle and load, pressure and force at a held length of the muscle.
     rig : pam_sim.Rig
         Its unknown numbers are looked for, from the values it has.
-    unknown : sequence of str
+    unknown : str or sequence of str
         Further ones: a parameter of the rig, a coefficient ``law.NAME`` of its force law, ``law``
         for all on which the force depends, or ``EFFECT.PARAMETER``.
-    added_kg : sequence of float
+    added_kg : float or sequence of float
         Known masses that hung on the load in addition, one per run; none by default.
     seed : int
         Of the starts.
@@ -92,6 +92,8 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: Sequence[str] = (),
 
     """
     progress = _onward(progress)
+    unknown = [unknown] if isinstance(unknown, str) else unknown
+    added_kg = [added_kg] if isinstance(added_kg, (int, float)) else list(added_kg)
     runs = [runs] if isinstance(runs, Run) else list(runs)
     if not runs:
         raise InputError('at least one recording is needed', 'runs')

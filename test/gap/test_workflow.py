@@ -22,6 +22,7 @@ import numpy as np
 from pam_actuation.report.gap import free_run_overlay, write_gap
 from pam_sim import load_rig
 from pam_sim.effects.registry import effects
+from pam_sim.errors import InputError
 from pam_sim.gap import find_gap
 from pam_sim.gap.criteria import CRITERIA
 from pam_sim.gap.data.health import check_for
@@ -174,6 +175,11 @@ def test_what_cannot_be_compared_is_refused_with_a_reason(spoil, word):
     assert result.verdict == 'refused' and word in result.reason
     assert_form(result)
     json.dumps(result.to_dict(), allow_nan=False)
+
+
+def test_one_effect_may_be_given_by_its_name():
+    with pytest.raises(InputError, match='unknown effect `hysteresys`'):
+        find_gap(recorded(nominal(), voltages(12.0)), nominal(), effects='hysteresys')
 
 
 @pytest.mark.parametrize('valve, asked, told', [

@@ -44,6 +44,13 @@ def test_mass_and_spring_are_determined_from_contraction_and_known_muscle():
     assert again.to_dict() == found.to_dict()
 
 
+def test_one_number_and_one_mass_may_be_given_as_they_are():
+    run = record(RIG, hold_s=0.3)
+    one, same = (identify(run, RIG, *asked, advise=False).to_dict() for asked in (
+        ('mass_kg', 1.0), (['mass_kg'], [1.0])))
+    assert one == same
+
+
 def test_a_far_start_and_a_wide_range_end_at_the_same_mass():
     run = record(RIG.with_(parameters={'mass_kg': 1.4}))
     found = identify(run, RIG.with_(parameters={'mass_kg': 60.0}), ['mass_kg'])
@@ -212,6 +219,7 @@ def test_a_recording_that_offers_nothing_is_refused(change, said):
 @pytest.mark.parametrize('unknown, masses, said', [
     ([], (), 'no number is unknown'), (['mas_kg'], (), 'did you mean `mass_kg`'),
     (['no_effect.size'], (), 'no_effect'), (['creep.sise'], (), 'creep'),
+    ('mas_kg', (), 'did you mean `mass_kg`'),
     (['mass_kg'], (1.0, 2.0), '2 masses for 1 recordings')])
 def test_a_mistake_is_told(unknown, masses, said):
     with pytest.raises(InputError) as caught:
