@@ -205,7 +205,10 @@ def _choose_namespace(bag: Bag, wanted: str | None) -> str:
                 'pam_actuation.bags.load_joint', bag.path)
     names = ', '.join(sorted(bag.topics)) or 'none at all'
     types = {name: topic.type_name for name, topic in bag.topics.items()}
-    hints = filter(None, (renamed.may_be(short, types) for short in ('pressure', 'contraction')))
+    hints = [hint for short in ('pressure', 'contraction')
+             if (hint := renamed.may_be(short, types))]
+    if types and not hints and not present:     # a bag of another program
+        hints = [renamed.IMPORT]
     raise InputError('; '.join([
         'the bag has no messages on a pressure or contraction topic of a muscle', *hints,
         *(text.rstrip('.') for text in of_another_type(bag).values()),

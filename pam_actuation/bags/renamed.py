@@ -29,6 +29,7 @@ NAMES = tuple(OF_A_RUN)
 OF_A_JOINT = tuple(name for name, row in RECORDED_OF_JOINT.items()
                    if row.place != ROOT and name != MARKER)
 _MOST = 5                   # topics that are listed
+IMPORT = '`pam import BAG --preview` shows what can be read from other types of messages'
 
 
 def checked(topics: Mapping[str, object] | None) -> dict[str, str]:
@@ -38,9 +39,12 @@ def checked(topics: Mapping[str, object] | None) -> dict[str, str]:
     Raises
     ------
     InputError
-        A name that is none of this project, a topic that is no text, or one given twice.
+        No mapping, a name that is none of this project, a topic that is no text, or one given
+        twice.
 
     """
+    if not isinstance(topics, Mapping | None):
+        raise InputError("is no mapping; write `{'pressure': '/robot/p'}`", 'topics')
     found: dict[str, str] = {}
     for short, name in (topics or {}).items():
         if short not in NAMES and short not in OF_A_JOINT:
@@ -93,7 +97,7 @@ def full_names(path: StrPath, topics: Mapping[str, object] | None, namespace: st
         topic, needed = present[name], BY_NAME[short_name(short)].type_name
         if (topic.type_name, topic.encoding) != (needed, 'cdr'):
             raise InputError(f'{name} is {topic.type_name} in {topic.encoding}; `{short}` is read '
-                             f'from {needed} in cdr', bag.path)
+                             f'from {needed} in cdr; {IMPORT}', bag.path)
         if not len(topic.payloads):
             raise InputError(f'{name} has no messages', bag.path)
     if namespace is None:

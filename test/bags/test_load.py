@@ -198,8 +198,14 @@ def test_namespaces_that_are_no_muscle_do_not_disturb(tmp_path):
 
 def test_bag_without_a_muscle(tmp_path):
     path = write_bag(tmp_path / 'run', 2, leave_out=('pressure', 'contraction'))
-    with pytest.raises(InputError, match='no messages on a pressure or contraction topic'):
+    with pytest.raises(InputError, match='no messages on a pressure or contraction topic') as told:
         load_run(path)
+    assert 'pam import' not in str(told.value)
+    with BagWriter(tmp_path / 'other', {}) as writer:
+        writer.add_topic('/plc/p', 'std_msgs/msg/Float64')
+        writer.write('/plc/p', b'\x00\x01\x00\x00' + bytes(8), START_NS, START_NS)
+    with pytest.raises(InputError, match='`pam import BAG --preview` shows .*its topics: /plc/p'):
+        load_run(tmp_path / 'other')
 
 
 def test_stamps_out_of_order_are_sorted_stably_and_said(tmp_path):

@@ -83,7 +83,8 @@ def test_topics_under_other_names_are_read_as_ours(bag):
     ({'pressure': '/robot/q'}, ['no topic /robot/q', '/robot/p', 'its topics']),
     ({'pressure': '/robot/note'}, ['/robot/note is std_msgs/msg/String',
                                    'sensor_msgs/msg/FluidPressure']),
-    ({'contraction': '/robot/p'}, ['sensor_msgs/msg/JointState']),
+    ({'contraction': '/robot/p'}, ['sensor_msgs/msg/JointState', 'pam import BAG --preview']),
+    ([('pressure', '/robot/p')], ["is no mapping; write `{'pressure': '/robot/p'}`"]),
     ({'force': '/robot/empty'}, ['/robot/empty has no messages']),
     ({'force': '/robot/cell', 'external_force': '/robot/cell'}, ['for two topics']),
     ({'force': ''}, ['needs the name of a topic'])])
