@@ -140,9 +140,4 @@ def rebuild(controller: Law, settings: dict[str, float],
     It starts from ``rules``, by default from those of ``controller`` where the settings leave
     them their meaning.
     """
-    if not isinstance(controller, JointController):
-        return controller.with_settings(settings, rules)
-    fresh = controller.with_law(controller.law.with_settings(settings, rules))
-    fresh.made_for, fresh.other_rig = controller.made_for, controller.other_rig
-    fresh.driver = controller.driver
-    return fresh
+    return controller.with_settings(settings, rules)

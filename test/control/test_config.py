@@ -26,7 +26,7 @@ from pam_actuation.experiments import load_experiment
 from pam_actuation.tuning.closed_loop import _rollout_of, ClosedLoop, ROLLOUTS
 from pam_actuation.tuning.problem import rebuild
 from pam_actuation.tuning.space import AXES_OF, default_axes
-from pam_sim import load_rig
+from pam_sim import load_joint, load_rig
 from pam_sim.errors import InputError
 import pytest
 from straight_rig import StraightRig
@@ -182,6 +182,25 @@ def test_other_settings_ask_the_same_of_the_driver():
     fresh = controller.with_settings({})
     assert fresh.driver == controller.driver and fresh.driver
     assert loop.cost(fresh) == loop.cost(controller)
+
+
+@pytest.mark.parametrize('name, model', [
+    ('sofc_force_ppr', 'dmsp_5_300_isometric'), ('sofc_model_joint_hsv', 'joint_dmsp_5_300')])
+def test_with_settings_keeps_what_a_mode_tracks(name, model):
+    rig = load_rig(model) if 'force' in name else load_joint(model).with_(valve='hsv')
+    controller = load_controller(name, rig)
+    fresh = controller.with_settings({'slew_pa_per_s': 1e5})
+    assert fresh.settings == {**controller.settings, 'slew_pa_per_s': 1e5}
+    assert (fresh.driver, fresh.made_for) == (controller.driver, controller.made_for)
+    assert not np.shares_memory(fresh.static_inverse, controller.static_inverse)
+    same = controller.with_settings({})
+    assert same.to_yaml() == controller.to_yaml()
+    told = (3e5, 2.9e5) if 'joint' in name else 3e5
+    named = 'pressures_pa' if 'joint' in name else 'pressure_pa'
+    measured = {named: told, **({} if 'joint' in name else {'force_n': 30.0})}
+    for _ in range(50):
+        assert (same.step(0.01, 0.1, 0.0, 0.1, 0.0, True, **measured)
+                == controller.step(0.01, 0.1, 0.0, 0.1, 0.0, True, **measured))
 
 
 def test_a_law_without_with_settings_is_refused_in_a_sentence(monkeypatch):

@@ -207,6 +207,10 @@ class ForceController(WrappedLaw):
         self._convert(np.zeros_like(law.input_array))      # compiled before time counts
         self.pause()
 
+    def with_law(self, law: CompiledController) -> 'ForceController':
+        """Return a controller of the same force surface round another law."""
+        return ForceController(law, self.surface, self.stiffness_n_per_m, self.contraction_m)
+
     @property
     def upper_force_n(self) -> float:
         """Largest force [N] of the surface."""

@@ -14,7 +14,9 @@
 
 """A control law, which works in metres of contraction, made to track something else."""
 
-from typing import Any
+from collections.abc import Mapping
+import copy
+from typing import Any, Self
 
 import numpy as np
 from pam_actuation.control.compiled_controller import CompiledController
@@ -110,6 +112,19 @@ class WrappedLaw(SharedMemory):
     @freeze_learning.setter
     def freeze_learning(self, value: bool) -> None:
         self.law.freeze_learning = value
+
+    def with_law(self, law: CompiledController) -> Any:
+        """Return a controller that tracks the same round another law."""
+        raise NotImplementedError
+
+    def with_settings(self, settings: Mapping[str, object],
+                      rules: RuleBase | None = None) -> Self:
+        """Return a fresh controller with other settings of its law; see ``CompiledController``."""
+        # A copy, as a law may share its static inverse, which force mode writes.
+        fresh: Self = self.with_law(copy.deepcopy(self.law.with_settings(settings, rules)))
+        fresh.made_for, fresh.driver = self.made_for, self.driver
+        fresh.other_rig, fresh.other_valve = self.other_rig, self.other_valve
+        return fresh
 
     def take_rules(self, rules: RuleBase, where: str = 'rules') -> None:
         """Begin with the rules of a file; as of the law."""
