@@ -39,6 +39,7 @@ from pam_actuation.tuning.search import BUDGET_USED, default_members, minimise, 
 from pam_actuation.tuning.space import Axis, check_axes, default_axes, from_unit, to_unit
 from pam_actuation.workers import Workers
 from pam_sim.annotations import FloatArray
+from pam_sim.declared import shown
 from pam_sim.errors import InputError
 from pam_sim.files import write_text
 
@@ -226,6 +227,17 @@ def _as_list(thing: Any) -> list[Any]:
     return list(thing) if isinstance(thing, (list, tuple)) else [thing]
 
 
+def _check_counts(budget: int, patience: int, population: int | None, jobs: int) -> None:
+    """Refuse counts that no search can have."""
+    for name, number, lowest in (('budget', budget, 1), ('patience', patience, 0),
+                                 ('population', population or SMALLEST, SMALLEST)):
+        if not isinstance(number, (int, np.integer)) or number < lowest:
+            raise InputError(f'is {shown(number)}; a whole number, {lowest} or more, is needed',
+                             name)
+    if jobs == 0:
+        raise InputError('is 0; allowed are 1 or more, and -1 for one a core', 'jobs')
+
+
 def tune(rig: 'Rig | JointRig | Sequence[Rig | JointRig]', controller: 'Law',
          experiment: 'Experiment | list[Experiment]', budget: int = 400, seed: int = 0,
          jobs: int = 1, progress: Callable[[int], object] | None = None,
@@ -278,8 +290,8 @@ def tune(rig: 'Rig | JointRig | Sequence[Rig | JointRig]', controller: 'Law',
     Raises
     ------
     InputError
-        Budget too small, unknown axis, experiment not in what the controller tracks or beyond
-        all rigs, cluster not to be had.
+        Budget too small, a count out of range, no rig, no experiment, unknown axis, experiment
+        not in what the controller tracks or beyond all rigs, cluster not to be had.
 
     """
     began = time.perf_counter()
@@ -287,6 +299,10 @@ def tune(rig: 'Rig | JointRig | Sequence[Rig | JointRig]', controller: 'Law',
     check_axes(axes, controller.settings)
     rigs: list[Rig | JointRig] = _as_list(rig)
     experiments: list[Experiment] = _as_list(experiment)
+    for name, given in (('rig', rigs), ('experiment', experiments)):
+        if not given:
+            raise InputError('at least one is needed', name)
+    _check_counts(budget, patience, population, jobs)
     train, left_out = loops_of(rigs, experiments, seed, controller, rigs[0], preview_s)
     tested = list(held_out_rigs or rigs)
     test, _ = loops_of(tested, _as_list(held_out or experiments),

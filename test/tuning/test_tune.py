@@ -167,6 +167,19 @@ def test_axes_are_clipped_scaled_and_checked(rig):
         tune(rig, untuned(rig), load_experiment(SHORT_SINE), budget=3)
 
 
+@pytest.mark.parametrize('wrong, says', [
+    ({'budget': 100.0}, 'budget: is 100.0; a whole number, 1 or more'),
+    ({'patience': -1}, 'patience: is -1; a whole number, 0 or more'),
+    ({'population': 2}, 'population: is 2; a whole number, 5 or more'),
+    ({'jobs': 0}, 'jobs: is 0; allowed are 1 or more'), ({'seed': -1}, 'seed: is -1'),
+    ({'rig': []}, 'rig: at least one is needed'),
+    ({'experiment': []}, 'experiment: at least one is needed')])
+def test_counts_and_empty_lists_are_refused_by_name(rig, wrong, says):
+    with pytest.raises(InputError, match=says):
+        tune(**{'rig': rig, 'controller': load_controller('pid', rig), 'budget': 100,
+                'experiment': load_experiment(SHORT_SINE), **wrong})
+
+
 @pytest.mark.parametrize('axes, says', [
     ((), 'nothing to tune'), ((AXES[0], AXES[0]), 'twice'),
     ((Axis('rate_hz', 100.0, 200.0),), 'for each rate'),
