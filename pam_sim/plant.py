@@ -79,6 +79,11 @@ class Plant(SharedMemory):
         """Return the plant of each muscle, by its place as in ``Rig.muscles``: this one."""
         return {'': self}
 
+    def __repr__(self) -> str:
+        """Return rig, time and readings in one line."""
+        return (f'{type(self).__name__}({self.rig.name!r}, {self.rig.valve}, {self.time_s:.6g} s: '
+                f'{self.pressure_pa:.6g} Pa, {self.contraction_m:.6g} m, {self.force_n:.6g} N)')
+
     def reset(self) -> None:
         """Go back to the start."""
         self.state, self.par = self.rig.pack(dt_s=self.dt_s, **self._initial)

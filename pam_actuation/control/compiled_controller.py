@@ -79,6 +79,10 @@ class CompiledController(SharedMemory):
         self._outputs = np.zeros(len(self.state_names))
         self._told = self._outputs      # those of ``state_names``
 
+    def __repr__(self) -> str:
+        """Return law, rig and rate in one line."""
+        return f'{type(self).__name__}({self.rig_name!r}, {self.rate_hz:g} Hz)'
+
     @property
     def rate_hz(self) -> float:
         """Rate [Hz] at which ``step`` is to be called."""

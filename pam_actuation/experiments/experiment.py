@@ -99,6 +99,10 @@ class Experiment:
         self.stop_after_s = stop_after_s
         self.duration_s = self.chain.duration_s
 
+    def __repr__(self) -> str:
+        """Return name, domain and length in one line."""
+        return f'{type(self).__name__}({self.name!r}, {self.domain}, {self.duration_s:g} s)'
+
     def at(self, t_s: float) -> tuple[float, float]:
         """Return (value, rate) at t_s since the start; outside, the end values at rest."""
         return self.chain.at(t_s)

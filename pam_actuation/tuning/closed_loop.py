@@ -185,6 +185,11 @@ class MuscleLoop:
         self._driver = DriverLaw(rig, driver or driver_config(rig), rate_hz)
         self._steps = steps, latency_steps(latency_s, steps)
 
+    def __repr__(self) -> str:
+        """Return rig, experiment and rate in one line."""
+        return (f'{type(self).__name__}({self.rig.name!r}, {self.rig.valve}, '
+                f'{self.experiment!r}, {self.rate_hz:g} Hz)')
+
     @property
     def reference_m(self) -> FloatArray:
         """Wanted contraction [m] at every tick."""

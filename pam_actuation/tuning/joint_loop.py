@@ -128,6 +128,11 @@ class JointLoop:
         """Pickle what it is made of: a cluster gets kilobytes, not the arrays."""
         return JointLoop, self._arguments
 
+    def __repr__(self) -> str:
+        """Return joint, experiment and rate in one line."""
+        return (f'{type(self).__name__}({self.joint.name!r}, {self.experiment!r}, '
+                f'{self.rate_hz:g} Hz)')
+
     @property
     def rig(self) -> 'JointRig':
         """The joint."""

@@ -91,6 +91,11 @@ class JointPlant(SharedMemory):
         self.extensor = JointMuscle(joint.extensor, int(seed) + 1, **extensor)
         self.reset()
 
+    def __repr__(self) -> str:
+        """Return joint, time and readings in one line."""
+        return (f'{type(self).__name__}({self.joint.name!r}, {self.time_s:.6g} s: '
+                f'{self.angle_rad:.6g} rad, {self.torque_n_m:.6g} N m)')
+
     def reset(self) -> None:
         """Go back to the start."""
         self.state = self._start.copy()

@@ -19,6 +19,10 @@ import subprocess
 import sys
 
 import numpy as np
+from pam_actuation.control.config import load_controller
+from pam_actuation.experiments import load_experiment
+from pam_actuation.tuning.closed_loop import ClosedLoop
+from pam_actuation.tuning.joint_loop import JointLoop
 import pam_sim
 from pam_sim import load_joint, load_rig
 from pam_sim.characterise.points import Points
@@ -57,6 +61,21 @@ def test_what_holds_arrays_is_told_in_a_line(run):
     frame = joint.to_dataframe()
     assert len(frame) == 51 and list(frame.columns) == list(joint.as_dict())
     assert (frame['flexor/pressure_pa'] == joint.flexor.pressure_pa).all()
+
+
+def test_what_runs_is_told_in_a_line():
+    rig, joint = load_rig('dmsp_5_300_realistic'), load_joint('joint_dmsp_5_300')
+    plant = rig.plant(initial_pressure_pa=3e5)
+    plant.step(3.0, steps=10)
+    assert repr(plant).startswith("Plant('dmsp_5_300_realistic', ppr, 0.01 s: 3")
+    assert repr(joint.plant()).startswith("JointPlant('joint_dmsp_5_300', 0 s: ")
+    sine, law = load_experiment('short_sine'), load_controller('pid', rig)
+    assert repr(sine) == "Experiment('short_sine', contraction, 6 s)"
+    assert repr(law).startswith('PidController(') and repr(law).endswith(', 200 Hz)')
+    assert repr(load_controller('sofc_joint_ppr', joint)).startswith('JointController(Self')
+    assert repr(ClosedLoop(rig, sine)) == f"ClosedLoop('{rig.name}', ppr, {sine!r}, 200 Hz)"
+    assert repr(JointLoop(joint, load_experiment('joint_sine'))).startswith(
+        "JointLoop('joint_dmsp_5_300', Experiment('joint_sine', joint_angle, ")
 
 
 def test_a_short_text_names_what_is_there():

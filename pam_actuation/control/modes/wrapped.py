@@ -59,6 +59,10 @@ class WrappedLaw(SharedMemory):
     def __init__(self, law: CompiledController) -> None:
         self.law = law
 
+    def __repr__(self) -> str:
+        """Return mode and law in one line."""
+        return f'{type(self).__name__}({self.law!r})'
+
     @property
     def kind(self) -> str:
         """Which law it is, as in controller files."""
