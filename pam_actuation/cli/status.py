@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 
 HELP = """Show how the running nodes are: level, reason, lost messages; of one node, all values.
 
-Exit code 1: a node reports an error (a driver that vents, for instance), a controller vented since
-its reference is lost, a node lost a message or sent no status, or a plant, sensors or a watchdog
-run and no driver of theirs is heard."""
+Exit code 1: a node reports an error (a driver that vents, a controller without a usable
+measurement), a controller vented since its reference is lost, a node lost a message or sent no
+status, or a plant, sensors or a watchdog run and no driver of theirs is heard."""
 EXAMPLE = 'pam status valve_driver'
 LEVELS = ('ok', 'WARN', 'ERROR', 'STALE', 'silent')
 SILENT: tuple[int, str, dict[str, str]] = (

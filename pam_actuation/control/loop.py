@@ -304,7 +304,7 @@ class ControllerLoop:
                 self.reason += f'; {remark}'
         elif inputs.reason == codes.TWO_SENSORS:
             self.reason = f'{self.reason}: {self.two_sensors}'
-        elif inputs.reason == self.measurement.sensor.implausible and self.measurement.says:
+        elif inputs.reason == self.measurement.sensor.implausible:
             self.reason = f'{self.reason}, {self.measurement.says}'
         elif inputs.reason == codes.MUSCLE_SLACK:
             self.reason = f'{self.reason}: ' + '; '.join(

@@ -55,6 +55,8 @@ class Sensor:
         Codes of what may be wrong with it, see ``tick``.
     swing_pa, stop_swing_pa, band : float
         As of ``FrozenMeasurement``.
+    factor, unit : float, str
+        In which unit people are told of a value, and by what it is multiplied for that.
 
     """
 
@@ -69,21 +71,24 @@ class Sensor:
     swing_pa: float = SWING_PA
     stop_swing_pa: float = math.inf
     band: float = 0.0
+    factor: float = 1.0
+    unit: str = ''
 
 
 SENSORS = {
     CONTRACTION: Sensor(
         'contraction', 'contraction_m', codes.NO_CONTRACTION, codes.CONTRACTION_OLD,
         codes.CONTRACTION_AHEAD, codes.CONTRACTION_NOT_FINITE, codes.CONTRACTION_IMPLAUSIBLE,
-        codes.CONTRACTION_FROZEN, stop_swing_pa=STOP_SWING_PA, band=30e-6),
+        codes.CONTRACTION_FROZEN, stop_swing_pa=STOP_SWING_PA, band=30e-6,
+        factor=1e3, unit='mm'),
     # A muscle that has become short enough to be slack may stay without force.
     FORCE: Sensor(
         'force', 'force_n', codes.NO_FORCE, codes.FORCE_OLD, codes.FORCE_AHEAD,
-        codes.FORCE_NOT_FINITE, codes.FORCE_IMPLAUSIBLE, codes.FORCE_FROZEN),
+        codes.FORCE_NOT_FINITE, codes.FORCE_IMPLAUSIBLE, codes.FORCE_FROZEN, unit='N'),
     JOINT: Sensor(
         'joint_state', 'angle_rad', codes.NO_ANGLE, codes.ANGLE_OLD, codes.ANGLE_AHEAD,
         codes.ANGLE_NOT_FINITE, codes.ANGLE_IMPLAUSIBLE, codes.ANGLE_FROZEN,
-        swing_pa=JOINT_SWING_PA)}
+        swing_pa=JOINT_SWING_PA, unit='rad')}
 
 
 class Measurement:
@@ -115,6 +120,7 @@ class Measurement:
         self._newest = newest
         self._plausible = plausible
         self._implausible = Implausible()
+        self._seen = ''             # the first value of those that are not plausible now
         # By the measured pressure; where its reading stands still too, by what should be.
         self._frozen = self._judges(between_stops)
         self._frozen_both = self._judges(between_stops)
@@ -129,13 +135,14 @@ class Measurement:
     def forget(self) -> None:
         """Begin anew, as before the first message."""
         self._implausible.forget()
+        self._seen = ''
         for judge in (*self._frozen, *self._frozen_both):
             judge.forget()
 
     @property
     def says(self) -> str:
-        """Return why a measurement counts as implausible that was so before, '' if it is."""
-        return SAYS if self._implausible.holds else ''
+        """Return which value counts as implausible, and whether that was so before; else ''."""
+        return '; '.join(filter(None, (self._seen, SAYS * self._implausible.holds)))
 
     def reason(self, now_ns: int) -> int:
         """Look at the newest measurement; return its code, ``codes.OK`` if it is usable."""
@@ -154,6 +161,10 @@ class Measurement:
             return sensor.not_finite
         lowest, highest = self._plausible
         implausible = self._implausible.judge(now_ns, not lowest <= value <= highest)
+        # The first one: a text that changes with every reading would be a flood of messages.
+        self._seen = implausible and (self._seen or (
+            f'{sensor.factor * value:.5g} {sensor.unit}, believable are '
+            f'{sensor.factor * lowest:.4g} to {sensor.factor * highest:.4g}')) or ''
         return sensor.implausible if implausible else codes.OK
 
     def stands_still(self, now_ns: int, measured_pa: float,

@@ -72,6 +72,12 @@ REASONS = (
     'the controller estimated or commanded what is impossible, asks for the atmosphere',
     'the driver vented or fell silent, so what was wanted before is dropped; send a new reference')
 RUNNING = (OK, REFERENCE_HELD)      # reasons with which the controller runs
+# Of a sensor or a law at fault: the muscle is vented, although somebody wants it elsewhere.
+AT_FAULT = tuple(REASONS[code] for code in (
+    CONTRACTION_OLD, CONTRACTION_AHEAD, CONTRACTION_NOT_FINITE, CONTRACTION_IMPLAUSIBLE,
+    CONTRACTION_FROZEN, FORCE_OLD, FORCE_AHEAD, FORCE_NOT_FINITE, FORCE_IMPLAUSIBLE, FORCE_FROZEN,
+    ANGLE_OLD, ANGLE_AHEAD, ANGLE_NOT_FINITE, ANGLE_IMPLAUSIBLE, ANGLE_FROZEN, TWO_SENSORS,
+    LAW_FAILED))
 
 HELD_BACK = 'held_back'     # not 0 while the driver does not follow the command
 # From the stamps of what a law tracks and of the pressure to the tick; of two pressures the mean.

@@ -17,11 +17,11 @@
 from collections.abc import Sequence
 from typing import Any, TYPE_CHECKING
 
-from pam_actuation.control.tick import REASONS
+from pam_actuation.control.tick import AT_FAULT, REASONS
 from pam_actuation.drivers.parameter import node_parameter
 from pam_actuation.messages import Pressure
 from pam_actuation.nodes import lockstep
-from pam_actuation.nodes.diagnostics import OK, Values, WARN
+from pam_actuation.nodes.diagnostics import ERROR, OK, Values, WARN
 from pam_actuation.nodes.lockstep import TickInput
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import valve_of_rig
@@ -29,7 +29,7 @@ from pam_actuation.nodes.refusals import RefusalLog
 from pam_actuation.nodes.senders import TopicEar
 from pam_sim.errors import InputError
 from pam_sim.parameters import Parameter
-from pam_sim.units import P_ATM_PA
+from pam_sim.units import NS_PER_S, P_ATM_PA
 
 if TYPE_CHECKING:
     from pam_actuation.control.loop import ControllerLoop
@@ -70,6 +70,7 @@ class ControllerNode(ManagedNode):
     _own_services: Sequence[Any] = ()
     _vented = False         # at the end of a former run
     _last_ns: int | None = None
+    _sound_ns, _ran = 0, False      # last tick without a sensor at fault, and whether it followed
 
     def load_rig(self) -> 'Rig | JointRig':
         """Return the rig that the controller is made for."""
@@ -150,6 +151,7 @@ class ControllerNode(ManagedNode):
     def start(self) -> None:
         """Begin without memory of a former run; what was learned stays."""
         self._last_ns = None
+        self._sound_ns, self._ran = self.now_ns(), False
         if not self.participants:           # in lockstep what waits is of the first tick
             self.discard_arrived()
         if self._vented:
@@ -178,14 +180,23 @@ class ControllerNode(ManagedNode):
         for topic, message in loop.sent(now_ns, self.learning).items():
             self.send(topic, message)
         self._refusals.note(*loop.setpoint.refusals)
-        level, says = WARN, loop.reason
+        level, says = ERROR if self._is_at_fault(now_ns) else WARN, loop.reason
         if loop.reason == REASONS[0]:
             level, says = OK, GIVING if loop.setpoint.effort.follows else FOLLOWING
         # The muscle follows two references in turn, smoothly: a reason to warn, not to vent.
         two_want = '; '.join(filter(None, two_send.values()))
         if two_want:
-            level, says = WARN, f'{says}; {two_want}'
+            level, says = max(level, WARN), f'{says}; {two_want}'
         self.diagnostics.update(level, says)
+
+    def _is_at_fault(self, now_ns: int) -> bool:
+        """Tell whether a sensor or the law is at fault and vented the muscle, or is so for 1 s."""
+        assert self.loop is not None
+        if not self.loop.reason.startswith(AT_FAULT):
+            self._sound_ns, self._ran = now_ns, self.loop.valid
+            return False
+        # At rest a reading that is late for a moment does no harm.
+        return self._ran or not 0 <= now_ns - self._sound_ns <= NS_PER_S
 
     def diagnostic_values(self) -> Values:
         """Add set points that were refused, and what is wrong with each muscle of a joint."""

@@ -88,7 +88,7 @@ def test_both_muscles_are_vented_without_a_sound_angle(joint, loop, spoiled, rea
     assert min(command.pressure_pa for command in commands) > P_ATM_PA + 10e3
     _, commands = bench.tick(joint_state=spoiled(bench.now_ns + bench.period_ns))
     assert [command.pressure_pa for command in commands] == [P_ATM_PA] * 2
-    assert loop.reason == codes.REASONS[reason]
+    assert loop.reason.startswith(codes.REASONS[reason])
     _, commands = bench.tick()
     assert loop.reason == codes.REASONS[codes.OK]
     assert bench.internal('tick') == 21

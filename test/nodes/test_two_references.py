@@ -24,8 +24,8 @@ pytest.importorskip('rclpy')
 from pam_actuation.control.config import load_controller                    # noqa: E402, I100
 from pam_actuation.control.loop import ControllerLoop                       # noqa: E402
 from pam_actuation.messages import (                                        # noqa: E402
-    AngleReference, Contraction, JointAngle, LEVEL_OK, LEVEL_WARN, NamedTrajectory, Pressure,
-    Reference)
+    AngleReference, Contraction, is_fault, JointAngle, LEVEL_ERROR, LEVEL_OK, LEVEL_WARN,
+    NamedTrajectory, Pressure, Reference)
 from pam_actuation.nodes.controller_node import ControllerNode, FOLLOWING   # noqa: E402
 from pam_sim import load_rig                                                # noqa: E402
 from pam_sim.joint import load_joint                                        # noqa: E402
@@ -145,3 +145,40 @@ def test_trajectories_of_several_joints_may_have_several_senders(joint):
     said = joint.run(40, angle, lambda k, now: [
         trajectory(now, 'knee', b'gait'), trajectory(now, 'hip', b'teleop')])
     assert not any('publishers' in text for _, text in said)
+
+
+def in_mm(now_ns):
+    """Return a contraction in millimetres, as of a board that knows no metres."""
+    return Contraction(now_ns, 10.0 + now_ns % 7 * 1e-9), Pressure(now_ns, 3e5)
+
+
+def not_a_number(now_ns):
+    return Contraction(now_ns, float('nan')), Pressure(now_ns, 3e5)
+
+
+@pytest.mark.parametrize('sensors, why', [
+    (in_mm, 'contraction is outside what the muscle can do, 10000 mm, believable are -10 to '),
+    (not_a_number, 'contraction is not a finite number'),
+    (lambda now_ns: (Pressure(now_ns, 3e5),), 'contraction is older than 0.1 s')])
+def test_a_controller_that_vents_for_its_sensor_reports_an_error(muscle, sensors, why):
+    """As a driver does that vents: ``pam up`` ended with exit code 0, and nothing had moved."""
+    assert muscle.run(40, measured, lambda k, now: [GAIT(now)])[-1] == (LEVEL_OK, FOLLOWING)
+    level, said = muscle.run(40, sensors, lambda k, now: [GAIT(now), TELEOP(now)])[-1]
+    assert level == LEVEL_ERROR and said.startswith(why) and 'two publishers' in said
+    assert is_fault(level, said)
+
+
+def test_a_sensor_that_is_late_for_a_moment_at_rest_is_no_error(muscle):
+    assert muscle.run(40, measured, lambda k, now: [])[-1][1] == 'no reference yet'
+    late = muscle.run(220, lambda now_ns: (), lambda k, now: [])
+    assert late[100] == (LEVEL_WARN, 'contraction is older than 0.1 s')
+    assert {level for level, _ in late} == {LEVEL_WARN}
+    said = muscle.run(20, lambda now_ns: (), lambda k, now: [])
+    assert said[-1] == (LEVEL_ERROR, 'contraction is older than 0.1 s')     # dead
+    assert muscle.run(1, measured, lambda k, now: [])[-1] == (LEVEL_WARN, 'no reference yet')
+
+
+def test_a_controller_that_waits_warns(muscle):
+    assert muscle.run(40, lambda now_ns: (), lambda k, now: [])[-1] == (
+        LEVEL_WARN, 'no contraction measured yet')
+    assert muscle.run(40, measured, lambda k, now: [])[-1] == (LEVEL_WARN, 'no reference yet')
