@@ -208,6 +208,9 @@ CONFIGURED, ACTIVE, DEACTIVATED = 'configured, not active', 'active', 'deactivat
 REFERENCE_LOST = 'reference lost, asks for the atmosphere'
 EFFORT_LOST = 'wanted torque lost, asks for the atmosphere'
 
+# Of a reference generator whose experiment cannot be measured; the topics follow.
+NOT_BEGUN = 'the experiment waits: nothing valid came yet on'
+
 
 def is_fault(level: int, message: str) -> bool:
     """Tell whether a status is an error, or a controller vented since its reference is lost."""

@@ -136,7 +136,8 @@ def run(args: argparse.Namespace) -> int:
         except KeyboardInterrupt:
             pass
         with undisturbed():
-            problems = supervisor.finish(failure)
+            waiting = supervisor.not_begun() if is_up and not failure else []
+            problems = waiting + supervisor.finish(failure)
             faults = list(dict.fromkeys(supervisor.faults))
             codes = {name: process.exit_code for name, process in supervisor.processes.items()}
     if not is_up and not failure:

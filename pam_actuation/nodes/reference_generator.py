@@ -25,7 +25,8 @@ from pam_actuation.bags.ending import FINISHED
 from pam_actuation.bags.ending import PLAYING
 from pam_actuation.drivers.limits import SafetyLimits
 from pam_actuation.drivers.parameter import node_parameter
-from pam_actuation.nodes.diagnostics import OK, Values
+from pam_actuation.messages import NOT_BEGUN
+from pam_actuation.nodes.diagnostics import OK, Values, WARN
 from pam_actuation.nodes.endpoints import PolledSubscription
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.runner import run
@@ -41,6 +42,7 @@ OF_DOMAIN = {'contraction': ('contraction',), 'force': ('force',),
              'joint_angle': ('joint_state',)}
 # As for the driver. A clock that is slewed takes the steady clock with it.
 CLOCK_STEP_S = SafetyLimits().pause_s
+TOLD_S = 3.0                # without a measurement: then it is told
 UNTRACKED = 'pressure', 'contraction', 'force'      # of an experiment that tracks nothing
 
 
@@ -80,6 +82,7 @@ class ReferenceGenerator(ManagedNode):
 
     loop: Any = None            # a ReferenceLoop, once configured
     begin_ns: int | None = None
+    _lacks = ''                 # topics without which it does not begin, once that lasts
     _played_s = 0.0             # of the experiment, at the last tick
 
     def check(self) -> None:
@@ -110,7 +113,7 @@ class ReferenceGenerator(ManagedNode):
     def start(self) -> None:
         """Play from the beginning."""
         self.loop.start_ns = None
-        self.begin_ns = None
+        self.begin_ns, self._lacks = None, ''
         self._received_s = self._played_s = 0.0
         self._clock_steps = ClockSteps()
         self.add_loop(1.0 / self.loop.rate_hz)
@@ -138,13 +141,15 @@ class ReferenceGenerator(ManagedNode):
                          if not any(heard(one) for one in group))
 
     def _may_begin(self, now_ns: int) -> bool:
-        """Tell whether all is there; fail where that takes too long."""
+        """Tell whether all is there; say what is not, and fail where that takes too long."""
         if not self._received():
             return False
         missing = self._missing(now_ns)
         self._received_s = self._received_s or time.monotonic()
         limit_s = self.value('await_measurement_s')
-        if missing and time.monotonic() - self._received_s > limit_s:
+        waited_s = time.monotonic() - self._received_s
+        self._lacks = missing if waited_s > TOLD_S else ''
+        if missing and waited_s > limit_s:
             self.fail(f'the experiment did not begin: nothing valid came on {missing} for '
                       f'{limit_s:g} s')
         return not missing
@@ -162,7 +167,10 @@ class ReferenceGenerator(ManagedNode):
         if self.exit_code is not None:
             return
         if self.begin_ns is None or now_ns < self.begin_ns:
-            self.diagnostics.update(OK, 'waiting for the start')
+            if self._lacks and self.begin_ns is None:
+                self.diagnostics.update(WARN, f'{NOT_BEGUN} {self._lacks}')
+            else:
+                self.diagnostics.update(OK, 'waiting for the start')
             return
         for topic, plain in self.loop.tick(now_ns).items():
             self.send(topic, plain)

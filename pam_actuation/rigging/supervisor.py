@@ -23,7 +23,7 @@ from typing import Self, TYPE_CHECKING
 from pam_actuation.bags.ending import ERROR, FINISHED, tell_recorder
 from pam_actuation.drivers.decision import EMERGENCY_STOP
 from pam_actuation.drivers.faults import MAY_NOT_BE_VENTED
-from pam_actuation.messages import is_fault
+from pam_actuation.messages import is_fault, NOT_BEGUN
 from pam_actuation.namespaces import node_name_of
 from pam_actuation.rigging.domain import own_domain
 from pam_actuation.rigging.node_group import NodeGroup
@@ -72,6 +72,7 @@ class Supervisor:
             for node in nodes}, domain_id=domain_id)
         self.faults: list[str] = []
         self._grades: dict[str, int] = {}       # of the fault that was told of a node
+        self._waiting: set[str] = set()         # reference generators of which that was told
         self._silent: set[str] = set()
         self._unwatched: set[str] = set()       # drivers of which that was told
         self._from_start: set[str] = set()      # not well yet when the nodes became active
@@ -145,6 +146,12 @@ class Supervisor:
             if until():
                 return
 
+    def not_begun(self) -> list[str]:
+        """Return a sentence on each experiment that still waits for what it needs."""
+        said = {name: self.status(name)[1] for name in self._group.of_kind(REFERENCE)}
+        return [f'{name}: {message}' for name, message in said.items()
+                if message.startswith(NOT_BEGUN)]
+
     def _hear(self, tell: Callable[[str], None], settled: bool) -> None:
         """Tell which nodes found a fault, or lost it; before ``settled`` only what is new."""
         statuses = self._group.started.statuses
@@ -155,6 +162,9 @@ class Supervisor:
             told += [(name, *statuses[name][:2]) for name in self._from_start & statuses.keys()]
             self._from_start = set()
         for name, level, message in told:
+            if message.startswith(NOT_BEGUN) and name not in self._waiting:
+                self._waiting.add(name)
+                tell(f'{name}: {message}')
             grade, before = _grade(level, message, statuses[name][2]), self._grades.get(name, 0)
             if name in self._from_start and grade:
                 continue

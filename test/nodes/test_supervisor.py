@@ -23,7 +23,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 from pam_actuation.hardware.device_watchdog import OPENED                   # noqa: E402, I100
-from pam_actuation.messages import START_NS, Status                         # noqa: E402
+from pam_actuation.messages import NOT_BEGUN, START_NS, Status              # noqa: E402
 from pam_actuation.nodes.parameters import COMMON_PARAMETERS                # noqa: E402
 from pam_actuation.rigging.client import MOST_CHANGES, MOST_FAULTS, RigClient   # noqa: E402
 from pam_actuation.rigging.domain import DomainLock                         # noqa: E402
@@ -141,6 +141,20 @@ def test_an_emergency_stop_that_the_device_does_not_take_is_a_finding(rig):
 def test_a_rig_that_waits_for_its_first_reference_is_well(rig):
     rig.hear('/left/sofc_controller', 1, 'no reference yet')
     assert rig.tell() == [] == rig.supervisor.faults
+
+
+def test_an_experiment_that_waits_is_told_once_and_a_finding_at_the_end(rig):
+    name, waits = '/left/reference_generator', f'{NOT_BEGUN} /left/contraction'
+    rig.supervisor.processes[name] = SimpleNamespace(full_name=name)
+    rig.hear(name, 0, 'waiting for the start')
+    assert rig.tell() == [] == rig.supervisor.not_begun()
+    rig.hear(name, 1, waits)
+    assert rig.tell() == [f'{name}: {waits}'] == rig.supervisor.not_begun()
+    rig.hear(name, 1, f'{waits}, /left/valve_signal')
+    assert rig.tell() == [] == rig.supervisor.faults
+    rig.hear(name, 0, 'playing sine_quarter_hz')
+    assert rig.tell() == [] == rig.supervisor.not_begun()
+    del rig.supervisor.processes[name]
 
 
 HOLDS = f'{DRIVER}: sent no status for 3 s: its valve holds the last signal, {BY_HAND}'

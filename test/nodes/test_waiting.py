@@ -21,7 +21,8 @@ import pytest
 pytest.importorskip('rclpy')
 
 from live_rig import LiveRig, wait_for                                      # noqa: E402, I100
-from pam_actuation.messages import Contraction, LEVEL_ERROR, ValveSignal    # noqa: E402
+from pam_actuation.messages import (                                        # noqa: E402
+    Contraction, LEVEL_ERROR, LEVEL_WARN, NOT_BEGUN, ValveSignal)
 from pam_actuation.topics.codec import Writer                               # noqa: E402
 
 pytestmark = pytest.mark.ros
@@ -86,6 +87,19 @@ def test_an_experiment_begins_once_it_is_measured_and_driven(tmp_path):
             time.sleep(0.15)
         send(0, 0.001, True)
         wait_for(lambda: rig.heard['reference'], 5.0, 'the reference')
+    finally:
+        rig.close()
+
+
+def test_an_experiment_that_waits_says_for_what(tmp_path):
+    rig = LiveRig(tmp_path)
+    try:
+        rig.start('reference_generator', experiment='short_sine', await_measurement_s=60.0)
+        rig.listen(('reference',))
+        wait_for(lambda: rig.health['reference_generator'], 30.0, 'a word')
+        wait_for(lambda: rig.health['reference_generator'][-1].level == LEVEL_WARN, 10.0, 'why')
+        assert rig.health['reference_generator'][-1].message == (
+            f'{NOT_BEGUN} /muscle/contraction, /muscle/valve_signal')
     finally:
         rig.close()
 
