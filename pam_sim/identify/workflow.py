@@ -97,12 +97,7 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: str | Sequence[str] =
     runs = [runs] if isinstance(runs, Run) else list(runs)
     if not runs:
         raise InputError('at least one recording is needed', 'runs')
-    if added_kg and len(added_kg) != len(runs):
-        raise InputError(f'{len(added_kg)} masses for {len(runs)} recordings; give one for each, '
-                         '0 for none', 'added mass')
-    if any(added_kg) and 'mass_kg' not in rig.parameters:
-        raise InputError(f'{max(added_kg):g} kg hung on load `{rig.load}`, which has no mass; a '
-                         'held muscle takes 0', 'added mass')
+    _check_masses(added_kg, len(runs), rig)
     rig, unknown, wanted = with_unknown(rig, unknown)
     runs, of_commands = commanded(runs, rig)
     offers, of_offers = offers_of(runs, rig, added_kg or [0.0] * len(runs), spare_certify)
@@ -135,17 +130,10 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: str | Sequence[str] =
         weighted, x, forms = _in_each_form(
             weighted, x, len(acting), _part(progress, 0.3, 0.6))
     progress(0.6)
-    x, information, numbers_found, combinations = _judged(
+    x, information, first, combinations = _judged(
         weighted, x, acting, forms, _part(progress, 0.6, 0.9))
-    first, squares = numbers_found, weighted.mean_squares(x)
-    numbers_found, at_rest = with_settled_zero(
-        rig, [p for p, _, square in squares if square > CRITERIA.clear_rest], first)
-    beside = beside_settled_zero(weighted, x, numbers_found) if at_rest else None
-    if beside is not None:
-        more, joined, own = _without_valve(*beside, _part(progress, 0.9, 0.95))
-        numbers_found = [more.get(one.number.name, one) for one in numbers_found]
-        combinations = joined + [c for c in combinations if not set(more) & set(c.weights)]
-        squares = own + [one for one in squares if one[0].subsystem == 'valve']
+    numbers_found, combinations, squares, at_rest = _with_zero_at_rest(
+        weighted, x, rig, first, combinations, _part(progress, 0.9, 0.95))
     left = [(p, name, square) for p, name, square in squares if square > SEEN_FLOORS2]
     # A small rest of another formulation bends little; a clear one bends the fit of every edge.
     bent = [n.name for n in acting if any(
@@ -154,22 +142,40 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: str | Sequence[str] =
         _identified(rig, numbers_found), numbers_found, combinations,
         [{'path': one.path, 'kind': one.kind, 'added_kg': one.added_kg} for one in offers],
         _signals(before, _rms(squares)), incomplete, [n.name for n in wanted], bent=bent)
-    result.remarks += [f'{one.path}: {one.rest.text()}' for one in offers if one.rest]
-    result.remarks += [*of_commands, *of_offers]
-    result.remarks += [] if force_compared else of_one_scale(acting)
-    result.remarks += remarks_on(rig, problems, wanted, numbers_found, left, at_rest)
+    result.remarks += [
+        *(f'{one.path}: {one.rest.text()}' for one in offers if one.rest),
+        *of_commands, *of_offers, *([] if force_compared else of_one_scale(acting)),
+        *remarks_on(rig, problems, wanted, numbers_found, left, at_rest)]
+    narrow = [one.number.name for one in numbers_found if one.is_narrow]
     # What ends at the edge of its range needs another model rather than another recording.
-    if advise and (any(not one.is_narrow for one in numbers_found) or len(acting) < len(wanted)):
-        with_force = any('force' in one.recording.signals for one in offers)
-        x, information = where_open(acting, [one.interval for one in first],
-                                    [DETERMINED if one.is_narrow else one.status
-                                     for one in first], x, information)
+    if advise and (len(narrow) < len(numbers_found) or len(acting) < len(wanted)):
+        x, information = where_open(
+            acting, [one.interval for one in first],
+            [DETERMINED if one.is_narrow else one.status for one in first], x, information)
         result.next_experiment = next_experiment(
             with_values(rig, numbers, weighted.values(x)), wanted, acting, information,
-            offers, with_force, _part(progress, 0.95, 1.0),
-            [one.number.name for one in numbers_found if one.is_narrow])
+            offers, any('force' in one.recording.signals for one in offers),
+            _part(progress, 0.95, 1.0), narrow)
     progress(1.0)
     return result
+
+
+def _check_masses(added_kg: Sequence[float], count: int, rig: Rig) -> None:
+    """
+    Check the masses that hung on the load of so many recordings in addition.
+
+    Raises
+    ------
+    InputError
+        Another number of masses than of recordings, or a load that has no mass.
+
+    """
+    if added_kg and len(added_kg) != count:
+        raise InputError(f'{len(added_kg)} masses for {count} recordings; give one for each, '
+                         '0 for none', 'added mass')
+    if any(added_kg) and 'mass_kg' not in rig.parameters:
+        raise InputError(f'{max(added_kg):g} kg hung on load `{rig.load}`, which has no mass; a '
+                         'held muscle takes 0', 'added mass')
 
 
 def _onward(progress: Progress) -> Progress:
@@ -201,6 +207,28 @@ def identify_beside(law: Sequence[str], why: str, runs: Sequence[Run], rig: Rig,
         found.remarks = [*(one for one in found.remarks if one != ANOTHER_LAW),
                          f'{", ".join(law)}: as in the model. {why}']
     return found
+
+
+def _with_zero_at_rest(
+        weighted: Weighted, x: FloatArray, rig: Rig, found: list[Found],
+        combinations: list[Combination], progress: Progress
+        ) -> tuple[list[Found], list[Combination], Squares, list[str]]:
+    """
+    Read the zero of the pressure sensor at rest, where the valve is not understood.
+
+    Returns (numbers, combinations, mean squares, names of what was read so). Where it was, muscle
+    and load are fitted without the valve, with this zero as prior.
+    """
+    squares = weighted.mean_squares(x)
+    found, at_rest = with_settled_zero(
+        rig, [p for p, _, square in squares if square > CRITERIA.clear_rest], found)
+    beside = beside_settled_zero(weighted, x, found) if at_rest else None
+    if beside is not None:
+        more, joined, own = _without_valve(*beside, progress)
+        found = [more.get(one.number.name, one) for one in found]
+        combinations = joined + [c for c in combinations if not set(more) & set(c.weights)]
+        squares = own + [one for one in squares if one[0].subsystem == 'valve']
+    return found, combinations, squares, at_rest
 
 
 def _judged(weighted: Weighted, x: FloatArray, acting: Sequence[Number], forms: FloatArray,
