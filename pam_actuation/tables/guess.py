@@ -42,6 +42,7 @@ LOWEST_AIR = 0.6                  # of it: the air of the highest towns
 _PLACE = re.compile(r'(?<=.)/(data|value|[xyz])([.\[]\d+\]?)?$')
 FEW_BELOW = 0.02                  # share of the rows; fewer may be a sensor that drops out
 _STRAIN = re.compile(r'\b(strain|epsilon|ratio)\b')
+_Meaning = tuple[ColumnMap, str] | Question     # what a column is and why, or what must be asked
 
 
 @dataclass
@@ -99,30 +100,8 @@ def guess(tables: Collection[Table], mapping: TableMapping,
         if tables and all(table.name_of(one) is None for table in tables):
             tables[0].require(one)
     found = as_stated(mapping)
-    seen: dict[str, dict[str, tuple[ColumnMap, str] | Question]] = {}
-    either: dict[str, Question] = {}
-    for table in tables:
-        used = {table.name_of(one.column) for one in mapping.signals.values()}
-        used |= {table.name_of(one) for one in left_out}
-        used |= {table.name_of(mapping.time.column)} if mapping.time is not None else set()
-        for column in table.columns:
-            if column in used or is_called_time(table, column):
-                continue
-            meant = {signal.name: answer for signal in _signals_of(table, column)
-                     if signal.name not in mapping.signals and (
-                         answer := _of_column(table, column, signal, missing)) is not None}
-            if len(meant) > 1:
-                either[column] = either_of(column, {
-                    name: _units_of(answer) for name, answer in meant.items()})
-            else:
-                for name, answer in meant.items():
-                    of_name = seen.setdefault(name, {})
-                    of_name.setdefault(column, answer)
-                    for other in _numbered_2(table, column):
-                        if other not in used and (second := _readable(
-                                table, other, BY_NAME[name], missing)) is not None:
-                            of_name.setdefault(other, second)
-    found.questions += either.values()
+    seen, either = _meant(tables, mapping, missing, left_out)
+    found.questions += either
     signals = dict(mapping.signals)
     joint = are_of_joint(signals) or are_of_joint(seen.keys() - {one.name for one in ANGLES})
     for name, candidates in seen.items():
@@ -144,6 +123,42 @@ def guess(tables: Collection[Table], mapping: TableMapping,
     return found
 
 
+def _meant(tables: Collection[Table], mapping: TableMapping, missing: Collection[str],
+           left_out: Collection[str]) -> tuple[dict[str, dict[str, _Meaning]], list[Question]]:
+    """Return (by signal the columns that may be it, questions on columns of several signals)."""
+    seen: dict[str, dict[str, _Meaning]] = {}
+    either: dict[str, Question] = {}
+    for table in tables:
+        used = _used(table, mapping, left_out)
+        for column in table.columns:
+            if column in used or is_called_time(table, column):
+                continue
+            meant = {signal.name: answer for signal in _signals_of(table, column)
+                     if signal.name not in mapping.signals and (
+                         answer := _of_column(table, column, signal, missing)) is not None}
+            if len(meant) > 1:
+                either[column] = either_of(column, {
+                    name: _units_of(answer) for name, answer in meant.items()})
+                continue
+            for name, answer in meant.items():
+                of_name = seen.setdefault(name, {})
+                of_name.setdefault(column, answer)
+                for other in _numbered_2(table, column):
+                    second = None if other in used else _readable(
+                        table, other, BY_NAME[name], missing)
+                    if second is not None:
+                        of_name.setdefault(other, second)
+    return seen, list(either.values())
+
+
+def _used(table: Table, mapping: TableMapping, left_out: Collection[str]) -> set[str | None]:
+    """Return the columns of a table that are mapped, or left out."""
+    stated = [one.column for one in mapping.signals.values()]
+    if mapping.time is not None:
+        stated.append(mapping.time.column)
+    return {table.name_of(one) for one in (*stated, *left_out)}
+
+
 def _numbered_2(table: Table, column: str) -> list[str]:
     """Return the columns called as one that ends in 1, but with a 2: nobody knows which is it."""
     words = words_of(_name_of(table, column))
@@ -154,7 +169,7 @@ def _numbered_2(table: Table, column: str) -> list[str]:
 
 
 def _readable(table: Table, column: str, signal: Signal, missing: Collection[str]
-              ) -> tuple[ColumnMap, str] | Question | None:
+              ) -> _Meaning | None:
     """Return what ``_of_column`` does, None for a column that holds texts."""
     try:
         return _of_column(table, column, signal, missing)
@@ -188,8 +203,7 @@ def _of_lengths(tables: Collection[Table], mapping: TableMapping, missing: Colle
             for column, one in lengths.items()]
 
 
-def _chosen(name: str, candidates: dict[str, tuple[ColumnMap, str] | Question]
-            ) -> tuple[ColumnMap, str] | Question:
+def _chosen(name: str, candidates: dict[str, _Meaning]) -> _Meaning:
     """Return the one column that is a signal, or the question which of several is."""
     exported = [one for column, one in candidates.items() if is_exported(column, BY_NAME[name])]
     measured = {column: one for column, one in candidates.items() if not _is_output(one)}
@@ -200,12 +214,12 @@ def _chosen(name: str, candidates: dict[str, tuple[ColumnMap, str] | Question]
         (column, _units_of(one)) for column, one in candidates.items()])
 
 
-def _units_of(one: tuple[ColumnMap, str] | Question) -> tuple[str, ...]:
+def _units_of(one: _Meaning) -> tuple[str, ...]:
     """Return the units in which a column may be read."""
     return one.answers if isinstance(one, Question) else (one[0].unit.name,)
 
 
-def _is_output(one: tuple[ColumnMap, str] | Question) -> bool:
+def _is_output(one: _Meaning) -> bool:
     return isinstance(one, Question) and one.is_output
 
 
@@ -287,7 +301,7 @@ def is_exported(column: str, signal: Signal) -> bool:
 
 
 def _of_column(table: Table, column: str, signal: Signal, missing: Collection[str]
-               ) -> tuple[ColumnMap, str] | Question | None:
+               ) -> _Meaning | None:
     """Return what a column is and why, a question, or None for one that is another quantity."""
     if is_exported(column, signal):
         si = si_unit(signal.quantity)
