@@ -45,7 +45,7 @@ from pam_sim.files import write_text
 
 if TYPE_CHECKING:
     from pam_actuation.experiments.experiment import Experiment
-    from pam_actuation.tuning.problem import Law
+    from pam_actuation.tuning.problem import Law, Loop
     from pam_sim.joint.rig import JointRig
     from pam_sim.rig import Rig
 
@@ -357,14 +357,28 @@ def tune(rig: 'Rig | JointRig | Sequence[Rig | JointRig]', controller: 'Law',
     changed = {name: (value, tuned.settings[name]) for name, value in before.items()
                if tuned.settings[name] != value}
     rollouts = done[0] + len(train) + 2 * len(test) + extra
+    return TuneResult(
+        controller=tuned, changed=changed, history=history, cost_before=cost_before,
+        cost_after=cost_after, held_out_before=held_before, held_out_after=held_after,
+        improved=improved, rollouts=rollouts, simulated_s=_simulated_s(train, test, rollouts),
+        seconds=time.perf_counter() - began, ended=found.reason, rules=rules, left_out=left_out,
+        axes=axes, start=controller, problem=problem, check=check,
+        unit='deg' if tracked_by(controller) == JOINT else 'mm', held_out_found=held_found,
+        held_out_runs=_held_out_runs(
+            test, tested, seed + HELD_OUT_SEED, costs_before, costs_after),
+        refused=refused)
+
+
+def _simulated_s(train: 'Sequence[Loop]', test: 'Sequence[Loop]', rollouts: int) -> float:
+    """Return how long all rollouts are together [s], each held-out run among them twice."""
     train_s, test_s = (
         sum(loop.experiment.duration_s for loop in loops) for loops in (train, test))
-    simulated_s = (rollouts - 2 * len(test)) * (train_s / len(train)) + 2 * test_s
-    numbers = {id(one): k for k, one in enumerate(tested)}
-    return TuneResult(
-        tuned, changed, history, cost_before, cost_after, held_before, held_after, improved,
-        rollouts, simulated_s, time.perf_counter() - began, found.reason, rules, left_out,
-        axes, controller, problem, check, 'deg' if tracked_by(controller) == JOINT else 'mm',
-        held_found, [
-            HeldOutRun(loop.experiment.name, numbers[id(loop.rig)], seed + HELD_OUT_SEED, *costs)
-            for loop, *costs in zip(test, costs_before, costs_after)], refused)
+    return (rollouts - 2 * len(test)) * (train_s / len(train)) + 2 * test_s
+
+
+def _held_out_runs(test: 'Sequence[Loop]', rigs: 'Sequence[Rig | JointRig]', seed: int,
+                   before: Sequence[float], after: Sequence[float]) -> list[HeldOutRun]:
+    """Return the costs of each held-out run; its rig counts among ``rigs``."""
+    numbers = {id(one): k for k, one in enumerate(rigs)}
+    return [HeldOutRun(loop.experiment.name, numbers[id(loop.rig)], seed, *costs)
+            for loop, *costs in zip(test, before, after)]
