@@ -73,7 +73,9 @@ EFFECT_KEYS = (
     Key('source', dict, 'Where the numbers come from; `pam gap` writes intervals here.',
         otherwise='none'),
 )
-_PRESETS = NamedFiles('presets')
+_PRESETS, _JOINTS = NamedFiles('presets'), NamedFiles('joint/presets')
+_ONE_MUSCLE = ('is a joint with two muscles, and one muscle is needed here, such as '
+               'dmsp_5_300_driven; in Python `pam_sim.load_joint` reads a joint')
 _EFFECTS_FORM = 'write `effects: [{name: NAME, parameters: {NUMBER: VALUE}}]`'
 
 
@@ -110,6 +112,8 @@ def load_rig(
     if isinstance(source, Rig):
         rig = source
     else:
+        if isinstance(source, str) and source in _JOINTS.names():
+            raise InputError(_ONE_MUSCLE, source)
         data, name = _PRESETS.locate(source, 'rig')
         rig = _from_mapping(data, name or file_stem(source), (name,) if name else ())
     for value, choices, what in ((valve, VALVES, 'valve'), (fidelity, hsv.FIDELITIES, 'fidelity')):
@@ -121,8 +125,7 @@ def load_rig(
 
 def _from_mapping(data: Located, name: str | None, seen: tuple[str, ...]) -> Rig:
     if data.get('load') == 'antagonistic_joint' or 'joint' in data:
-        raise data.error('describes a joint with two muscles; `pam_sim.load_joint` reads it',
-                         'load' if 'load' in data else 'joint')
+        raise data.error(_ONE_MUSCLE, 'load' if 'load' in data else 'joint')
     data.check_keys(names_of(KEYS))
     name = data.get('name', str, name)
     if 'rig' in data:

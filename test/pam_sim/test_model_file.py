@@ -128,6 +128,12 @@ def test_mistakes_outside_files(tmp_path):
         load_rig('no_such_rig')
     with pytest.raises(InputError, match='No such file'):
         load_rig('no_such_rig.yaml')
+    one_muscle = 'is a joint with two muscles, and one muscle is needed here'
+    with pytest.raises(InputError, match=f'^joint_dmsp_5_300: {one_muscle}'):
+        load_rig('joint_dmsp_5_300')
+    (tmp_path / 'knee.yaml').write_text('name: mine\njoint: joint_dmsp_5_300\n')
+    with pytest.raises(InputError, match=f'knee.yaml:2: {one_muscle}'):
+        load_rig(tmp_path / 'knee.yaml')
     with pytest.raises(InputError, match='xyz'):
         load_rig('dmsp_5_300_realistic', valve='xyz')
     binary = tmp_path / 'binary.yaml'
