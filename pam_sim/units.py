@@ -65,6 +65,11 @@ def often(count: int) -> str:
     return {0: 'never', 1: 'once'}.get(count, f'{count} times')
 
 
+def counted(count: int, noun: str) -> str:
+    """Return a number of things in words: ``1 rig``, ``3 rigs``."""
+    return f'{count} {noun}' + 's' * (count != 1)
+
+
 def allowed_range(lower: float, upper: float, unit: str = '', name: str = '') -> str:
     """
     Return a range in words, in the unit that is to be written: ``0.1 to 500 kg``.

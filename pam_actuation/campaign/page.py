@@ -25,6 +25,7 @@ from pam_actuation.campaign.series import IN_95, Series
 from pam_actuation.report import figures
 from pam_actuation.report.page import paragraph, plot, render, Section, text
 from pam_actuation.report.pages import FOOTER
+from pam_sim.units import counted
 
 LEAD = ('Every recording was worked on by itself. This page compares what was found over rigs and '
         'days.')
@@ -50,7 +51,8 @@ def campaign_page(campaign: Campaign, findings: Findings) -> str:
     rows = campaign.rows
     days = _days(rows)
     numbers = [
-        (str(len(rows)), 'recordings', f'{len(campaign.rigs)} rigs, {days[0]} to {days[-1]}', ''),
+        (str(len(rows)), 'recordings',
+         f'{counted(len(campaign.rigs), "rig")}, {days[0]} to {days[-1]}', ''),
         (str(len(findings.changes)), 'changes over time', f'at a level of {LEVEL:g} in all',
          'bad' if findings.changes else 'good'),
         (str(len(findings.odd)), 'recordings stand out', 'listed first below',

@@ -136,9 +136,10 @@ def _told(row: dict[str, Any]) -> dict[str, Any]:
 
 def _lines(campaign: 'Campaign', findings: 'Findings') -> list[str]:
     """Return the result for people."""
-    count_of = len(campaign.rows)
-    lines = [f'{count_of} recordings of {len(campaign.rigs)} rigs, {campaign.worked_on} worked '
-             f'on now in {campaign.seconds:.1f} s, {len(campaign.failed)} failed']
+    from pam_sim.units import counted
+    lines = [f'{counted(len(campaign.rows), "recording")} of '
+             f'{counted(len(campaign.rigs), "rig")}, {campaign.worked_on} worked on now in '
+             f'{campaign.seconds:.1f} s, {len(campaign.failed)} failed']
     lines += [f'  {one}' for one in findings.sentences()]
     if not findings.changes:
         lines.append('  nothing changes over time')

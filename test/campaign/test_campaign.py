@@ -312,7 +312,7 @@ def test_recordings_of_equal_bytes_keep_their_own_reason(tmp_path):
 
 @pytest.mark.parametrize('cases, span, columns', [
     # Numbers, and stamps within one minute on three rigs.
-    ([('rig', str(k), float(k)) for k in range(1, 13)], '1 rigs, 1 to 12', 12),
+    ([('rig', str(k), float(k)) for k in range(1, 13)], '1 rig, 1 to 12', 12),
     ([(f'rig{k}', '2026-11-25T09:30', 20000.0 + 1e-4 * k) for k in range(3)],
      '3 rigs, 2026-11-25T09:30 to 2026-11-25T09:30', 1)])
 def test_the_page_has_a_column_for_each_day(cases, span, columns):
