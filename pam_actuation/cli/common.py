@@ -198,12 +198,12 @@ def load_setup(args: argparse.Namespace) -> 'tuple[Experiment, Any, Any]':
     from pam_sim.joint import load_rig_or_joint
     experiment = load_experiment(args.experiment)
     rig = load_rig_or_joint(args.rig, args.valve)
+    experiment.check_reachable(rig)
     if not experiment.asks_for_motion:
         if args.controller or args.rules:       # of no use here, but not to be wrong either
             load_controller(default_controller(args, rig.valve), rig, rules_file=args.rules,
                             accept_other_rig=True)
         return experiment, rig, None
-    experiment.check_reachable(rig)
     controller = load_controller(
         args.controller or preset_for(experiment, rig), rig, rules_file=args.rules,
         accept_other_rig=args.accept_other_rig)

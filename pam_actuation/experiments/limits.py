@@ -64,7 +64,8 @@ def check_rig(experiment: 'Experiment', rig: 'JointRig | Rig') -> None:
     elif rig.valve != _VALVE_OF[experiment.domain]:
         raise InputError(
             f'its values are the raw signal {experiment.domain} of the valve type '
-            f'{_VALVE_OF[experiment.domain]}, the rig {rig.name} has {rig.valve}', place)
+            f'{_VALVE_OF[experiment.domain]}, the rig {rig.name} has {rig.valve}; choose that '
+            f'valve (--valve {_VALVE_OF[experiment.domain]}), or an experiment for this one', place)
     elif experiment.domain == 'ppr_voltage':
         _check_voltage(experiment, rig, place)
     if experiment.disturbance:
@@ -173,7 +174,8 @@ def _check_force(experiment: 'Experiment', rig: 'Rig', place: str) -> None:
     if LOADS[rig.load].MOVES_FREELY:
         raise InputError(
             f'asks for a force; the load `{rig.load}` of {rig.name} moves freely, a force can be '
-            'tracked where the contraction is prescribed (isometric, driven)', place)
+            'tracked where the contraction is prescribed (isometric, driven), as of '
+            'dmsp_5_300_isometric_realistic', place)
     highest = highest_force_n(
         rig, highest_gauge_pa(rig), rig.parameters.get('contraction_m', 0.0))
     worst = experiment.chain.extremes()[1]

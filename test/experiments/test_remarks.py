@@ -116,6 +116,14 @@ def test_options_of_a_controller_that_change_nothing_are_told(experiment, option
     assert said in printed and ('nothing' in printed) == bool(said)
 
 
+def test_a_refusal_stands_alone_and_says_what_to_take(capsys):
+    for options, ways in ((['duty_pulses'], '(--valve hsv)'),
+                          (['force_sine'], 'as of dmsp_5_300_isometric_realistic')):
+        assert main(['simulate', *options]) == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        assert line.startswith('pam simulate: experiment ') and ways in line
+
+
 def test_nominal_values_of_unknown_numbers_are_said_until_they_are_found(rig):
     unknown = {'spring_n_per_m': math.inf, 'law.a1_n_per_pa': math.inf}
     said, = unknown_remarks(rig.with_(tolerance=unknown))
