@@ -211,7 +211,14 @@ def knee(namespace: str = '/knee', joint: str = 'joint_dmsp_5_300_realistic', va
     parameter file, as of ``rig``.
     ``angle`` tells of hardware whether the angle is read by ``hardware_sensors`` ('sensors') or
     published by a program of your own ('topic').
+
+    Raises
+    ------
+    InputError
+        In the experiment, or where the joint cannot do it.
+
     """
+    _check_joint(experiment, joint, valve)
     namespace = namespace_of(namespace)
     seed = seed_in(namespace) if seed is None else seed
     common = {'valve_type': valve, 'muscle': name or name_in(namespace)}
@@ -246,6 +253,14 @@ def knee(namespace: str = '/knee', joint: str = 'joint_dmsp_5_300_realistic', va
         **common, **({'seed': seed} if hardware == SIMULATED else {}),
         'rig': joint, 'output': record, 'experiment': experiment,
         'controller': '' if controller == NO_CONTROLLER else controller}, overwrite)
+
+
+def _check_joint(experiment: str, joint: str, valve: str) -> None:
+    """Raise InputError where a joint cannot do a named experiment, before any node starts."""
+    if experiment:
+        from pam_actuation.experiments import load_experiment
+        from pam_sim.joint import load_joint
+        load_experiment(experiment).check_reachable(load_joint(joint, valve=valve))
 
 
 def exo(namespace: str = '', record: str = '', seed: int | None = None,

@@ -120,6 +120,10 @@ def test_every_node_has_its_place_in_the_order():
     (['knee', '--hardware', 'nothing'], 'nothing'),
     (['rig', '--hardware', 'nothing'], 'nothing'),
     (['rig', '--experiment', 'nowhere'], 'nowhere'),
+    (['knee', '--experiment', 'nowhere'], 'nowhere'),
+    (['knee', '--experiment', 'sine_half_hz'], 'is a joint; name an experiment in joint_angle'),
+    (['exo', '--experiment', 'rest'], 'is a joint; name an experiment in joint_angle'),
+    (['knee', '--experiment', 'joint_sine', '--model', 'knee_dmsp_20_300'], 'rad'),
     (['rig', '--experiment', 'voltage_steps', '--valve', 'hsv'], 'voltage')])
 def test_a_mistake_is_one_sentence(arguments, words, capsys):
     assert main(['up', *arguments]) == 2
