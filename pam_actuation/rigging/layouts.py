@@ -180,12 +180,14 @@ def played(experiment: str, rig: str, valve: str, controller: str = '',
         In the experiment, or where the rig cannot do it.
 
     """
-    name = controller or (presets or {}).get(valve)
-    if not experiment:
-        return '' if name == NO_CONTROLLER else name or f'sofc_{valve}', False
-    from pam_actuation.control.modes.files import preset_for
+    from pam_actuation.control.modes.files import preset_for, preset_without_experiment
     from pam_actuation.experiments import load_experiment
     from pam_sim import load_rig
+    name = controller or (presets or {}).get(valve)
+    if not experiment:
+        if name == NO_CONTROLLER:
+            return '', False
+        return name or preset_without_experiment(load_rig(rig, valve=valve)), False
     wanted, model = load_experiment(experiment), load_rig(rig, valve=valve)
     wanted.check_reachable(model)
     if not wanted.tracked or name == NO_CONTROLLER:

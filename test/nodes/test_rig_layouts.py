@@ -109,6 +109,14 @@ def test_a_joint_is_recorded_as_a_whole_and_each_knee_in_a_bag_of_its_own():
             if node.name == 'experiment_recorder'] == ['bags/left_knee', 'bags/right_knee']
 
 
+@pytest.mark.parametrize('load, controller', [
+    ('hanging_mass', 'sofc_ppr'), ('isometric', 'sofc_force_ppr'), ('driven', 'sofc_force_ppr')])
+def test_without_an_experiment_the_controller_tracks_what_the_load_allows(load, controller):
+    nodes = layouts.rig(rig=f'dmsp_5_300_{load}')
+    (node,) = [one for one in nodes if one.name == 'sofc_controller']
+    assert node.parameters['controller'] == controller
+
+
 def test_every_node_has_its_place_in_the_order():
     nodes = [*layouts.rig(hardware='dummy', experiment='rest', record='bag'), *layouts.rig(),
              *layouts.exo(experiment='joint_sine')]

@@ -49,6 +49,11 @@ def preset_for(experiment: 'Experiment', rig: 'Rig | JointRig') -> str:
     return f'sofc_{mode}{rig.valve}'
 
 
+def preset_without_experiment(rig: 'Rig') -> str:
+    """Return the same for references from elsewhere: a force where no contraction can be."""
+    return f'sofc_{"" if LOADS[rig.load].MOVES_FREELY else "force_"}{rig.valve}'
+
+
 def joint_size(joint: 'JointRig') -> str:
     """Return ``knee`` for a joint of the size of a leg, ``joint`` for one of a bench."""
     return 'knee' if joint.parameters['inertia_kg_m2'] > LARGE_JOINT_KG_M2 else 'joint'
