@@ -88,7 +88,7 @@ def main(argv: list[str] | None = None) -> int:
         code = interrupts.EXIT_INTERRUPTED
     finally:
         interrupts.closing.end(code)    # the result is out
-        gc.freeze()     # the interpreter would look for garbage among all that the system takes
+        gc.freeze()     # or the interpreter looks for garbage once more as it ends
     if code == interrupts.EXIT_INTERRUPTED:
         interrupts.end_interrupted()
     return code
