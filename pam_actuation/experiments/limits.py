@@ -65,7 +65,8 @@ def check_rig(experiment: 'Experiment', rig: 'JointRig | Rig') -> None:
         raise InputError(
             f'its values are the raw signal {experiment.domain} of the valve type '
             f'{_VALVE_OF[experiment.domain]}, the rig {rig.name} has {rig.valve}; choose that '
-            f'valve (--valve {_VALVE_OF[experiment.domain]}), or an experiment for this one', place)
+            f'valve (--valve {_VALVE_OF[experiment.domain]}), or an experiment for this one',
+            place)
     elif experiment.domain == 'ppr_voltage':
         _check_voltage(experiment, rig, place)
     if experiment.disturbance:
