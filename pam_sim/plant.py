@@ -79,6 +79,16 @@ class Plant(SharedMemory):
         """Return the plant of each muscle, by its place as in ``Rig.muscles``: this one."""
         return {'': self}
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the attributes without compiled code: another process has its own."""
+        return {name: value for name, value in super().__getstate__().items()
+                if name != '_kernel'}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Take attributes, and the compiled code of the rig."""
+        super().__setstate__(state)
+        self._kernel = kernel.entries_for(self.par)
+
     def __repr__(self) -> str:
         """Return rig, time and readings in one line."""
         return (f'{type(self).__name__}({self.rig.name!r}, {self.rig.valve}, {self.time_s:.6g} s: '

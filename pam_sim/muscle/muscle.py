@@ -120,6 +120,10 @@ class LawChoice:
             return make_law(self.name, self.table)
         return make_law(self.name, self.parameters or None, self.set)
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the choice without the law: another process reads the file of a law itself."""
+        return {name: value for name, value in vars(self).items() if name != 'law'}
+
     def plain(self) -> dict[str, Any]:
         """Return the choice as plain data for a model file."""
         data: dict[str, Any] = {'name': self.name}

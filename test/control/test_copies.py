@@ -76,6 +76,14 @@ def test_a_copied_joint_steps_by_itself(copied):
     assert other.flexor.pressure_pa == plant.flexor.pressure_pa
 
 
+def test_a_rig_and_its_plant_travel_without_code(rig):
+    """A process that was just started cannot import the file of a force law of one's own."""
+    assert rig.muscle.law.law.NAME == 'sarosi'
+    for one in (rig, rig.plant(), load_joint('joint_dmsp_5_300').plant()):
+        assert b'muscle.laws' not in pickle.dumps(one) and b'rollout' not in pickle.dumps(one)
+    assert pickle.loads(pickle.dumps(rig)) == rig
+
+
 @pytest.mark.parametrize('name', LAWS)
 def test_a_copied_controller_keeps_below_the_limit_it_is_given(rig, copied, name):
     controller = load_controller(name, rig)
