@@ -24,6 +24,7 @@ one tick early or late. So it is with the controller in recordings of versions w
 states lack some inputs.
 """
 
+import copy
 from dataclasses import dataclass, field
 import os
 from typing import Any, TYPE_CHECKING
@@ -36,6 +37,7 @@ from pam_actuation.control.modes.joint import JointController
 from pam_actuation.drivers.recorded import as_recorded
 from pam_actuation.replay.arrivals import recorded_topics_of_joint, RecordedTopic
 from pam_actuation.replay.chain import ChainReplay, recorded_seed, RepeatedLoops, replay_chain
+from pam_actuation.replay.controller import check_rate
 from pam_actuation.replay.joint_controller import replay_joint_controller, states_suffice
 from pam_actuation.replay.model import GIVE_MODEL, other_model, with_model
 from pam_actuation.replay.settings import preview_remark, valve_remark
@@ -140,7 +142,8 @@ def replay_joint(run: Run, controller: 'Controller | str | os.PathLike[str] | No
     run : RecordedRun
         Of a joint, from ``load_recording``.
     controller : optional
-        Another controller (an object, or its name or path): what would it have commanded?
+        Another controller (an object, or its name or path): what would it have commanded? Of an
+        object a copy is stepped.
     only : {'controller', 'driver', 'plant'}, optional
         Replay this part alone; by default each of the three by itself.
     chain : bool
@@ -151,7 +154,8 @@ def replay_joint(run: Run, controller: 'Controller | str | os.PathLike[str] | No
     Raises
     ------
     InputError
-        What was asked for cannot be replayed; the controller is unusable.
+        What was asked for cannot be replayed; the controller is unusable, or runs at another
+        rate than the recorded ticks.
 
     """
     path = str(run.path)
@@ -168,6 +172,8 @@ def replay_joint(run: Run, controller: 'Controller | str | os.PathLike[str] | No
     if controller is not None and 'controller' not in wanted:
         raise InputError(f'another controller changes nothing for the {only} alone', '--set')
     law = _law(run, joint, controller)
+    if controller is not None and law is not None and 'controller_state' in run:
+        check_rate(law, run['controller_state'], path)
     parts: dict[str, ChainReplay] = {}
     notes: dict[str, str] = {}
     internals: dict[str, int] = {}
@@ -203,4 +209,4 @@ def _law(run: Run, joint: JointRig, controller: 'Controller | str | os.PathLike[
     own = run.metadata.get('controller')
     if controller is None and own:
         return load_controller(own, joint, accept_other_rig=True)
-    return controller
+    return copy.deepcopy(controller)

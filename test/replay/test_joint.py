@@ -160,6 +160,10 @@ def test_another_law_gives_another_experiment_and_is_no_mistake(run):
     assert not angle.identical
     with pytest.raises(InputError, match='changes nothing for the plant'):
         replay_joint(run, other, only='plant')
+    slower = other.with_settings({'rate_hz': 100.0})
+    with pytest.raises(InputError, match='runs at 100 Hz, the recorded ticks at 200 Hz'):
+        replay_joint(run, slower, only='controller')
+    assert other.to_yaml() == load_controller(text, load_joint(run.metadata['rig'])).to_yaml()
 
 
 def test_a_changed_recording_is_noticed(run):
