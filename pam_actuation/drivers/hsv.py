@@ -70,8 +70,10 @@ class HsvLaw(SharedMemory):
 
         Pressures absolute [Pa]; ``p_meas_pa`` NaN = no new measurement, ``supply_pa``
         NaN = nominal; ``age_s`` is the age of the measurement. ``contraction_m`` [m], NaN = none,
-        counts where the law is told to use it.
+        counts where the law is told to use it. A command that is not finite vents.
         """
+        if not math.isfinite(p_cmd_pa):
+            p_cmd_pa = P_ATM_PA
         self._see(age_s, contraction_m, contraction_age_s)
         hsv_step(self.state, self.par, p_cmd_pa, p_meas_pa, supply_pa, self.out)
         return self._out.fill_duty.item(), self._out.vent_duty.item()

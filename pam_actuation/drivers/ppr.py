@@ -163,8 +163,11 @@ class PprLaw(SharedMemory):
         """
         Return the volts for a wanted absolute pressure [Pa].
 
-        ``dt_s`` is the time since the last step where it is not the configured period.
+        ``dt_s`` is the time since the last step where it is not the configured period. A command
+        that is not finite vents.
         """
+        if not math.isfinite(p_cmd_pa):
+            p_cmd_pa = P_ATM_PA
         if dt_s is not None and self.config.slew_v_per_s > 0.0:
             self._par.largest_change_v[...] = self.config.slew_v_per_s * dt_s
         ppr_step(self.state, self.par, p_cmd_pa, math.nan, math.nan, self.out)

@@ -110,6 +110,15 @@ def test_both_duties_exactly_zero_in_the_band():
         assert law.step(P_ATM_PA + 300e3, P_ATM_PA + 300e3 + wiggle) == (0.0, 0.0)
 
 
+@pytest.mark.parametrize('command_pa', [math.nan, math.inf])
+def test_a_command_that_is_not_finite_vents_and_is_forgotten(command_pa):
+    """The vent duty was NaN, in all later periods too."""
+    law = HsvLaw()
+    assert law.step(4e5, 2e5, 801_325.0)[0] > 0.5
+    assert law.step(command_pa, 2.5e5, 801_325.0) == (0.0, 1.0)
+    assert law.step(4e5, 2e5, 801_325.0)[0] > 0.5 and law.sound
+
+
 def test_atmosphere_and_supply_limits(rig):
     """Commands beyond both ends end in shut valves, not in ones held open."""
     p, _, duties = run(

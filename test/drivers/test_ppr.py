@@ -108,3 +108,12 @@ def test_a_regulator_that_0_v_does_not_vent_is_refused(numbers, left_kpa, words)
     {'lowest_v': 1.0, 'atmospheric_v': 3.0}])
 def test_a_regulator_that_0_v_vents_is_taken(numbers):
     check_vents(PprConfig(**numbers), 'here')
+
+
+@pytest.mark.parametrize('command_pa', [math.nan, math.inf, -math.inf])
+def test_a_command_that_is_not_finite_vents(command_pa):
+    """Its volts were NaN, so what a valve output did was up to the output."""
+    law = PprLaw(PprConfig(slew_v_per_s=1.0))
+    law.step(P_ATM_PA + 500e3)
+    assert law.step(command_pa) == 0.0
+    assert law.step(P_ATM_PA + 500e3) == pytest.approx(0.005)       # and then it rises again
