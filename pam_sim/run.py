@@ -54,7 +54,10 @@ class Seconds(np.ndarray):
         return self
 
     def __call__(self, origin_ns: int = 0) -> FloatArray:
-        """Return the stamps in seconds after ``origin_ns``."""
+        """Return the stamps in seconds after ``origin_ns``; not of what was made of the array."""
+        if not hasattr(self, '_stamp_ns'):
+            raise InputError('is a part or a copy of `time_s`, which has no stamps; take '
+                             '`series.time_s(origin_ns)`, or `series.stamp_ns`', 'time_s')
         return _seconds(self._stamp_ns, origin_ns)
 
 

@@ -26,6 +26,7 @@ from pam_actuation.tuning.joint_loop import JointLoop
 import pam_sim
 from pam_sim import load_joint, load_rig
 from pam_sim.characterise.points import Points
+from pam_sim.errors import InputError
 from pam_sim.gap.result import Trace
 from pam_sim.run import Run, Series
 from pam_sim.short_repr import brief, short_repr
@@ -109,6 +110,8 @@ def test_time_is_asked_for_in_one_way(run):
     # The former way.
     np.testing.assert_array_equal(run['force'].time_s(run.start_ns), run['force'].time_s)
     assert run['force'].time_s()[0] == pytest.approx(1e9 + 0.5)
+    with pytest.raises(InputError, match='a part or a copy of `time_s`, .* `series.stamp_ns`'):
+        run['force'].time_s[10:20](run.start_ns)
     alone = Series(np.array([7, 9]), {})
     np.testing.assert_allclose(alone.time_s, [0.0, 2e-9])
     # A topic that is in two runs counts from the start of each.
