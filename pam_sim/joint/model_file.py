@@ -156,7 +156,7 @@ def _from_mapping(data: Located, name: str) -> JointRig:
 
 
 def _side(data: Located, side: str, base: JointRig | None) -> Rig:
-    """Return the rig of a side: a preset by name, a mapping as in a model file, or the base's."""
+    """Return the rig of a side: a preset or file by name, a mapping as in one, or the base's."""
     if side not in data and base is not None:
         return base.flexor if side == 'flexor' else base.extensor
     value = data.require(side)
@@ -164,7 +164,9 @@ def _side(data: Located, side: str, base: JointRig | None) -> Rig:
         return load_rig(value)
     if not isinstance(value, str):
         raise data.error(f'`{side}` must be a preset or a mapping as in a model file', side)
+    beside = os.path.join(os.path.dirname(data.name), value)        # as the table of a muscle
     try:
-        return load_rig(value)
+        return load_rig(beside if os.path.isfile(beside) else value)
     except InputError as error:
-        raise data.error(error.problem, side) from error
+        where = f'{side}: {error.where}: ' if error.where else ''
+        raise data.error(f'{where}{error.problem}', side) from error
