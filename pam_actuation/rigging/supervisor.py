@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from pam_actuation.rigging.processes import NodeProcess
 
 SILENT_S = 3.0            # without a status, which comes twice in a second
+SENSORS = 'hardware_sensors'
 _FAULT, _LATCHED, _NOT_VENTED = 1, 2, 3   # how grave the fault of a node is
 HEARD_S = 1.5             # a watchdog that sent a status within this time vents
 SETTLED_S = 1.0           # from the last node active to the first command and reading of all
@@ -136,7 +137,7 @@ class Supervisor:
             self._hear(tell, time.monotonic() > begun + SETTLED_S)
             looked, before = time.monotonic(), looked
             self._tell_silence({
-                name: silence.of(name, looked - before) for kind in (DRIVER, WATCHDOG)
+                name: silence.of(name, looked - before) for kind in (DRIVER, WATCHDOG, SENSORS)
                 for name in self._group.of_kind(kind)}, tell)
             for name in self._group.of_kind(DRIVER):
                 self._tell_unwatched(name, tell)
@@ -182,7 +183,7 @@ class Supervisor:
 
     def _tell_silence(self, silent_s: Mapping[str, float], tell: Callable[[str], None]) -> None:
         """
-        Tell of a driver or watchdog that fell silent, or is heard again.
+        Tell of a driver, watchdog or sensors that fell silent, or are heard again.
 
         ``silent_s`` has for how long each of them sent no status [s].
         """
@@ -198,7 +199,9 @@ class Supervisor:
                 tell(f'{name} is heard again')
 
     def _without(self, name: str, silent_s: Mapping[str, float]) -> str:
-        """Return what it means for the muscle that a driver or watchdog is silent."""
+        """Return what it means for the muscle that a driver, watchdog or sensors are silent."""
+        if name.endswith(f'/{SENSORS}'):
+            return 'its back end may hang, and nothing is measured'
         if name.endswith(f'/{WATCHDOG}'):
             driver = f'{name.removesuffix(WATCHDOG)}{DRIVER}'
             return (f'its driver is silent too, {MAY_HOLD}' if driver in self._silent

@@ -34,6 +34,7 @@ from pam_actuation.topics import codec                                      # no
 pytestmark = [pytest.mark.ros, pytest.mark.shared]
 
 DRIVER, WATCHDOG = '/left/valve_driver', '/left/valve_watchdog'
+SENSORS = '/left/hardware_sensors'
 BY_HAND = 'the muscle may still be under pressure: shut the supply and open the dump valve'
 
 
@@ -160,6 +161,7 @@ def test_an_experiment_that_waits_is_told_once_and_a_finding_at_the_end(rig):
 HOLDS = f'{DRIVER}: sent no status for 3 s: its valve holds the last signal, {BY_HAND}'
 VENTS = f'{DRIVER}: sent no status for 3 s: its watchdog vents'
 UNWATCHED = f'{WATCHDOG}: sent no status for 3 s: nothing vents if the driver stops'
+HANGS = f'{SENSORS}: sent no status for 3 s: its back end may hang, and nothing is measured'
 BOTH = f'{WATCHDOG}: sent no status for 3 s: its driver is silent too, {BY_HAND}'
 
 
@@ -170,9 +172,10 @@ BOTH = f'{WATCHDOG}: sent no status for 3 s: its driver is silent too, {BY_HAND}
     ([{DRIVER: 0.0, WATCHDOG: 3.1}, {DRIVER: 3.1, WATCHDOG: 9.0}], [UNWATCHED, HOLDS]),
     ([{DRIVER: 3.1, WATCHDOG: 0.4}, {DRIVER: 6.0, WATCHDOG: 3.1}], [VENTS, BOTH]),
     ([{DRIVER: 0.2, WATCHDOG: 3.1}, {DRIVER: 0.2, WATCHDOG: 0.0}],
-     [UNWATCHED, f'{WATCHDOG} is heard again'])])
+     [UNWATCHED, f'{WATCHDOG} is heard again']),
+    ([{DRIVER: 0.2, SENSORS: 2.9}, {DRIVER: 0.2, SENSORS: 3.1}], [HANGS])])
 def test_a_watchdog_is_said_to_vent_only_where_it_is_heard(rig, silent_s, told):
-    for name in (DRIVER, WATCHDOG):
+    for name in (DRIVER, WATCHDOG, SENSORS):
         rig.group.processes[name] = SimpleNamespace(running=True)
     said = []
     for moment in silent_s:
@@ -183,13 +186,14 @@ def test_a_watchdog_is_said_to_vent_only_where_it_is_heard(rig, silent_s, told):
     assert rig.supervisor.faults == [one for one in told if 'heard again' not in one]
 
 
-def test_drivers_and_watchdogs_are_listened_for(rig, monkeypatch):
-    rig.group._nodes[WATCHDOG] = NodeSpec('valve_watchdog', '/left', {})
+def test_drivers_watchdogs_and_sensors_are_listened_for(rig, monkeypatch):
+    for name in (WATCHDOG, SENSORS):
+        rig.group._nodes[name] = NodeSpec(name.rpartition('/')[2], '/left', {})
     looked = []
     monkeypatch.setattr(rig.supervisor, '_tell_silence',
                         lambda silent_s, tell: looked.append(set(silent_s)))
     rig.supervisor.watch(until=lambda: True)
-    assert looked == [{DRIVER, WATCHDOG}]
+    assert looked == [{DRIVER, WATCHDOG, SENSORS}]
 
 
 def test_messages_of_other_benches_are_not_counted(rig):
