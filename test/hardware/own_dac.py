@@ -15,6 +15,7 @@
 """A valve output of another package that has ``write`` alone, as behind a serial line."""
 
 import asyncio
+from contextlib import suppress
 from pathlib import Path
 import time
 
@@ -49,7 +50,9 @@ class WriteOnly(ValveOutput):
         put(self._file, ' '.join(f'{effort:g}' for effort in efforts))
 
     def _told(self):
-        return self._fault.read_text() if self._fault.exists() else ''
+        with suppress(FileNotFoundError):       # it may be taken away meanwhile
+            return self._fault.read_text()
+        return ''
 
 
 def write_metadata(folder):
