@@ -25,6 +25,7 @@ from pam_sim.identify.numbers import Number
 from pam_sim.identify.possible import counted_in
 from pam_sim.identify.result import Found
 from pam_sim.rig import Rig
+from pam_sim.valve import hsv, ppr
 
 ANOTHER_LAW = ('muscle and load leave a clear gap with the stated force law. If it was measured '
                'on another muscle, state it as unknown: pam rig new --unknown law')
@@ -32,6 +33,8 @@ OF_A_TABLE = ('muscle and load leave a clear gap with the stated table of forces
               'coefficients to find: {}let pam gap look for the effect that is missing, or '
               'measure the table of this muscle')
 STRENGTH = 'state its strength as unknown (pam rig new --unknown force_map_gain), '
+_OF_OTHER_VALVE = {'ppr': {p.name for p in hsv.PARAMETERS},
+                   'hsv': {p.name for p in ppr.PARAMETERS}}
 # (problem, signal, mean square in noise floors) of every signal.
 Squares = list[tuple[SubsystemProblem, str, float]]
 
@@ -67,7 +70,7 @@ def remarks_on(rig: Rig, problems: Sequence[SubsystemProblem], wanted: Sequence[
     told += [f'{name}: {effect.name} would look the same and counts in; a recorded force tells '
              'them apart' for effect, name in counted_in(problems, acting)]
     known = {n.name for n in acting}
-    return told + [f'{n.name}: nothing in these recordings depends on it; {_what_shows(n)}'
+    return told + [f'{n.name}: nothing in these recordings depends on it; {_what_shows(n, rig)}'
                    for n in wanted if n.name not in known]
 
 
@@ -100,7 +103,12 @@ def of_another_law(rig: Rig, left: Squares) -> list[str]:
     return [OF_A_TABLE.format('' if 'force_map_gain' in rig.unknown else STRENGTH)]
 
 
-def _what_shows(number: Number) -> str:
+def _what_shows(number: Number, rig: Rig) -> str:
+    """Return what would show a number on which nothing depends, or why nothing can."""
+    if number.name in _OF_OTHER_VALVE[rig.valve]:
+        return ('it is a number of on/off valves, and this rig has a regulator'
+                if rig.valve == 'ppr' else
+                'it is a number of a regulator, and this rig has on/off valves')
     if number.name == 'force_zero_n':
         return 'record a force'
     if number.name == LENGTH:

@@ -22,7 +22,9 @@ from pam_actuation.report.identify import page
 from pam_sim import load_rig
 from pam_sim.errors import InputError
 from pam_sim.identify import identify
+from pam_sim.identify.numbers import with_unknown
 from pam_sim.identify.records import offer_of, offers_of, ONE_LENGTH
+from pam_sim.identify.remarks import remarks_on
 from pam_sim.run import Run, Series
 import pytest
 
@@ -250,3 +252,12 @@ def test_a_load_cell_that_reads_nothing_on_a_stop_does_not_bend_the_mass():
     said = [one for one in found.remarks if one.startswith('bag: in ')]
     assert len(said) == 1 and 'the load rests on a stop: the load cell reads 0.1 N' in said[0]
     assert not found.incomplete
+
+
+@pytest.mark.parametrize('valve, name, says', [('ppr', 'C', 'a number of on/off valves'),
+                                               ('hsv', 'K_m', 'a number of a regulator')])
+def test_a_number_of_the_other_valve_is_told_as_such(valve, name, says):
+    rig, _, wanted = with_unknown(load_rig('dmsp_5_300_hanging_mass', valve=valve), [name])
+    remark, = remarks_on(rig, [], wanted, [], [], ())
+    assert remark.startswith(f'{name}: nothing') and says in remark and 'record' not in (
+        remark.split('; ')[1])
