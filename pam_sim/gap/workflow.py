@@ -252,7 +252,7 @@ def _answered(runs: Run | Sequence[Run], rig: Rig, certify: Run | None, options:
         outcome.screened, rig, [s for p in estimator.problems for s in p.signals], materiality)
     if result.verdict in WANTING and (late := late_force(own_runs, criteria)):
         result.remarks.append(late)
-    result.reason = explain(result, outcome, harms)
+    result.reason = explain(result, outcome, harms, bool(options.effects))
     if not outcome.complete:
         result.reason += CUT_SHORT.format(options.seconds)
     result.simulations = sum(

@@ -92,6 +92,11 @@ def test_a_search_that_was_cut_short_says_so_and_claims_nothing_of_what_was_not_
     assert said('unknown', {'pressure': PRESSURE}, complete=False) == (
         'The calibrated model misses 8 kPa of pressure and none of the effects that were tried '
         'explains it.')
+    # Of names that were asked for alone, others are not known to fail.
+    result = GapResult('unknown', '', signals={'pressure': PRESSURE})
+    assert explain(result, SimpleNamespace(named=[], share={}, mistaken={}, complete=True),
+                   of_some=True) == ('The calibrated model misses 8 kPa of pressure and none of '
+                                     'the effects that were asked for explains it.')
     run, limit = recorded(nominal(), voltages(6.0)), {'effects': ['creep'], 'unnamed': ()}
     whole = find_gap(run, nominal(), **limit)
     spent = find_gap(run, nominal(), seconds=100.0, spent_s=100.0, **limit)

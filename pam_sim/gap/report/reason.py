@@ -34,12 +34,17 @@ MOVED = 1.0                  # deviations of its tolerance by which a number is 
 WORTH_A_WORD = 0.2           # share of the squared gap that is left
 
 
-def explain(result: GapResult, outcome: Outcome, harms: Iterable[Harm] = ()) -> str:
-    """Return the reason of a verdict, two or three sentences, and what is not added for harm."""
-    return _told(result, outcome) + ''.join(_harm(one) for one in harms)
+def explain(result: GapResult, outcome: Outcome, harms: Iterable[Harm] = (),
+            of_some: bool = False) -> str:
+    """
+    Return the reason of a verdict, two or three sentences, and what is not added for harm.
+
+    ``of_some``: only names that were asked for were tried.
+    """
+    return _told(result, outcome, of_some) + ''.join(_harm(one) for one in harms)
 
 
-def _told(result: GapResult, outcome: Outcome) -> str:
+def _told(result: GapResult, outcome: Outcome, of_some: bool) -> str:
     if result.verdict == 'no_gap' and result.is_slight:
         return f'{_missed(result)}. This is too small to matter by the materiality that was given.'
     if result.verdict == 'no_gap' and 'valve' in result.not_judged:
@@ -56,7 +61,7 @@ def _told(result: GapResult, outcome: Outcome) -> str:
     if result.verdict == 'parameter' and result.unexplained_fraction < WORTH_A_WORD:
         return f'{_numbers(result.parameters)}. With this {_shrink(result)}.'
     if result.verdict == 'unknown':
-        return (f'{_missed(result)}{_nearest(result, outcome)}.{_bent(result)}'
+        return (f'{_missed(result)}{_nearest(result, outcome, of_some)}.{_bent(result)}'
                 f'{_noticed(result)}{_mistaken(outcome)}')
     # Of several that are named, some may be certain.
     open_sets = list({frozenset(w.names): w.names for w in outcome.named
@@ -204,14 +209,15 @@ def _mistaken(outcome: Outcome) -> str:
                    for name, relative in outcome.mistaken.items())
 
 
-def _nearest(result: GapResult, outcome: Outcome) -> str:
+def _nearest(result: GapResult, outcome: Outcome, of_some: bool) -> str:
     """Return in words what was fitted where the gap is, and why it is no explanation."""
     closed = {s for s, one in result.subsystems.items() if one.verdict == 'no_gap'}
     shares = {s: share for s, share in outcome.share.items()
               if share >= LEAST_SHARE and s not in closed}
     parts = [f'{100 * share:.0f} % in the {s}' for s, share in shares.items()]
-    none = ' and no known effect explains it' if outcome.complete else (
-        ' and none of the effects that were tried explains it')
+    none = ' and none of the effects that were tried explains it' if not outcome.complete else (
+        ' and none of the effects that were asked for explains it' if of_some else
+        ' and no known effect explains it')
     if not parts:
         return none
     if max(shares.values()) < ENOUGH:
