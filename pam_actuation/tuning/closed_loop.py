@@ -45,11 +45,11 @@ from pam_sim.rollout.kernel import refuse_terms
 from pam_sim.short_repr import short_repr
 
 if TYPE_CHECKING:
-    import pandas as pd
     from pam_actuation.control.compiled_controller import CompiledController
     from pam_actuation.drivers.config import DriverConfig
     from pam_actuation.experiments.experiment import Experiment
     from pam_sim.rig import Rig
+    import pandas as pd
 
 # The module with ``KIND_rollout``, the compiled loop of a law.
 ROLLOUTS = {'sofc': 'rollouts', 'pid': 'rollouts', 'lqi': 'rollouts',

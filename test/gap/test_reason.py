@@ -243,7 +243,8 @@ def test_the_sentence_on_venting_says_what_the_ratio_says(ratio_minus_1, sentenc
 def test_a_number_without_a_unit_has_no_dash_behind_it():
     gain = Calibrated('force_map_gain', '-', 1.0, 1.1, (1.09, 1.11), 5.0)
     text = said('parameter', {'pressure': PRESSURE}, parameters=[gain])
-    assert text.startswith('force_map_gain = 1.1 instead of 1 (+10.0 %), 95 % 1.09 to 1.11. With this')
+    assert text.startswith(
+        'force_map_gain = 1.1 instead of 1 (+10.0 %), 95 % 1.09 to 1.11. With this')
     vent = effect('vent_asymmetry', 'vent_to_fill_time_ratio', '-')
     found = GapResult('effects', '', signals={'pressure': PRESSURE}, effects=[vent],
                       calibration=[gain])
