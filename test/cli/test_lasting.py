@@ -61,6 +61,9 @@ def test_a_rig_runs_on_where_nobody_reads(monkeypatch, faults, code):
             tell('/muscle/valve_driver is well again')
             watched.append(seconds)
 
+        def not_begun(self):
+            return []
+
         def finish(self, failure):
             assert failure == ''
             return []
