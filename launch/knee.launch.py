@@ -46,7 +46,7 @@ from pam_actuation.hardware.files import hardware_file
 from pam_actuation.namespaces import launch_namespace, name_in
 from pam_actuation.nodes.hardware_check import check_hardware
 from pam_actuation.nodes.launched import (
-    check_remaps, full_namespace, joint_nodes, launched_by, OF_SIMULATED_JOINT, RigEnd, users_file)
+    check_remaps, full_namespace, joint_nodes, launched_by, RigEnd, users_file)
 from pam_actuation.rigging import layouts
 from pam_actuation.rigging.layouts import AWAITED_S, BY_SENSORS, BY_TOPIC, SIMULATED, TOPICS
 from pam_sim.joint import load_joint
@@ -98,7 +98,8 @@ def _arguments():
         DeclareLaunchArgument(
             'experiment', default_value='',
             description='Experiment by name, or path of its file; none: wait for references; '
-                        f'empty: {OF_SIMULATED_JOINT} with hardware:=sim, otherwise none.'),
+                        'empty: with hardware:=sim joint_sine, or knee_sine for a joint of the '
+                        'size of a leg; otherwise none.'),
         DeclareLaunchArgument(
             'seed', default_value='',
             description='Seed of the simulated sensors; empty: by the namespace.'),
@@ -212,7 +213,8 @@ def _note_names(context, end):
     namespace = launch_namespace(given('namespace'))
     valve = given('valve') or load_joint(given('joint')).valve
     place = full_namespace(context, namespace)
-    experiment = layouts.experiment_of(given('experiment'), given('hardware'), OF_SIMULATED_JOINT)
+    experiment = layouts.experiment_of_joint(
+        given('experiment'), given('hardware'), given('joint'))
     seed = given('seed') or str(layouts.seed_in(place))
     check_remaps(context, place)
     nodes = joint_nodes(given, place, int(seed), given('name'))

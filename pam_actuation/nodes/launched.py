@@ -41,7 +41,6 @@ if TYPE_CHECKING:
 Given = Callable[[str], str]            # the value of a launch argument
 Handler = Callable[[Any, Any], list[Any]]
 SHARED = 'supply_pressure', 'controller_state'      # one supply may feed both muscles
-OF_SIMULATED_JOINT = 'joint_sine'       # what one plays where no experiment is named
 
 
 class RigEnd:
@@ -142,7 +141,7 @@ def joint_nodes(given: Given, place: str, seed: int, name: str = '') -> 'list[No
     return layouts.knee(
         place, given('joint'), given('valve') or load_joint(given('joint')).valve,
         layouts.NO_CONTROLLER if given('controller') == 'none' else given('controller_file'),
-        layouts.experiment_of(given('experiment'), given('hardware'), OF_SIMULATED_JOINT), seed,
+        layouts.experiment_of_joint(given('experiment'), given('hardware'), given('joint')), seed,
         given('accept_other_rig') == 'true',
         given('output') if given('record') == 'true' else '', given('hardware'), given('angle'),
         name=name)

@@ -70,6 +70,17 @@ def experiment_of(named: str, hardware: str, of_simulation: str) -> str:
     return '' if named == NO_EXPERIMENT else named
 
 
+def experiment_of_joint(named: str, hardware: str, joint: str) -> str:
+    """
+    Return the experiment that the launch file of a joint plays, '' for none.
+
+    A simulated joint, a preset or a file, plays a sine for joints of its size.
+    """
+    from pam_actuation.control.modes.files import joint_size
+    from pam_sim.joint import load_joint
+    return experiment_of(named, hardware, f'{joint_size(load_joint(joint))}_sine')
+
+
 def rig(namespace: str = '/muscle', rig: str = 'dmsp_5_300_realistic', valve: str = 'ppr',
         hardware: str = 'sim', controller: str = '', experiment: str = '', record: str = '',
         accept_other_rig: bool = False, overwrite: bool = False, name: str = '',

@@ -16,8 +16,11 @@
 
 from pam_actuation.cli import up
 from pam_actuation.cli.main import build_parser, main
+from pam_actuation.experiments import load_experiment
 from pam_actuation.rigging import layouts
 from pam_actuation.rigging.node_spec import ORDER
+from pam_sim.joint import load_joint
+from pam_sim.joint.model_file import joint_preset_names
 import pytest
 
 
@@ -49,6 +52,14 @@ def test_a_simulated_rig_has_a_watchdog_and_a_real_one_sensors():
     ('decay', 'dummy', 'decay')])
 def test_hardware_plays_no_experiment_that_was_not_named(named, hardware, played):
     assert layouts.experiment_of(named, hardware, 'rest') == played
+
+
+@pytest.mark.parametrize('joint', joint_preset_names())
+def test_a_simulated_joint_plays_what_one_of_its_size_can_do(joint):
+    assert layouts.experiment_of_joint('none', 'sim', joint) == ''
+    assert layouts.experiment_of_joint('', 'my_rig.yaml', joint) == ''
+    played = layouts.experiment_of_joint('', 'sim', joint)
+    load_experiment(played).check_reachable(load_joint(joint))
 
 
 @pytest.mark.parametrize('experiment, valve, raw', [
