@@ -157,7 +157,8 @@ class Plant(SharedMemory):
     def _take(self, signal: float | Sequence[float], external_force_n: float,
               contraction_m: float | None, steps: int) -> None:
         """Set the inputs of the next steps."""
-        check_steps(steps)
+        if type(steps) is not int or steps < 1:     # a call in each tick costs more than this
+            check_steps(steps)
         if contraction_m is not None:
             self._check_contraction(contraction_m)
         values = tuple(signal) if hasattr(signal, '__iter__') else (signal,)

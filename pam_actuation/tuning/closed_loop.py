@@ -176,11 +176,11 @@ class MuscleLoop:
         disturbances['supply_pa'] = rig.parameters['supply_pa']
         if external_force_n is None and experiment.disturbance:
             external_force_n = experiment.external_force_n
-        times_s = [k * (1.0 / rate_hz) for k in range(self.ticks)]
         for name, course, lowest in (('external_force_n', external_force_n, -math.inf),
                                      ('supply_pa', supply_pa, 0.0)):
             if course is not None:
-                disturbances[name] = sampled(course, times_s, name, lowest)
+                disturbances[name] = sampled(
+                    course, [k * (1.0 / rate_hz) for k in range(self.ticks)], name, lowest)
         fields(self._state, layout.STATE).supply_pa = disturbances['supply_pa'][0]
         self._driver = DriverLaw(rig, driver or driver_config(rig), rate_hz)
         self._steps = steps, latency_steps(latency_s, steps)
