@@ -16,7 +16,7 @@
 
 from collections.abc import Callable, Mapping
 import math
-from typing import Any, TYPE_CHECKING, TypeVar
+from typing import Any, Self, TYPE_CHECKING, TypeVar
 
 import numpy as np
 from pam_actuation.control.controller_text import controller_to_yaml
@@ -32,16 +32,23 @@ from pam_sim.units import P_ATM_PA
 if TYPE_CHECKING:
     from pam_actuation.control.sofc.rule_table import RuleBase
 
-_Law = TypeVar('_Law', bound='CompiledController')
+_Law = TypeVar('_Law')
+
+
+def hand_on(one: Any, fresh: _Law) -> _Law:
+    """Return a fresh controller with what another one is made for and asks of the driver."""
+    for name in ('made_for', 'driver', 'other_rig', 'other_valve'):
+        setattr(fresh, name, getattr(one, name))
+    return fresh
 
 
 class CompiledController(SharedMemory):
     """
     A control law as a class: owner of the arrays its compiled step works on.
 
-    Subclasses have ``kind`` and ``state_names``, set ``_step``, ``_arguments`` (what it takes,
-    ``_inputs`` and ``_outputs`` among them) and ``_limits`` (the cells of ``settings.LIMITS`` in
-    its parameters), and know what ``learning_reason`` is.
+    Subclasses have ``kind`` and ``state_names``, and know what ``learning_reason`` is. They set
+    ``_step`` and ``_arguments``, what it takes, with ``_inputs`` and ``_outputs`` among them. They
+    set ``_limits`` as well, the cells of ``settings.LIMITS`` in its parameters.
 
     Parameters
     ----------
@@ -169,7 +176,7 @@ class CompiledController(SharedMemory):
         return tuple(self._told.tolist())
 
     def with_settings(self, settings: Mapping[str, object], rules: 'RuleBase | None' = None
-                      ) -> 'CompiledController':
+                      ) -> Self:
         """
         Return a fresh controller of the same law and rig with other settings.
 
@@ -188,14 +195,12 @@ class CompiledController(SharedMemory):
             Settings that make no controller, or a law without this method.
 
         """
+        return hand_on(self, self._fresh({**self.settings, **settings}, rules))
+
+    def _fresh(self, settings: Mapping[str, object], rules: 'RuleBase | None') -> Self:
+        """Return a controller of the same law with all these settings; a law writes this."""
         raise InputError(f'a {self.kind} controller takes no other settings; `with_settings` of '
                          f'{type(self).__name__} is to be written', 'controller')
-
-    def _hand_on(self, fresh: _Law) -> _Law:
-        """Return a fresh controller with what this one is made for and asks of the driver."""
-        fresh.made_for, fresh.driver = self.made_for, self.driver
-        fresh.other_rig, fresh.other_valve = self.other_rig, self.other_valve
-        return fresh
 
     def learning_reason(self) -> str:
         """Return in words whether the last tick learned, or why not."""

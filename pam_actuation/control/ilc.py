@@ -334,11 +334,8 @@ class IlcController(FixedLawController):
         super().__init__(ilc_step, checked, self.static_inverse, PARAMETERS, STATE, rig_name,
                          self._memory)
 
-    def with_settings(self, settings: Mapping[str, object], rules: 'RuleBase | None' = None
-                      ) -> 'IlcController':
-        """Return a fresh controller with other settings; see ``CompiledController``."""
-        return self._hand_on(IlcController(
-            self.static_inverse, {**self.settings, **settings}, self.rig_name))
+    def _fresh(self, settings: Mapping[str, object], rules: 'RuleBase | None') -> 'IlcController':
+        return IlcController(self.static_inverse, settings, self.rig_name)
 
     def learning_reason(self) -> str:
         """Return in words whether the last tick learned, or why not."""

@@ -269,11 +269,8 @@ class LqiController(FixedLawController):
         super().__init__(lqi_step, checked, self.gains, PARAMETERS, STATE, rig_name,
                          self.observer)
 
-    def with_settings(self, settings: Mapping[str, object], rules: 'RuleBase | None' = None
-                      ) -> 'LqiController':
-        """Return a fresh controller with other settings; see ``CompiledController``."""
-        return self._hand_on(LqiController(
-            self.model, {**self.settings, **settings}, self.rig_name))
+    def _fresh(self, settings: Mapping[str, object], rules: 'RuleBase | None') -> 'LqiController':
+        return LqiController(self.model, settings, self.rig_name)
 
     def file_entries(self) -> dict[str, object]:
         """Return linear model and gains; an LQI controller has no static inverse."""

@@ -329,11 +329,8 @@ class MpcController(FixedLawController):
         super().__init__(mpc_step, checked, self.gains, PARAMETERS, STATE, rig_name,
                          self.static_inverse, self.observer)
 
-    def with_settings(self, settings: Mapping[str, object], rules: 'RuleBase | None' = None
-                      ) -> 'MpcController':
-        """Return a fresh controller with other settings; see ``CompiledController``."""
-        return self._hand_on(MpcController(
-            self.model, self.static_inverse, {**self.settings, **settings}, self.rig_name))
+    def _fresh(self, settings: Mapping[str, object], rules: 'RuleBase | None') -> 'MpcController':
+        return MpcController(self.model, self.static_inverse, settings, self.rig_name)
 
     def file_entries(self) -> dict[str, object]:
         """Return linear model, gains and static inverse."""

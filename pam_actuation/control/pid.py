@@ -242,8 +242,5 @@ class PidController(FixedLawController):
             self.static_inverse,
             PARAMETERS, STATE, rig_name)
 
-    def with_settings(self, settings: Mapping[str, object], rules: 'RuleBase | None' = None
-                      ) -> 'PidController':
-        """Return a fresh controller with other settings; see ``CompiledController``."""
-        return self._hand_on(PidController(
-            self.static_inverse, {**self.settings, **settings}, self.rig_name))
+    def _fresh(self, settings: Mapping[str, object], rules: 'RuleBase | None') -> 'PidController':
+        return PidController(self.static_inverse, settings, self.rig_name)

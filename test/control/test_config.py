@@ -204,7 +204,7 @@ def test_with_settings_keeps_what_a_mode_tracks(name, model):
 
 
 def test_a_law_without_with_settings_is_refused_in_a_sentence(monkeypatch):
-    monkeypatch.delattr(PidController, 'with_settings')
+    monkeypatch.delattr(PidController, '_fresh')
     with pytest.raises(InputError, match='^controller: a pid controller takes no other settings'):
         rebuild(load_controller('pid', StraightRig()), {})
 

@@ -19,7 +19,7 @@ import copy
 from typing import Any, Self
 
 import numpy as np
-from pam_actuation.control.compiled_controller import CompiledController
+from pam_actuation.control.compiled_controller import CompiledController, hand_on
 from pam_actuation.control.controller_text import controller_to_yaml
 from pam_actuation.control.modes.tracked import Tracked
 from pam_actuation.control.sofc.rule_table import RuleBase
@@ -126,9 +126,7 @@ class WrappedLaw(SharedMemory):
         """Return a fresh controller with other settings of its law; see ``CompiledController``."""
         # A copy, as a law may share its static inverse, which force mode writes.
         fresh: Self = self.with_law(copy.deepcopy(self.law.with_settings(settings, rules)))
-        fresh.made_for, fresh.driver = self.made_for, self.driver
-        fresh.other_rig, fresh.other_valve = self.other_rig, self.other_valve
-        return fresh
+        return hand_on(self, fresh)
 
     def take_rules(self, rules: RuleBase, where: str = 'rules') -> None:
         """Begin with the rules of a file; as of the law."""

@@ -119,10 +119,8 @@ class SelfOrganizingFuzzyController(CompiledController):
             self.parameters, self.static_inverse, self._tables, self._ring, self._state,
             self._inputs, self._outputs)
 
-    def with_settings(self, settings: Mapping[str, object], rules: RuleBase | None = None
-                      ) -> 'SelfOrganizingFuzzyController':
-        """Return a fresh controller with other settings; see ``CompiledController``."""
-        settings = {**self.settings, **settings}
+    def _fresh(self, settings: Mapping[str, object], rules: RuleBase | None
+               ) -> 'SelfOrganizingFuzzyController':
         if rules is None and scaling_of(settings) == scaling_of(self.settings):
             rules = self.rules
         mode = {name: value for name, value in self.rules.scaling.items()
@@ -135,7 +133,7 @@ class SelfOrganizingFuzzyController(CompiledController):
             self.static_inverse, settings, rules, self.rig_name)
         fresh.rules.scaling.update(mode)
         fresh.freeze_learning = self.freeze_learning
-        return self._hand_on(fresh)
+        return fresh
 
     def learning_reason(self) -> str:
         """Return in words whether the last tick learned, or why not."""
