@@ -161,7 +161,7 @@ class ControllerLoop:
         self._takes = self._takers()
         self._lead_ns = round(controller.lead_s * 1e9)
         self.reason = codes.REASONS[self.measurement.sensor.none]
-        self.valid = False
+        self.valid = self.at_fault = False
         self.state: ControllerState | None = None
         self.two_sensors = ''
         self._remarks: tuple[str, ...] = ()
@@ -297,6 +297,7 @@ class ControllerLoop:
             muscle.following.sent(now_ns, command_pa)
             commands.append(Pressure(now_ns, command_pa))
         self.valid = inputs.reason in codes.RUNNING
+        self.at_fault = inputs.reason in codes.AT_FAULT
         self._commands_pa = commands_pa if self.valid else None
         self.reason = codes.REASONS[inputs.reason]
         if self.valid:

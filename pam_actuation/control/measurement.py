@@ -160,12 +160,14 @@ class Measurement:
         if not math.isfinite(value):
             return sensor.not_finite
         lowest, highest = self._plausible
-        implausible = self._implausible.judge(now_ns, not lowest <= value <= highest)
+        if not self._implausible.judge(now_ns, not lowest <= value <= highest):
+            self._seen = ''
+            return codes.OK
         # The first one: a text that changes with every reading would be a flood of messages.
-        self._seen = implausible and (self._seen or (
+        self._seen = self._seen or (
             f'{sensor.factor * value:.5g} {sensor.unit}, believable are '
-            f'{sensor.factor * lowest:.4g} to {sensor.factor * highest:.4g}')) or ''
-        return sensor.implausible if implausible else codes.OK
+            f'{sensor.factor * lowest:.4g} to {sensor.factor * highest:.4g}')
+        return sensor.implausible
 
     def stands_still(self, now_ns: int, measured_pa: float,
                      expected_pa: float | None) -> bool:

@@ -73,7 +73,7 @@ REASONS = (
     'the driver vented or fell silent, so what was wanted before is dropped; send a new reference')
 RUNNING = (OK, REFERENCE_HELD)      # reasons with which the controller runs
 # Of a sensor or a law at fault: the muscle is vented, although somebody wants it elsewhere.
-AT_FAULT = tuple(REASONS[code] for code in (
+AT_FAULT = frozenset((
     CONTRACTION_OLD, CONTRACTION_AHEAD, CONTRACTION_NOT_FINITE, CONTRACTION_IMPLAUSIBLE,
     CONTRACTION_FROZEN, FORCE_OLD, FORCE_AHEAD, FORCE_NOT_FINITE, FORCE_IMPLAUSIBLE, FORCE_FROZEN,
     ANGLE_OLD, ANGLE_AHEAD, ANGLE_NOT_FINITE, ANGLE_IMPLAUSIBLE, ANGLE_FROZEN, TWO_SENSORS,

@@ -17,7 +17,7 @@
 from collections.abc import Sequence
 from typing import Any, TYPE_CHECKING
 
-from pam_actuation.control.tick import AT_FAULT, REASONS
+from pam_actuation.control.tick import REASONS
 from pam_actuation.drivers.parameter import node_parameter
 from pam_actuation.messages import Pressure
 from pam_actuation.nodes import lockstep
@@ -192,7 +192,7 @@ class ControllerNode(ManagedNode):
     def _is_at_fault(self, now_ns: int) -> bool:
         """Tell whether a sensor or the law is at fault and vented the muscle, or is so for 1 s."""
         assert self.loop is not None
-        if not self.loop.reason.startswith(AT_FAULT):
+        if not self.loop.at_fault:
             self._sound_ns, self._ran = now_ns, self.loop.valid
             return False
         # At rest a reading that is late for a moment does no harm.
