@@ -67,6 +67,12 @@ def _wanted(cls: Any) -> list[tuple[str, Any, str, Any]]:
     return found
 
 
+def check_whole(value: Any, lowest: int, name: str) -> None:
+    """Raise InputError for what is no whole number from ``lowest`` on, placed at a name."""
+    if not isinstance(value, numbers.Integral) or int(value) < lowest:
+        raise InputError(f'is {shown(value)}; a whole number, {lowest} or more, is needed', name)
+
+
 def shown(value: object) -> str:
     """Return a value of any size as a short piece of one sentence."""
     text = repr(value)

@@ -22,13 +22,12 @@ from typing import Any, TYPE_CHECKING
 
 import numpy as np
 from pam_sim.annotations import FloatArray
-from pam_sim.declared import shown
+from pam_sim.declared import check_whole
 from pam_sim.errors import InputError
-from pam_sim.load import LOADS
 from pam_sim.records import cells, fields, zeros
 from pam_sim.rollout import kernel
 from pam_sim.rollout.layout import INPUT, OUTPUT, PARAMETERS, STATE
-from pam_sim.rollout.simulate import STRAIN_RANGE, told_by_own_file
+from pam_sim.rollout.simulate import contraction_range_m, told_by_own_file
 from pam_sim.shared_memory import SharedMemory
 
 if TYPE_CHECKING:
@@ -38,12 +37,6 @@ if TYPE_CHECKING:
 def all_finite(row: FloatArray) -> bool:
     """Return whether all numbers are finite; in a third of the time of ``np.isfinite``."""
     return math.isfinite(row.dot(row))      # beyond 1e154 nothing is physical either
-
-
-def check_steps(steps: int) -> None:
-    """Raise InputError for a count of steps that is no whole number from 1 on."""
-    if not isinstance(steps, (int, np.integer)) or steps < 1:
-        raise InputError(f'is {shown(steps)}; a whole number, 1 or more, is needed', 'steps')
 
 
 class Plant(SharedMemory):
@@ -158,7 +151,7 @@ class Plant(SharedMemory):
               contraction_m: float | None, steps: int) -> None:
         """Set the inputs of the next steps."""
         if type(steps) is not int or steps < 1:     # a call in each tick costs more than this
-            check_steps(steps)
+            check_whole(steps, 1, 'steps')
         if contraction_m is not None:
             self._check_contraction(contraction_m)
         values = tuple(signal) if hasattr(signal, '__iter__') else (signal,)
@@ -175,10 +168,7 @@ class Plant(SharedMemory):
 
     def _check_contraction(self, contraction_m: float) -> None:
         """Refuse what is no contraction of this muscle, as ``Rig.simulate`` does."""
-        if LOADS[self.rig.load].MOVES_FREELY:
-            raise InputError(f'load `{self.rig.load}` moves freely; use a driven rig',
-                             'contraction_m')
-        low, high = (share * self.rig.muscle.length_m for share in STRAIN_RANGE)
+        low, high = contraction_range_m(self.rig)
         if not low <= contraction_m <= high:
             raise InputError(f'is {contraction_m:g}; allowed {low:g} to {high:g} m',
                              'contraction_m')

@@ -33,11 +33,12 @@ from pam_actuation.messages import VALVE_NAMES
 from pam_actuation.tuning.cost import tracking_cost
 from pam_actuation.tuning.loop_parts import DISTURBANCE, Driver
 from pam_actuation.tuning.loop_setup import (
-    check_seed, Course, DriverLaw, first_periodic_tick, fresh_rise, latency_steps,
+    Course, DriverLaw, first_periodic_tick, fresh_rise, latency_steps,
     learning_mask, Learns, PHYSICS_S, sampled, sensor_noise, steps_per_tick)
 from pam_actuation.tuning.sampled_reference import SampledReference
 from pam_actuation.tuning.tracking_errors import Cycles, TrackingErrors
 from pam_sim.annotations import FloatArray
+from pam_sim.declared import check_whole
 from pam_sim.errors import InputError
 from pam_sim.records import fields, size_of, zeros
 from pam_sim.rollout import layout
@@ -157,7 +158,7 @@ class MuscleLoop:
                 f'experiment {experiment.name} is in {experiment.domain}; this loop tracks '
                 f'{self.DOMAIN}')
         steps = steps_per_tick(rate_hz)
-        check_seed(seed)
+        check_whole(seed, 0, 'seed')
         self.rig = rig
         self.rate_hz = rate_hz
         self.experiment = experiment

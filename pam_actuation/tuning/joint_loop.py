@@ -31,11 +31,12 @@ from pam_actuation.tuning.cost import tracking_cost
 from pam_actuation.tuning.force_loop import check_controller
 from pam_actuation.tuning.loop_parts import Driver, JOINT_READINGS, READINGS
 from pam_actuation.tuning.loop_setup import (
-    check_seed, Course, DriverLaw, first_periodic_tick, fresh_rise, latency_steps,
+    Course, DriverLaw, first_periodic_tick, fresh_rise, latency_steps,
     learning_mask, Learns, PHYSICS_S, sampled, sensor_noise, steps_per_tick)
 from pam_actuation.tuning.mode_result import ModeResult
 from pam_actuation.tuning.sampled_reference import SampledReference
 from pam_sim.annotations import FloatArray
+from pam_sim.declared import check_whole
 from pam_sim.errors import InputError
 from pam_sim.records import fields, size_of, zeros
 from pam_sim.sensors.encoder import ANGLE_NOISE_RAD, ANGLE_STEP_RAD
@@ -96,7 +97,7 @@ class JointLoop:
                 f'{JOINT.topic}')
         experiment.check_reachable(joint)
         steps = steps_per_tick(rate_hz)
-        check_seed(seed)
+        check_whole(seed, 0, 'seed')
         self.joint, self.experiment, self.rate_hz = joint, experiment, rate_hz
         self.slow_start = slow_start
         self._reference = SampledReference(experiment, rate_hz, preview_s)

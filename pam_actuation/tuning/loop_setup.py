@@ -97,12 +97,6 @@ def latency_steps(latency_s: float | None, steps: int) -> int:
     return min(round(latency_s / PHYSICS_S), steps - 1)
 
 
-def check_seed(seed: int) -> None:
-    """Raise InputError for a seed that is no whole number from 0 on."""
-    if not isinstance(seed, (int, np.integer)) or seed < 0:
-        raise InputError(f'is {seed!r}; a whole number, 0 or more, is needed', 'seed')
-
-
 def sampled(course: Course, times_s: Sequence[float], name: str,
             lowest: float = -math.inf) -> FloatArray:
     """

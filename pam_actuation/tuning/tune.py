@@ -39,7 +39,7 @@ from pam_actuation.tuning.search import BUDGET_USED, default_members, minimise, 
 from pam_actuation.tuning.space import Axis, check_axes, default_axes, from_unit, to_unit
 from pam_actuation.workers import Workers
 from pam_sim.annotations import FloatArray
-from pam_sim.declared import shown
+from pam_sim.declared import check_whole
 from pam_sim.errors import InputError
 from pam_sim.files import write_text
 
@@ -231,9 +231,7 @@ def _check_counts(budget: int, patience: int, population: int | None, jobs: int)
     """Refuse counts that no search can have."""
     for name, number, lowest in (('budget', budget, 1), ('patience', patience, 0),
                                  ('population', population or SMALLEST, SMALLEST)):
-        if not isinstance(number, (int, np.integer)) or number < lowest:
-            raise InputError(f'is {shown(number)}; a whole number, {lowest} or more, is needed',
-                             name)
+        check_whole(number, lowest, name)
     if jobs == 0:
         raise InputError('is 0; allowed are 1 or more, and -1 for one a core', 'jobs')
 

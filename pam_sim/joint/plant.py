@@ -20,13 +20,14 @@ import math
 from typing import Any, TYPE_CHECKING
 
 from pam_sim.annotations import FloatArray
+from pam_sim.declared import check_whole
 from pam_sim.errors import InputError
 from pam_sim.joint import kernel, layout
 from pam_sim.joint.packing import pack_joint
 from pam_sim.joint.parameters import SIDES
 from pam_sim.joint.statics import told_by_own_file_of
 from pam_sim.joint.step import Arrays
-from pam_sim.plant import all_finite, check_steps, Plant
+from pam_sim.plant import all_finite, Plant
 from pam_sim.records import cells, zeros
 from pam_sim.shared_memory import SharedMemory
 
@@ -137,7 +138,7 @@ class JointPlant(SharedMemory):
             or a number is not finite, given or computed.
 
         """
-        check_steps(steps)
+        check_whole(steps, 1, 'steps')
         sent = []
         for side, signal in (('flexor', flexor_signal), ('extensor', extensor_signal)):
             values = tuple(signal) if isinstance(signal, Iterable) else (signal,)

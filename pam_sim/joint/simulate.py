@@ -19,7 +19,6 @@ from typing import Any, TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 from pam_sim.annotations import FloatArray
-from pam_sim.declared import shown
 from pam_sim.errors import InputError
 from pam_sim.joint import kernel, layout
 from pam_sim.joint.parameters import SIDES
@@ -83,11 +82,7 @@ def input_array(joint: 'JointRig', flexor_signal: ArrayLike, extensor_signal: Ar
         for field in ('signal_0', 'signal_1'):
             given[f'{side}_{field}'] = columns(one, muscle.INPUT)[field]
     if external_torque_n_m is not None:
-        try:
-            torque = np.asarray(external_torque_n_m, dtype=float)
-        except (TypeError, ValueError):
-            raise InputError(f'is no array of numbers: {shown(external_torque_n_m)}',
-                             'external_torque_n_m') from None
+        torque = one_muscle.array_of(external_torque_n_m, 'external_torque_n_m')
         if torque.ndim != 0 and torque.shape != (len(inputs),):
             raise InputError(f'has shape {torque.shape}; one number or {len(inputs)} expected',
                              'external_torque_n_m')

@@ -31,7 +31,7 @@ from typing import Any, TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 from pam_sim.annotations import FloatArray
-from pam_sim.declared import shown
+from pam_sim.declared import check_whole, shown
 from pam_sim.errors import InputError
 from pam_sim.records import size_of
 from pam_sim.response import COLUMNS, Response
@@ -130,7 +130,7 @@ def simulate_batch(rigs: 'Rig | list[Rig] | tuple[Rig, ...]',
     for name in names:
         if name not in COLUMNS:
             raise InputError(f'`{name}` is no signal; allowed: {", ".join(COLUMNS)}', 'keep')
-    _check_count(every, 'every')
+    check_whole(every, 1, 'every')
     places = {name: place for place, name in enumerate(names)}
     if spread is not None:
         pairs = _pairs(rigs, records)
@@ -240,12 +240,6 @@ def default_workers() -> int:
     return os.cpu_count() or 1
 
 
-def _check_count(count: int, name: str) -> None:
-    """Refuse what is no whole number from 1 on."""
-    if not isinstance(count, (int, np.integer)) or count < 1:
-        raise InputError(f'is {count!r}; a whole number, 1 or more, is needed', name)
-
-
 def _pairs(
         rigs: 'Rig | list[Rig] | tuple[Rig, ...]',
         records: Record | list[Record] | tuple[Record, ...]) -> 'list[tuple[Rig, Record]]':
@@ -291,7 +285,7 @@ def _run_all(pairs: 'list[tuple[Rig, Record]]', finish: Callable[[int, FloatArra
              workers: int | None) -> list[Any]:
     """Return ``finish(index, outputs)`` of every run, in order."""
     workers = default_workers() if workers is None else workers
-    _check_count(workers, 'workers')
+    check_whole(workers, 1, 'workers')
     workers = min(workers, len(pairs))
     results: list[Any] = [None] * len(pairs)
     errors: dict[int, InputError] = {}

@@ -163,7 +163,7 @@ def input_array(rig: 'Rig', valve_signal: ArrayLike,
         missing.
 
     """
-    signal = _numbers(valve_signal, 'valve_signal')
+    signal = array_of(valve_signal, 'valve_signal')
     wanted = len(rig.signal_names)
     if signal.ndim == 1 and wanted == 1:
         signal = signal[:, np.newaxis]
@@ -182,12 +182,10 @@ def input_array(rig: 'Rig', valve_signal: ArrayLike,
         columns(inputs, INPUT)['external_force_n'] = force
     start = None
     if contraction_m is not None:
-        if LOADS[rig.load].MOVES_FREELY:
-            raise InputError(f'load `{rig.load}` moves freely; use a driven rig', 'contraction_m')
+        low, high = contraction_range_m(rig)
         path = _sized(contraction_m, (count, count + 1), 'contraction_m')
         if path.ndim == 0:
             path = np.full(count + 1, float(path))
-        low, high = (share * rig.muscle.length_m for share in STRAIN_RANGE)
         _check_range(path, low, high, 'm', 'contraction_m')
         start = float(path[0])
         held_m = columns(inputs, INPUT)['contraction_m']
@@ -196,6 +194,14 @@ def input_array(rig: 'Rig', valve_signal: ArrayLike,
     elif LOADS[rig.load].NEEDS_CONTRACTION:
         raise InputError('is missing; a driven load needs it', 'contraction_m')
     return inputs, start
+
+
+def contraction_range_m(rig: 'Rig') -> tuple[float, float]:
+    """Return lowest and highest prescribed contraction; refuse a load that moves freely."""
+    if LOADS[rig.load].MOVES_FREELY:
+        raise InputError(f'load `{rig.load}` moves freely; use a driven rig', 'contraction_m')
+    low, high = STRAIN_RANGE
+    return low * rig.muscle.length_m, high * rig.muscle.length_m
 
 
 def _check_range(values: FloatArray, lower: float, upper: float, unit: str, name: str) -> None:
@@ -210,7 +216,7 @@ def _check_range(values: FloatArray, lower: float, upper: float, unit: str, name
                      name)
 
 
-def _numbers(values: ArrayLike, name: str) -> FloatArray:
+def array_of(values: ArrayLike, name: str) -> FloatArray:
     """Return an array of floats; refuse what is none."""
     try:
         return np.asarray(values, dtype=float)
@@ -219,7 +225,7 @@ def _numbers(values: ArrayLike, name: str) -> FloatArray:
 
 
 def _sized(values: ArrayLike, lengths: tuple[int, ...], name: str) -> FloatArray:
-    array = _numbers(values, name)
+    array = array_of(values, name)
     if array.ndim == 0 or (array.ndim == 1 and len(array) in lengths):
         return array
     raise InputError(f'has shape {array.shape}; one number or {lengths[-1]} expected', name)

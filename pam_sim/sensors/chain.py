@@ -17,8 +17,7 @@
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
-from pam_sim.declared import shown
-from pam_sim.errors import InputError
+from pam_sim.declared import check_whole
 from pam_sim.parameters import check_parameters, Parameter
 
 if TYPE_CHECKING:
@@ -59,8 +58,7 @@ class SensorChain:
         given: Any = getattr(settings, 'sensors', settings)
         self.settings = check_parameters(
             SENSOR_PARAMETERS, given or {}, 'sensor setting', 'sensors')
-        if not isinstance(seed, (int, np.integer)) or seed < 0:
-            raise InputError(f'is {shown(seed)}; a whole number, 0 or more, is needed', 'seed')
+        check_whole(seed, 0, 'seed')
         self.seed = int(seed)
         value = self.settings
         self._sigma = np.array([value['pressure_noise_pa'], value['contraction_noise_m'],
