@@ -23,6 +23,8 @@ P_ATM_PA = 101_325.0          # atmospheric pressure; gauge = absolute - P_ATM_P
 EMPTY_PA = 10e3               # gauge; a muscle below is empty and holds no load up
 NS_PER_S = 1_000_000_000     # stamps count nanoseconds
 GRAVITY_M_PER_S2 = 9.80665
+# Units of others: exact, or as NIST SP 811 has them.
+PSI_PA, INCH_M, LBF_N, KGF_N = 6894.757293168361, 0.0254, 4.4482216152605, GRAVITY_M_PER_S2
 GAS_CONSTANT_AIR = 287.05     # J/(kg K)
 TEMPERATURE_K = 293.15        # air temperature of the isothermal models
 RHO_REFERENCE = 1.185         # kg/m^3, reference density of ISO 6358

@@ -20,18 +20,18 @@ import re
 
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import did_you_mean, InputError
-from pam_sim.units import P_ATM_PA
+from pam_sim.units import INCH_M, KGF_N, LBF_N, P_ATM_PA, PSI_PA
 
 PRESSURE, LENGTH, FORCE, VOLTAGE, DUTY, ANGLE, TIME, SPEED, RATE = (
     'pressure', 'length', 'force', 'voltage', 'duty', 'angle', 'time', 'speed', 'angular rate')
-# Size of one unit in SI, by quantity. psi, lbf, kgf, mmHg, in: exact or as NIST SP 811 has them.
+# Size of one unit in SI, by quantity. mmHg as NIST SP 811 has it.
 FACTORS: dict[str, dict[str, float]] = {
     PRESSURE: {'Pa': 1.0, 'hPa': 1e2, 'mbar': 1e2, 'kPa': 1e3, 'bar': 1e5, 'MPa': 1e6,
-               'psi': 6894.757293168361, 'atm': P_ATM_PA, 'mmHg': 133.322387415,
+               'psi': PSI_PA, 'atm': P_ATM_PA, 'mmHg': 133.322387415,
                'kgf/cm2': 98066.5},
-    LENGTH: {'m': 1.0, 'cm': 1e-2, 'mm': 1e-3, 'um': 1e-6, 'in': 0.0254},
-    FORCE: {'N': 1.0, 'mN': 1e-3, 'kN': 1e3, 'lbf': 4.4482216152605, 'kgf': 9.80665,
-            'gf': 9.80665e-3, 'daN': 10.0},
+    LENGTH: {'m': 1.0, 'cm': 1e-2, 'mm': 1e-3, 'um': 1e-6, 'in': INCH_M},
+    FORCE: {'N': 1.0, 'mN': 1e-3, 'kN': 1e3, 'lbf': LBF_N, 'kgf': KGF_N,
+            'gf': KGF_N / 1e3, 'daN': 10.0},
     VOLTAGE: {'V': 1.0, 'mV': 1e-3},
     DUTY: {'1': 1.0, '%': 1e-2},
     ANGLE: {'rad': 1.0, 'mrad': 1e-3, 'deg': math.pi / 180.0},

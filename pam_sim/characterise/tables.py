@@ -37,9 +37,8 @@ from pam_sim.files import StrPath
 from pam_sim.muscle.force_maps import ForceMap
 from pam_sim.muscle.lookup_table import read_commented_csv
 from pam_sim.short_repr import short_repr
-from pam_sim.units import P_ATM_PA
+from pam_sim.units import INCH_M, KGF_N, LBF_N, P_ATM_PA, PSI_PA
 
-_KG_N = 9.80665                       # the weight of 1 kg
 # Column name in lower case -> (quantity, factor to SI).
 COLUMNS = {
     'pressure_pa': ('pressure', 1.0), 'pressure_gauge_pa': ('pressure', 1.0),
@@ -51,12 +50,12 @@ COLUMNS = {
     'contraction_u_m': ('contraction_u', 1.0), 'contraction_u_mm': ('contraction_u', 1e-3),
     'load_u_n': ('load_u', 1.0), 'drift_m': ('drift', 1.0), 'pressure_u_pa': ('pressure_u', 1.0),
     **{f'pressure_{kind}{unit}': ('pressure', pa) for kind in ('', 'gauge_')
-       for unit, pa in (('bar', 1e5), ('mpa', 1e6), ('psi', 6894.757293168361))},
-    'length_cm': ('length', 1e-2), 'length_in': ('length', 0.0254),
-    'contraction_cm': ('contraction', 1e-2), 'contraction_in': ('contraction', 0.0254),
+       for unit, pa in (('bar', 1e5), ('mpa', 1e6), ('psi', PSI_PA))},
+    'length_cm': ('length', 1e-2), 'length_in': ('length', INCH_M),
+    'contraction_cm': ('contraction', 1e-2), 'contraction_in': ('contraction', INCH_M),
     'contraction_%': ('strain', 0.01), 'strain_%': ('strain', 0.01),
     **{f'{name}_{unit}': (name, newton) for name in ('force', 'load') for unit, newton in (
-        ('kn', 1e3), ('kg', _KG_N), ('kgf', _KG_N), ('lbf', 4.4482216152605))},
+        ('kn', 1e3), ('kg', KGF_N), ('kgf', KGF_N), ('lbf', LBF_N))},
 }
 _IN_BRACKETS = re.compile(r'[\s_]*[\[(]\s*([^\])]*?)\s*[\])]$')
 # From about the atmosphere on, rows so close to the lowest pressure, moved by less than a share.

@@ -25,9 +25,9 @@ import math
 import numpy as np
 from pam_sim.annotations import FloatArray
 from pam_sim.gap.result import Trace
-from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
+from pam_sim.units import INCH_M, KGF_N, LBF_N, P_ATM_PA, PSI_PA
 
-KGF, LBF, INCH, PSI = 1.0 / GRAVITY_M_PER_S2, 0.224809, 1.0 / 25.4, 14.5038
+KGF, LBF, INCH, PSI = 1.0 / KGF_N, 1.0 / LBF_N, 1e-3 / INCH_M, 1e5 / PSI_PA
 # By signal: factor on the true value, and what would cause it.
 FACTORS = {
     'pressure': {0.1: 'MPa called bar', 10.0: 'bar called MPa', PSI: 'psi called bar',
