@@ -21,6 +21,7 @@ from typing import Any
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.gap.data.signals import READABLE
 from pam_sim.gap.share import Share
+from pam_sim.gap.words import place_in_words
 from pam_sim.plain_json import finite
 from pam_sim.short_repr import short_repr
 
@@ -247,7 +248,7 @@ class GapResult:
         """Return in one sentence where the disagreement lives; empty where there is none."""
         if not self.where:
             return ''
-        others = ['a sensor' if s == 'sensor' else f'the {s}' for s, one in self.subsystems.items()
+        others = [place_in_words(s) for s, one in self.subsystems.items()
                   if one.names and s != self.where[0].subsystem]
         return self.where[0].text() + (
             f' Something is named in {" and ".join(others)} as well.' if others else '')

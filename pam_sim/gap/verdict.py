@@ -34,7 +34,7 @@ from pam_sim.gap.verify.model import as_given, held_without, model_of, numbers_o
 from pam_sim.gap.verify.notice import Notice, notices, stamp_sd_s, supply_notice
 from pam_sim.gap.verify.own_runs import OwnRuns
 from pam_sim.gap.verify.spread import spread_of_numbers
-from pam_sim.gap.verify.uncertainty import effect_numbers, FORM, half_width, NUMERICS
+from pam_sim.gap.verify.uncertainty import effect_numbers, half_width, NUMERICS, off_by
 from pam_sim.gap.verify.validation import Validation
 
 
@@ -270,7 +270,7 @@ def _calibrated(estimator: Estimator, found: Fit, precision: Precision,
                 value = numbers[known.name]
                 half = math.hypot(
                     NUMERICS * value, known.sd * half_width(precision, place, float(z)),
-                    FORM * math.sqrt(max(rests.get(known.name, 0.0), 0.0)) * (value - known.value))
+                    off_by(rests.get(known.name, 0.0)) * (value - known.value))
                 ends = (max(value - half, known.lower), min(value + half, known.upper))
                 listed.append(Calibrated(
                     known.name, known.unit, known.value, value, ends, float(z)))

@@ -24,6 +24,11 @@ CONDITIONS = {'400kpa': '400 kPa', '500kpa': '500 kPa', '10mm': '10 mm',
               '20mm_per_s': '20 mm/s', '50mm_per_s': '50 mm/s'}
 
 
+def place_in_words(subsystem: str) -> str:
+    """Return a subsystem with its article: ``the valve``, but ``a sensor`` of several."""
+    return 'a sensor' if subsystem == 'sensor' else f'the {subsystem}'
+
+
 def in_words(name: str) -> str:
     """
     Return the name of a reported quantity in words.

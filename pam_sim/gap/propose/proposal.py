@@ -31,6 +31,7 @@ from pam_sim.gap.select.comparison import gap
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.gap.verify.model import model_of
 from pam_sim.gap.verify.validation import Validation
+from pam_sim.gap.words import place_in_words
 from pam_sim.located_yaml import dump_yaml
 import yaml
 
@@ -143,8 +144,7 @@ def propose(result: GapResult, validation: Validation,
             result.remarks.append(result.proposal.sentence)
             own = result.proposal.subsystem
             if result.where and result.where[0].subsystem != own:
-                result.remarks.append(OTHER_PLACE.format(
-                    'a sensor' if own == 'sensor' else f'the {own}'))
+                result.remarks.append(OTHER_PLACE.format(place_in_words(own)))
             return
     result.remarks.append(NO_TIME if out_of_time() else NONE)
 

@@ -16,12 +16,12 @@
 How well the numbers of a named effect are known.
 
 There are three sources. The first is the tempered likelihood around the solution, or the
-difference between time blocks if that is larger; and how far a number may go, all others fitted
-again, before the errors rise. The second is what latency and skew of the measurement absorbed,
-since it may belong to the effect; a pure delay is known no better than that latency. The third is
-the form: no formulation is exactly that of the muscle. It is the spread over formulations of the
-same effect that explain about as much, and the rest of the gap. Results state quantities that mean
-the same in all formulations.
+difference between time blocks if that is larger. It is more where a number may go farther before
+the errors rise, all others fitted again. The second is what latency and skew of the measurement
+absorbed, since it may belong to the effect. A pure delay is known no better than that latency. The
+third is the form: no formulation is exactly that of the muscle. It is the spread over formulations
+of the same effect that explain about as much, and the rest of the gap. Results state quantities
+that mean the same in all formulations.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -90,7 +90,7 @@ def effect_numbers(rig: Rig, found: Fit, place: int, precision: Precision, named
     held = precision.held[rows]
     late = _late(candidate, late_sd_s)
     # What is left may be the effect's own: a formulation that is a little off.
-    off = FORM * math.sqrt(max(rest, 0.0))
+    off = off_by(rest)
     scaled = [f in candidate.amplitudes or not candidate.amplitudes for f in candidate.free]
     push = np.where(scaled, [off if f.shape else off * t
                              for f, t in zip(candidate.free, theta)], 0.0)
@@ -137,6 +137,11 @@ def half_width(precision: Precision, place: int, value: float) -> float:
     """Return half the 95 % interval of one normalised number, what has no form left out."""
     variance = max(c[place, place] for c in (precision.likelihood, precision.blocks))
     return float(np.hypot(NORMAL_95 * np.sqrt(variance), HELD * (precision.held[place] - value)))
+
+
+def off_by(rest: float) -> float:
+    """Return by which share a number may be off where that share of a squared gap is left."""
+    return FORM * math.sqrt(max(rest, 0.0))
 
 
 def _late(candidate: Candidate, late_sd_s: float) -> FloatArray:
