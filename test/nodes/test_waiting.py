@@ -61,47 +61,47 @@ def test_a_node_says_for_whom_it_waits_and_knows_it_in_every_form(tmp_path):
         rig.close()
 
 
-def test_an_experiment_begins_once_it_is_measured_and_driven(tmp_path):
+@pytest.fixture
+def waiting(tmp_path):
+    """Return a rig of a reference generator alone, which waits for measurements."""
     rig = LiveRig(tmp_path)
     try:
         rig.start('reference_generator', experiment='short_sine', await_measurement_s=60.0)
         rig.listen(('reference',))
         wait_for(lambda: rig.health['reference_generator'], 30.0, 'the generator')
-        contraction, signal_sent = rig.publisher('contraction'), rig.publisher('valve_signal')
-        wait_for(lambda: contraction.get_subscription_count()
-                 and signal_sent.get_subscription_count(), 10.0, 'the subscriptions')
-
-        def send(late_ns, value_m, driven):
-            for _ in range(40):
-                now_ns = time.time_ns()
-                contraction.publish(Writer('contraction').fill(
-                    Contraction(now_ns - late_ns, value_m)))
-                if driven:
-                    signal_sent.publish(Writer('valve_signal').fill(
-                        ValveSignal(now_ns, ('ppr_voltage',), (0.0,))))
-                time.sleep(0.01)
-
-        for what in ((200_000_000, 0.001, True), (0, float('nan'), True), (0, 0.001, False)):
-            send(*what)
-            assert not rig.heard['reference'], what
-            time.sleep(0.15)
-        send(0, 0.001, True)
-        wait_for(lambda: rig.heard['reference'], 5.0, 'the reference')
+        yield rig
     finally:
         rig.close()
 
 
-def test_an_experiment_that_waits_says_for_what(tmp_path):
-    rig = LiveRig(tmp_path)
-    try:
-        rig.start('reference_generator', experiment='short_sine', await_measurement_s=60.0)
-        rig.listen(('reference',))
-        wait_for(lambda: rig.health['reference_generator'], 30.0, 'a word')
-        wait_for(lambda: rig.health['reference_generator'][-1].level == LEVEL_WARN, 10.0, 'why')
-        assert rig.health['reference_generator'][-1].message == (
-            f'{NOT_BEGUN} /muscle/contraction, /muscle/valve_signal')
-    finally:
-        rig.close()
+def test_an_experiment_begins_once_it_is_measured_and_driven(waiting):
+    rig = waiting
+    contraction, signal_sent = rig.publisher('contraction'), rig.publisher('valve_signal')
+    wait_for(lambda: contraction.get_subscription_count()
+             and signal_sent.get_subscription_count(), 10.0, 'the subscriptions')
+
+    def send(late_ns, value_m, driven):
+        for _ in range(40):
+            now_ns = time.time_ns()
+            contraction.publish(Writer('contraction').fill(
+                Contraction(now_ns - late_ns, value_m)))
+            if driven:
+                signal_sent.publish(Writer('valve_signal').fill(
+                    ValveSignal(now_ns, ('ppr_voltage',), (0.0,))))
+            time.sleep(0.01)
+
+    for what in ((200_000_000, 0.001, True), (0, float('nan'), True), (0, 0.001, False)):
+        send(*what)
+        assert not rig.heard['reference'], what
+        time.sleep(0.15)
+    send(0, 0.001, True)
+    wait_for(lambda: rig.heard['reference'], 5.0, 'the reference')
+
+
+def test_an_experiment_that_waits_says_for_what(waiting):
+    said = waiting.health['reference_generator']
+    wait_for(lambda: said[-1].level == LEVEL_WARN, 10.0, 'why')
+    assert said[-1].message == f'{NOT_BEGUN} /muscle/contraction, /muscle/valve_signal'
 
 
 def test_an_experiment_that_nobody_measures_ends_with_a_reason(tmp_path):
