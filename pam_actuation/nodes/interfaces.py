@@ -26,6 +26,7 @@ import inspect
 from typing import Any, Self
 
 from pam_actuation.nodes.managed import ManagedNode
+from pam_actuation.nodes.ros_messages import type_of
 from pam_actuation.rigging.client import local_context
 from pam_actuation.rigging.domain import DomainLock
 from pam_actuation.topics.table import DIAGNOSTICS, topic_of
@@ -159,6 +160,5 @@ def _by_name(namespace: str, items: Iterable[tuple[str, Any]]) -> dict[str, str]
     found = {}
     for name, kind in items:
         if name not in OF_EVERY_NODE:
-            package, folder, *_ = kind.__module__.split('.')
-            found[name.removeprefix(f'{namespace}/')] = f'{package}/{folder}/{kind.__name__}'
+            found[name.removeprefix(f'{namespace}/')] = type_of(kind)
     return found

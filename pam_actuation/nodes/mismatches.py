@@ -13,16 +13,20 @@
 # limitations under the License.
 
 """
-Publishers that a subscription cannot receive: their quality of service does not match its own.
+Publishers that a subscription cannot receive: another quality of service, or another type.
 
 A best-effort publisher never matches a reliable subscription, and DDS says so to nobody who does
 not ask. The middleware counts such publishers. That count is read with the diagnostics; only when
 it has grown are the publishers looked up on the graph, by name.
+
+A publisher of another type never matches either, and nobody counts it. The graph is asked for it
+where a subscription has no publisher, as with a pressure that is sent as a Float64.
 """
 
 import time
 from typing import Any
 
+from pam_actuation.nodes.ros_messages import type_of
 from rclpy.event_handler import QoSSubscriptionEventType, UnsupportedEventTypeError
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
@@ -54,9 +58,32 @@ class Mismatches:
         self._profile = subscription.qos_profile
         self._counted = 0
         self._since_s: float | None = None      # the last event, while it may concern anybody
+        self._type = type_of(subscription.msg_type)
+        self._other_type_s: float | None = None     # since when there is one of another type
 
     def sentences(self) -> list[str]:
         """Return one sentence for each such publisher there is now, with the line to write."""
+        return [*self._of_other_quality(), *self._of_other_types()]
+
+    def _of_other_types(self) -> list[str]:
+        """Return a sentence for each publisher of another type, where none is received."""
+        alone = not self._subscription.get_publisher_count()
+        others = [end for end in self._node.get_publishers_info_by_topic(self._topic)
+                  if end.topic_type != self._type] if (
+                      alone and self._node.count_publishers(self._topic)) else []
+        if not others:
+            self._other_type_s = None
+            return []
+        now_s = time.monotonic()
+        self._other_type_s = self._other_type_s or now_s
+        if now_s - self._other_type_s < PATIENCE_S:
+            others = [end for end in others if end.node_name != NAMELESS]
+        sentences = [f'{_who(end)} sends {self._topic} as {end.topic_type}, which is not '
+                     f'received here; send it as {self._type}' for end in others]
+        return list(dict.fromkeys(sentences))
+
+    def _of_other_quality(self) -> list[str]:
+        """Return a sentence for each publisher of a quality that does not match."""
         now_s = time.monotonic()
         if self._has_new():
             self._since_s = now_s
@@ -91,11 +118,16 @@ class Mismatches:
         return self._counted > before
 
     def _sentence(self, end: TopicEndpointInfo, reason: str) -> str:
-        who = 'a program without a node name' if end.node_name == NAMELESS else (
-            f'{end.node_namespace.rstrip("/")}/{end.node_name}')
+        who = _who(end)
         if (end.qos_profile.reliability != ReliabilityPolicy.BEST_EFFORT
                 or self._profile.reliability != ReliabilityPolicy.RELIABLE):
             return f'{who} cannot be received on {self._topic}: {reason.strip(" ;")}'
         return (f'{who} sends {self._topic} best effort, which is not received here; let it '
                 f'publish reliable, or start this node with -p qos_overrides.{self._topic}.'
                 'subscription.reliability:=best_effort')
+
+
+def _who(end: TopicEndpointInfo) -> str:
+    """Return the full name of the node of a publisher, in words where it has none."""
+    return 'a program without a node name' if end.node_name == NAMELESS else (
+        f'{end.node_namespace.rstrip("/")}/{end.node_name}')

@@ -42,6 +42,12 @@ def class_of(topic: str) -> Any:
     return message_class(topic_of(topic).type_name)
 
 
+def type_of(message: Any) -> str:
+    """Return the name of the type of a message class, such as ``sensor_msgs/msg/Imu``."""
+    package, folder, *_ = message.__module__.split('.')
+    return f'{package}/{folder}/{message.__name__}'
+
+
 def set_stamp(stamp: Any, time_ns: int) -> None:
     """Write a time [ns] into a ``builtin_interfaces`` Time or Duration."""
     stamp.sec, stamp.nanosec = split_stamp(time_ns)

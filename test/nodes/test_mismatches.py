@@ -36,6 +36,7 @@ from rclpy.parameter import Parameter                                       # no
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy       # noqa: E402
 from rosgraph_msgs.msg import Clock                                         # noqa: E402
 from sensor_msgs.msg import FluidPressure, JointState                       # noqa: E402
+from std_msgs.msg import Float64                                            # noqa: E402
 
 pytestmark = [pytest.mark.ros, pytest.mark.shared]
 
@@ -176,6 +177,21 @@ def test_a_message_of_several_joints_is_told(nodes):
     assert after(['left_knee']) == []
     subscription.destroy()
     sensor.destroy_publisher(publisher)
+
+
+def test_a_publisher_of_another_type_is_named(nodes):
+    """Nothing of it arrives, and a driver then says that no pressure is measured."""
+    listener, sensor = nodes
+    subscription = PolledSubscription(listener, FluidPressure, 'bare')
+    assert subscription.remarks() == []
+    other = sensor.create_publisher(Float64, '/muscle/bare', qos.PUBLISHER)
+    wait_for(subscription.remarks, 10.0, 'the sentence')
+    assert subscription.remarks() == [
+        '/lab/sensor sends /muscle/bare as std_msgs/msg/Float64, which is not received here; '
+        'send it as sensor_msgs/msg/FluidPressure']
+    sensor.destroy_publisher(other)
+    wait_for(lambda: not subscription.remarks(), 10.0, 'the end of the sentence')
+    subscription.destroy()
 
 
 def test_another_mismatch_is_told_by_its_reason(nodes):
