@@ -26,7 +26,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from pam_actuation.interrupts import closing
-from pam_actuation.messages import is_fault
+from pam_actuation.messages import is_fault, LEVEL_ERROR, LEVEL_STALE
 from pam_actuation.ros_log import name_log_folder
 from pam_actuation.topics.codec import Reader
 from pam_actuation.topics.quality import USUAL
@@ -206,7 +206,9 @@ class RigClient:
 
     def _on_diagnostics(self, raw: bytes) -> None:
         for status in self._read(raw) or ():
-            name, level, message = status.name, status.level, status.message
+            name, message = status.name, status.message
+            # Other programs send any byte, and what is no level of ROS is no good news.
+            level = status.level if status.level <= LEVEL_STALE else LEVEL_ERROR
             if not self.concerns(name):
                 continue
             now_s, known = time.monotonic(), self.statuses.get(name)

@@ -101,6 +101,35 @@ def test_a_node_without_a_status_is_named(domain, capsys):
     assert len(said['nodes']) == 3
 
 
+def test_a_status_of_a_level_that_ros_does_not_have_is_an_error(capsys):
+    """A diagnostics driver of another program may send any byte."""
+    lock = DomainLock()
+    context = local_context(lock.domain_id)
+    node = Node('arm', namespace='/robot', context=context)
+    publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    node.create_timer(0.1, lambda: publisher.publish(DiagnosticArray(status=[
+        DiagnosticStatus(name='/robot/arm', level=bytes([level]), message='')
+        for level in (4, 9)])))
+
+    def spin():
+        with contextlib.suppress(ExternalShutdownException):
+            executor.spin()
+
+    thread = threading.Thread(target=spin)
+    thread.start()
+    try:
+        code, said = _pam(capsys, 'status', 'arm', '--domain-id', str(lock.domain_id))
+        assert code == 1 and [one['level'] for one in said['nodes']] == ['ERROR']
+    finally:
+        executor.shutdown()
+        rclpy.try_shutdown(context=context)
+        thread.join()
+        node.destroy_node()
+        lock.release()
+
+
 @pytest.mark.parametrize('level, message, code', [
     ('WARN', 'reference lost, asks for the atmosphere', 1), ('WARN', 'no reference yet', 0),
     ('ok', '', 0), ('ERROR', 'vented because', 1), ('STALE', '', 1)])
