@@ -37,6 +37,10 @@ from rclpy.node import Node
 
 QOS = 'qos_overrides.'
 # Of these ROS declares the parameters itself, late or never.
+QUALITIES = {            # by the last word of the name of such a parameter
+    'history': ('keep_last', 'keep_all', 'system_default'),
+    'reliability': ('reliable', 'best_effort', 'best_available', 'system_default')}
+MOST_DEPTH = 1_000_000
 TOPICS_OF_ROS = ('/clock', '/parameter_events', '/rosout')
 COMMON_PARAMETERS = (         # of every node
     node_parameter('autostart', True, 'Configure and activate without being told to.'),
@@ -109,6 +113,17 @@ def descriptor(parameter: Parameter, live: bool) -> ParameterDescriptor:
     return found
 
 
+def _quality_problem(name: str, value: Any) -> str:
+    """Return what is wrong with a given quality of service, '' if nothing is."""
+    policy = name.rpartition('.')[2]
+    choices = QUALITIES.get(policy)
+    if choices and not (isinstance(value, str) and value.lower() in choices):
+        return f'{value!r} is not allowed, it must be {" or ".join(choices)}'
+    if policy == 'depth' and not (type(value) is int and 0 <= value <= MOST_DEPTH):
+        return f'{value!r} is not allowed, it must be a whole number from 0 to {MOST_DEPTH}'
+    return ''
+
+
 def _check_overrides(node: Node, table: Mapping[str, Parameter]) -> None:
     """Raise InputError on a wrong given value; warn of one no parameter is declared for."""
     for name, override in node._parameter_overrides.items():
@@ -118,7 +133,10 @@ def _check_overrides(node: Node, table: Mapping[str, Parameter]) -> None:
                 continue                      # `-p rate:=200` is meant as 200.0
             if wrong := problem(table[name], value):
                 raise InputError(wrong, f'parameter {name}')
-        elif name != 'use_sim_time' and not name.startswith(QOS):
+        elif name.startswith(QOS):
+            if wrong := _quality_problem(name, override.value):
+                raise InputError(wrong, f'parameter {name}')
+        elif name != 'use_sim_time':
             hint = did_you_mean(name, table, '', '; did you mean {}?')
             node.get_logger().warning(f'parameter {name} is not known here, ignored{hint}')
 

@@ -148,6 +148,9 @@ def _run(node_class: type[ManagedNode], args: Sequence[str] | None, stopper: '_S
         unread = re.search("Couldn't parse ([^:]*): '(.*?)'", str(error))
         if unread:
             return _refuse(node_class, f'ROS cannot read the {unread[1]} {unread[2]}')
+        cut_off = re.search("Couldn't parse trailing (-\\S+) flag", str(error))
+        if cut_off:
+            return _refuse(node_class, f'nothing follows {cut_off[1]}, which needs a value')
         raise
     executor = SingleThreadedExecutor()
     executor.add_node(node)

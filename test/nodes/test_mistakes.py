@@ -66,6 +66,16 @@ MISTAKES = {
         'pid_controller', ['valve_type:=3'], 'valve_type: 3', 'must be of type str'),
     'reference_generator experiment': (
         'reference_generator', ['experiment:=nothing'], 'nothing', 'sine_quarter_hz'),
+    'valve_driver reliability': (
+        'valve_driver', ['qos_overrides./pressure.subscription.reliability:=besteffort'],
+        "qos_overrides./pressure.subscription.reliability: 'besteffort'",
+        'reliable or best_effort'),
+    'valve_driver history': (
+        'valve_driver', ['qos_overrides./valve_signal.publisher.history:=1'],
+        'qos_overrides./valve_signal.publisher.history: 1', 'keep_last or keep_all'),
+    'valve_driver depth': (
+        'valve_driver', ['qos_overrides./pressure.subscription.depth:=-1'],
+        'qos_overrides./pressure.subscription.depth: -1', '0 to 1000000'),
     'experiment_recorder topic': (
         'experiment_recorder', ['topics:=[pressure, tension]'], "'tension'", 'contraction'),
     'experiment_recorder extra': (
@@ -126,7 +136,8 @@ def test_a_rig_that_0_v_does_not_vent_is_refused_before_any_node_starts(words, t
     (['-r', '__ns:=le-g'], "namespace: 'le-g' is not allowed"),
     (['-r', '__node:=bad-name'], 'cannot read the remap rule -r __node:=bad-name'),
     (['-p', 'novalue'], 'cannot read the parameter override rule -p novalue'),
-    (['--params-file', '/no.yaml'], 'cannot read the params file --params-file /no.yaml')])
+    (['--params-file', '/no.yaml'], 'cannot read the params file --params-file /no.yaml'),
+    (['-p'], 'nothing follows -p, which needs a value')])
 def test_what_ros_cannot_read_is_a_sentence(arguments, words, tmp_path):
     done = subprocess.run(
         [sys.executable, '-m', 'pam_actuation.nodes.valve_watchdog', '--ros-args', *arguments],
