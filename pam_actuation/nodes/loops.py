@@ -26,6 +26,8 @@ import threading
 import time
 from typing import Protocol
 
+NOT_SERVED = ('nothing runs the loop of this node, so it does nothing: an executor answers its '
+              'services only, start it as a process of its own')
 LONGEST_SLEEP_NS = 100_000_000     # how soon an idle node notices that it is to end
 
 
@@ -89,13 +91,15 @@ class LoopSet:
     """
     The loops of a node; ``lock`` is held while one of them runs.
 
-    ``time`` is what they run on, ``SteadyTime`` or something like it.
+    ``time`` is what they run on, ``SteadyTime`` or something like it. ``served`` tells whether
+    somebody calls ``run_once``, again and again.
     """
 
     def __init__(self) -> None:
         self.lock = threading.RLock()
         self.time: LoopTime = SteadyTime()
         self._loops: list[Loop] = []
+        self.served = False
 
     def __bool__(self) -> bool:
         """Tell whether there is any loop."""
@@ -121,6 +125,7 @@ class LoopSet:
 
     def run_once(self) -> None:
         """Sleep until the next tick is due, at most 0.1 s, and run what is due."""
+        self.served = True
         loops = self._loops
         if not loops:
             time.sleep(LONGEST_SLEEP_NS * 1e-9)

@@ -37,7 +37,7 @@ from pam_actuation.nodes import qos
 from pam_actuation.nodes.diagnostics import DiagnosticsReporter, ERROR, OK, Values
 from pam_actuation.nodes.endpoints import CountedPublisher, PolledSubscription, wait_until_matched
 from pam_actuation.nodes.lockstep import TickInput, TickInputs
-from pam_actuation.nodes.loops import Loop, LoopSet, LoopTime, SteadyTime
+from pam_actuation.nodes.loops import Loop, LoopSet, LoopTime, NOT_SERVED, SteadyTime
 from pam_actuation.nodes.parameters import COMMON_PARAMETERS, declare, unused_qos
 from pam_actuation.nodes.realtime import run_in_realtime
 from pam_actuation.nodes.ros_messages import class_of
@@ -424,6 +424,9 @@ class ManagedNode(LifecycleNode):
         steady = None if self.simulated_time is None else SteadyTime()
         self.add_extra_loop(self.value('diagnostics_period_s'), self._report, steady)
         self.diagnostics.update(OK, ACTIVE)
+        if not self.loops.served:
+            self.diagnostics.remark = NOT_SERVED
+            self.diagnostics.send()         # no loop does
         self.get_logger().info('active')
 
     def _report(self) -> None:

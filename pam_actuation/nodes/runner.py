@@ -163,6 +163,7 @@ def _run(node_class: type[ManagedNode], args: Sequence[str] | None, stopper: '_S
         launch_pid = os.environ.get(LAUNCHED_BY, '')
         end_with_parent(os.getppid(), int(launch_pid) if launch_pid.isdigit() else 0)
     serving.start()
+    node.loops.served = True
     try:
         if node.value('autostart'):
             _bring_up(node)

@@ -22,10 +22,14 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from pam_actuation.control.trajectory_goal import Outcome, SUCCESSFUL       # noqa: E402, I100
+from live_rig import wait_for                                   # noqa: E402, I100
+from pam_actuation.control.trajectory_goal import Outcome, SUCCESSFUL       # noqa: E402
 from pam_actuation.nodes import joint_trajectory_server         # noqa: E402
+from pam_actuation.nodes.diagnostics import OK, WARN            # noqa: E402
+from pam_actuation.nodes.loops import NOT_SERVED                # noqa: E402
 from pam_actuation.nodes.managed import ManagedNode             # noqa: E402
 from pam_actuation.nodes.valve_driver import ValveDriver        # noqa: E402
+from pam_actuation.topics.codec import decode                   # noqa: E402
 
 
 def node_with(**parts):
@@ -77,6 +81,27 @@ def test_a_goal_is_answered_where_the_server_fails(fails, context, monkeypatch):
         assert followed.result.text == 'the server was stopped'
     finally:
         server.destroy_node()
+
+
+def test_a_node_whose_loop_nobody_runs_says_so(context):
+    """As one that an executor of another process has: it answered that it is active."""
+    class Loose(ManagedNode):
+        NAME = 'loose'
+
+    node, said = Loose(context=context, namespace='/muscle', enable_rosout=False), []
+    try:
+        node.trigger_configure()
+        node.diagnostics.publisher.publish = said.append
+        node.trigger_activate()
+        status, = decode('diagnostics', said[-1])
+        assert status.level == WARN and status.message == f'active; {NOT_SERVED}'
+        sent = len(said)
+        wait_for(lambda: node.loops.run_once() or len(said) > sent, 5.0, 'the next status')
+        status, = decode('diagnostics', said[-1])
+        assert (status.level, status.message) == (OK, 'active')
+    finally:
+        node.finish('over')
+        node.destroy_node()
 
 
 def test_what_fails_at_the_end_of_an_active_node_is_told_and_the_rest_is_done(context):
