@@ -33,6 +33,7 @@ from pam_actuation.bags import disk
 from pam_actuation.bags.ending import Ending, ERROR
 from pam_actuation.bags.losses import missing_messages, PublishedCounts, SentTimes
 from pam_actuation.bags.writer import BagWriter
+from pam_actuation.topics.quality import Quality
 from pam_actuation.topics.table import DIAGNOSTICS
 from pam_sim.errors import InputError
 
@@ -189,14 +190,14 @@ class RecorderCore:
         self._syncing = threading.Thread(target=self._sync, name='bag_sync', daemon=True)
         self._syncing.start()
 
-    def add_topic(self, full_name: str, type_name: str) -> None:
+    def add_topic(self, full_name: str, type_name: str, offered: Quality | None = None) -> None:
         """
-        Announce a topic before its messages.
+        Announce a topic before its messages; ``offered`` is as of ``BagWriter.add_topic``.
 
         Sequence numbers are watched for gaps, but on ``/diagnostics``, where many nodes publish.
         """
         with self._disk:
-            self._writer.add_topic(full_name, type_name)
+            self._writer.add_topic(full_name, type_name, offered)
         with self._wake:
             self._counts.setdefault(full_name, TopicCounts())
             self._sent.setdefault(full_name, SentTimes())

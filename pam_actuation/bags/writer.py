@@ -30,7 +30,7 @@ from pam_actuation.bags import disk, layout
 from pam_actuation.bags.data_file import DataFile
 from pam_actuation.bags.place import BagPlace
 from pam_actuation.topics.definitions import type_hash
-from pam_actuation.topics.quality import USUAL
+from pam_actuation.topics.quality import Quality, USUAL
 from pam_actuation.topics.table import BY_NAME, short_name
 from pam_sim.annotations import ByteArray, IntArray
 from pam_sim.errors import InputError
@@ -146,12 +146,12 @@ class BagWriter:
         """Return the path of the newest file."""
         return self.files[-1]
 
-    def add_topic(self, full_name: str, type_name: str) -> None:
+    def add_topic(self, full_name: str, type_name: str, offered: Quality | None = None) -> None:
         """
         Announce a topic; a second call with the same type changes nothing.
 
-        The bag states the quality of service of its publisher, as the table of topics has it.
-        Raises InputError for a name that is not absolute, a type that ROS 2 Jazzy does not have,
+        The bag states the quality of service of its publisher: ``offered``, or without that as
+        the table of topics has it. Raises InputError for a name that is not absolute, a type that ROS 2 Jazzy does not have,
         or another type than before.
         """
         if full_name in self._topics:
@@ -163,7 +163,7 @@ class BagWriter:
         if not full_name.startswith('/') or full_name.endswith('/'):
             raise InputError('give the full topic name, such as /muscle/pressure', full_name)
         row = BY_NAME.get(short_name(full_name))
-        profile = layout.qos_profile((row.service if row else USUAL).publisher)
+        profile = layout.qos_profile(offered or (row.service if row else USUAL).publisher)
         self._topics[full_name] = {
             'type': type_name, 'qos': (profile,), 'hash': type_hash(type_name), 'count': 0}
         facts = self._topics[full_name]

@@ -37,11 +37,12 @@ from pam_actuation.nodes.diagnostics import OK
 from pam_actuation.nodes.endpoints import PolledSubscription, Taken
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.physics_node import MAX_SEED
+from pam_actuation.nodes.qos import is_latched
 from pam_actuation.nodes.ros_messages import message_class
 from pam_actuation.nodes.runner import run
 from pam_actuation.topics.codec import decode
 from pam_actuation.topics.definitions import schema_text, type_hash
-from pam_actuation.topics.quality import Quality, USUAL
+from pam_actuation.topics.quality import LATCHED, OF_LATCHED, Quality, USUAL
 from pam_actuation.topics.table import DIAGNOSTICS, RECORDED, RECORDED_OF_JOINT, ROOT, Topic
 from pam_sim.errors import InputError
 from pam_sim.files import write_text
@@ -140,6 +141,7 @@ class ExperimentRecorder(ManagedNode):
                          **own_name(self.value('muscle'), self.get_namespace())}
         self.sources: dict[str, PolledSubscription] = {}
         self.types: dict[str, str] = {}
+        self.latched: set[str] = set()      # of the further topics
         recorded = list(filter(None, self.value('topics'))) or self.topics
         for topic in filter(None, self.value('await_topics')):
             if topic not in recorded:
@@ -167,6 +169,21 @@ class ExperimentRecorder(ManagedNode):
         type_hash(type_name)
         self.types[topic] = type_name
         self.sources[topic] = self.subscribe(message_class(type_name), name, quality)
+
+    def _record_latched(self, name: str) -> None:
+        """Subscribe anew to a further topic, so that its last message comes once more."""
+        former = self.sources[name]
+        self.subscriptions_polled.remove(former)
+        former.destroy()
+        self.latched.add(name)
+        self._record(name, name, self.types[name], OF_LATCHED)
+
+    def _look_for_latched(self) -> None:
+        """Find further topics whose last message was sent before this node came."""
+        for name in self.extra.keys() - self.latched:
+            topic = self.sources[name].topic
+            if topic not in self.known and is_latched(self, topic):
+                self._record_latched(name)
 
     def _metadata(self) -> dict[str, str]:
         path = self.value('metadata_file')
@@ -213,6 +230,8 @@ class ExperimentRecorder(ManagedNode):
         if self._recorded or not self.value('autostart'):
             for source in self.sources.values():
                 source.take()           # what came before belongs to no recording
+            for name in self.latched:
+                self._record_latched(name)
         # Who waited for this node to be there may have begun before it is active.
         self._recorded = True
         missing = self._wait_for_publishers()
@@ -245,6 +264,7 @@ class ExperimentRecorder(ManagedNode):
             self._give_up()
         elif self.timing is not None and self.timing.ticks % CHECK_EVERY == 1:
             self._check_losses()
+            self._look_for_latched()
 
     def _give_up(self) -> None:
         """
@@ -276,7 +296,8 @@ class ExperimentRecorder(ManagedNode):
                 continue
             name = source.topic
             if name not in self.known:
-                self._core.add_topic(name, self.types[topic])
+                self._core.add_topic(
+                    name, self.types[topic], LATCHED if topic in self.latched else None)
                 self.known.add(name)
             self._core.receive_all(name, messages)
             if topic == 'diagnostics':
@@ -321,6 +342,10 @@ class ExperimentRecorder(ManagedNode):
             self._take_last()
         finally:
             summary = self._close()
+        silent = [self.sources[name].topic for name in self.extra
+                  if self.sources[name].topic not in self.known]
+        if silent:
+            self.get_logger().warning(f'nothing came on {", ".join(silent)}')
         if summary.complete:
             self.get_logger().info(
                 f'{summary.written} messages recorded, none lost{_before(summary)}: '

@@ -22,6 +22,7 @@ Each setting can be overridden at launch by the usual parameters
 import functools
 
 from pam_actuation.topics import quality
+from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy
 from rclpy.qos import HistoryPolicy
 from rclpy.qos import QoSProfile
@@ -48,6 +49,13 @@ CONSUMER = profile(quality.USUAL.consumer)
 RECORDER = profile(quality.USUAL.recorder)
 LATCHED = profile(quality.LATCHED)
 CLOCK = profile(quality.CLOCK)
+
+
+def is_latched(node: Node, topic: str) -> bool:
+    """Tell whether somebody publishes a topic, and everybody who does keeps its last messages."""
+    ends = node.get_publishers_info_by_topic(topic)
+    return bool(ends) and all(
+        end.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL for end in ends)
 
 
 def overridable() -> QoSOverridingOptions:

@@ -55,3 +55,4 @@ ONLOOKER = Quality(1000, reliability='best_effort')
 CLOCK = Quality(1000, reliability='best_effort')
 # What is said once, such as a robot description: who comes later hears it too.
 LATCHED = Quality(1, durability='transient_local')
+OF_LATCHED = Quality(USUAL.recorder.depth, durability='transient_local')      # to record them

@@ -38,6 +38,7 @@ from pam_actuation.topics.codec import encode                                # n
 import rclpy                                                                # noqa: E402
 from rclpy.parameter import Parameter                                       # noqa: E402
 from sensor_msgs.msg import FluidPressure                                   # noqa: E402
+from std_msgs.msg import String                                             # noqa: E402
 
 pytestmark = pytest.mark.ros
 
@@ -137,6 +138,46 @@ def made(tmp_path):
         node.destroy_node()
     rclpy.try_shutdown(context=context)
     lock.release()
+
+
+@pytest.fixture
+def told(capfd):
+    """Return a function that gives what was logged by now."""
+    texts = []
+
+    def log():
+        texts.append(''.join(capfd.readouterr()))
+        return ''.join(texts)
+    return log
+
+
+def test_a_latched_topic_is_in_each_bag_although_it_was_sent_before(made, told, tmp_path):
+    """As /tf_static and robot_description are; what plays the bag has to offer it latched."""
+    topics = ['/robot_description', '/bench/nobody']
+    recorder = made(topics=['pressure'], extra_topics=[
+        f'{topic}=std_msgs/msg/String' for topic in topics])
+    context = local_context(recorder.context.get_domain_id())
+    other = rclpy.create_node('other', context=context)
+    publisher = other.create_publisher(String, topics[0], qos.LATCHED)
+    try:
+        publisher.publish(String(data='a robot'))
+        recorder.trigger_configure()
+        for bag in ('first', 'second'):
+            recorder.set_parameters([Parameter('output', value=str(tmp_path / bag))])
+            recorder.trigger_activate()
+            wait_for(lambda: recorder.loops.run_once() or topics[0] in recorder.known, 10.0,
+                     'the description')
+            recorder.trigger_deactivate()
+            info = bag_info(tmp_path / bag)
+            assert [(one.name, one.count, one.lost) for one in info.topics] == [
+                (topics[0], 1, 0)]
+            text = (tmp_path / bag / 'metadata.yaml').read_text()
+            assert 'durability: transient_local' in text
+    finally:
+        recorder.finish('over')
+        other.destroy_node()
+        rclpy.try_shutdown(context=context)
+    assert told().count('nothing came on /bench/nobody\n') == 2
 
 
 def test_it_does_not_await_what_it_does_not_record(made, tmp_path):
