@@ -33,7 +33,9 @@ def reported_counts(bag: Bag) -> PublishedCounts:
     """Return the PublishedCounts of a bag's diagnostics."""
     published = PublishedCounts({
         topic.recorded_name: int(topic.publish_time_ns.min()) if len(topic.publish_time_ns) else 0
-        for topic in bag.topics.values()})
+        for topic in bag.topics.values()}, min((
+            int(topic.log_time_ns.min()) for topic in bag.topics.values()
+            if len(topic.log_time_ns)), default=None))
     topic = bag.topics.get(DIAGNOSTICS)
     if topic is not None and is_rig_topic(topic):
         for raw, sent_ns in zip(topic.payloads, topic.publish_time_ns.tolist()):
@@ -47,7 +49,7 @@ def add_counts(info: 'TopicInfo', topic: TopicData, recording: Mapping[str, str]
     Enter what recorder and nodes have counted of a topic, and what is lost by that.
 
     Nodes outside the namespaces of the bag, of another bench, come and go as they like: what they
-    said before is nothing that is missing.
+    said before is nothing that is missing. Nor is what a node said that was there before the bag.
     """
     def recorded(key: str) -> int | None:
         return count_of(recording.get(f'{topic.recorded_name}.{key}', ''))
@@ -57,7 +59,8 @@ def add_counts(info: 'TopicInfo', topic: TopicData, recording: Mapping[str, str]
     if missed is not None:
         info.sent_before = recorded('sent_before') or 0
         if topic.name == DIAGNOSTICS:
-            info.sent_before = missed - min(missed, reports.missed_reports(namespaces) or 0)
+            info.sent_before = missed - min(
+                missed, reports.missed_reports(namespaces, late=True) or 0)
         info.missed_at_start = missed - info.sent_before
     info.published, sent_ns = reports.of(topic.recorded_name)
     info.lost = missing_messages(

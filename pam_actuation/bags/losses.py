@@ -30,6 +30,8 @@ from pam_sim.errors import InputError
 
 PUBLISHED = 'published.'
 COUNT_DIGITS = 18
+# A node reports once in a second at least: one heard by then was there before the bag.
+REPORTED_WITHIN_NS = 1_500_000_000
 _MOST_KEPT = 10_000           # send times of a topic no node reports on
 
 
@@ -71,17 +73,21 @@ class PublishedCounts:
     begins_ns : mapping of str to int, optional
         Send time [ns] of the first message of each topic in a bag, by full name, for
         ``first_of``.
+    begin_ns : int, optional
+        When the bag itself begins [ns].
 
     """
 
-    def __init__(self, begins_ns: Mapping[str, int] | None = None) -> None:
+    def __init__(self, begins_ns: Mapping[str, int] | None = None,
+                 begin_ns: int | None = None) -> None:
         self._begins_ns = begins_ns or {}
+        self._begin_ns = begin_ns
         # As _last, of the first report since the topic begins.
         self._baseline: dict[str, dict[str, tuple[int, int]]] = {}
         # Topic -> status name -> (number, send time).
         self._last: dict[str, dict[str, tuple[int, int]]] = {}
-        # Status name -> number of its first report on /diagnostics.
-        self._first: dict[str, int] = {}
+        # Status name -> (number, send time) of its first report on /diagnostics.
+        self._first: dict[str, tuple[int, int]] = {}
 
     def hear(self, payload: bytes, sent_ns: int) -> set[str]:
         """
@@ -104,20 +110,24 @@ class PublishedCounts:
                         self._baseline.setdefault(topic, {}).setdefault(
                             status.name, (number, sent_ns))
                     if topic == DIAGNOSTICS:
-                        self._first.setdefault(status.name, number)
+                        self._first.setdefault(status.name, (number, sent_ns))
         return topics
 
-    def missed_reports(self, namespaces: Collection[str] = ()) -> int | None:
+    def missed_reports(self, namespaces: Collection[str] = (),
+                       late: bool = False) -> int | None:
         """
         Return how many reports on /diagnostics came before the first one of their node.
 
-        Of the nodes in these namespaces; none given: of all. A report counts itself. None where
-        nobody counts them.
+        Of the nodes in these namespaces; none given: of all. With ``late`` only of those that
+        were not there when the bag began. A report counts itself. None where nobody counts them.
         """
+        since_ns = None if self._begin_ns is None or not late else (
+            self._begin_ns + REPORTED_WITHIN_NS)
         if not self._first:
             return None
-        return sum(max(number - 1, 0) for name, number in self._first.items()
-                   if not namespaces or name.rpartition('/')[0] in namespaces)
+        return sum(max(number - 1, 0) for name, (number, sent_ns) in self._first.items()
+                   if (not namespaces or name.rpartition('/')[0] in namespaces)
+                   and (since_ns is None or sent_ns > since_ns))
 
     def of(self, topic: str) -> tuple[int | None, int]:
         """Return (published, send time of the last report), (None, 0) where nobody reports."""

@@ -227,25 +227,31 @@ def test_messages_before_the_recorder_are_told_from_losses(late_s, missed, tmp_p
     assert ('6 messages were published before this bag begins.' in info.notes) == (not missed)
 
 
-def test_reports_before_the_recorder_are_told_from_lost_ones(tmp_path):
+@pytest.mark.parametrize('late_s', [0.0, 1.0, 2.0])
+def test_reports_before_the_recorder_are_told_from_lost_ones(late_s, tmp_path):
+    # Of a node that is not heard for 2 s the begin is missing. Others were there before.
     core = RecorderCore(BagWriter(tmp_path / 'run', METADATA))
     name = '/diagnostics'
     core.add_topic(name, RECORDED['diagnostics'].type_name)
     for i in range(10):
-        for node, missing in (('driver', (0, 1, 2)), ('plant', (5,))):
+        for node, missing, late_ns in (
+                ('plant', (5,), 0), ('driver', (0, 1, 2), round(late_s * 1e9))):
             if i not in missing:
+                now_ns = START_NS + i + late_ns
                 status = messages.Status(
-                    START_NS + i, 0, f'/muscle/{node}', 'ok', ((f'published.{name}', str(i + 1)),))
-                core.receive(name, codec.encode('diagnostics', [status]),
-                             START_NS + i, START_NS + i + 5)
-    summary, info = core.close(), bag_info(tmp_path / 'run').topic(name)
-    for counts in (summary.counts[name], info):
-        assert (counts.lost, counts.missed_at_start) == (1, 3)
+                    now_ns, 0, f'/muscle/{node}', 'ok', ((f'published.{name}', str(i + 1)),))
+                core.receive(name, codec.encode('diagnostics', [status]), now_ns, now_ns + 5)
+    counts, info = core.close().counts[name], bag_info(tmp_path / 'run').topic(name)
+    assert (counts.lost, counts.missed_at_start) == (1, 3)
+    missed = 3 * (late_s > 1.5)
+    assert (info.lost, info.missed_at_start, info.sent_before) == (1, missed, 3 - missed)
 
 
-@pytest.mark.parametrize('node, own', [
-    ('/other/driver', 0), ('/muscle_2/driver', 0), ('/muscle/driver', 400)])
-def test_reports_of_another_bench_before_the_recorder_are_no_loss(tmp_path, node, own):
+@pytest.mark.parametrize('node, late_s, own', [
+    ('/other/driver', 2.0, 0), ('/muscle_2/driver', 2.0, 0), ('/muscle/driver', 2.0, 400),
+    ('/muscle/driver', 0.0, 0)])
+def test_reports_of_another_bench_or_before_the_recorder_are_no_loss(
+        tmp_path, node, late_s, own):
     core = RecorderCore(BagWriter(tmp_path / 'run', METADATA))
     for short in ('pressure', 'diagnostics'):
         core.add_topic(full_name(short), RECORDED[short].type_name)
@@ -253,11 +259,13 @@ def test_reports_of_another_bench_before_the_recorder_are_no_loss(tmp_path, node
         now_ns = START_NS + i * STEP_NS
         core.receive(full_name('pressure'), codec.encode(
             'pressure', example_messages(i)['pressure']), now_ns, now_ns, i + 1)
-        for name, number in (('/muscle/plant', i + 1), (node, i + 401)):
+        for name, number, late_ns in (
+                ('/muscle/plant', i + 1, 0), (node, i + 401, round(late_s * 1e9))):
             status = messages.Status(now_ns, 0, name, 'ok', (
                 ('published./diagnostics', str(number)),
                 *([('published./muscle/pressure', str(number))] if 'plant' in name else [])))
-            core.receive('/diagnostics', codec.encode('diagnostics', [status]), now_ns, now_ns)
+            core.receive('/diagnostics', codec.encode('diagnostics', [status]),
+                         now_ns + late_ns, now_ns + late_ns)
     core.close()
     info = bag_info(tmp_path / 'run')
     assert (info.lost, info.missed_at_start) == (0, own)
