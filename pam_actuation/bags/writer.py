@@ -151,8 +151,8 @@ class BagWriter:
         Announce a topic; a second call with the same type changes nothing.
 
         The bag states the quality of service of its publisher: ``offered``, or without that as
-        the table of topics has it. Raises InputError for a name that is not absolute, a type that ROS 2 Jazzy does not have,
-        or another type than before.
+        the table of topics has it. Raises InputError for a name that is not absolute, a type that
+        ROS 2 Jazzy does not have, or another type than before.
         """
         if full_name in self._topics:
             if self._topics[full_name]['type'] != type_name:
