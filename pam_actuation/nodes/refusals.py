@@ -12,37 +12,57 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Tell the log why a message was not taken, once and not with every message."""
+"""Tell why a message was not taken, once and not with every message."""
 
+from collections.abc import Callable
 import re
-from typing import Any
+import time
 
+AGAIN_AFTER_S = 10.0        # without such a refusal, until one is news
+MOST_KINDS = 100
 _NUMBER = re.compile(r'-?\b(?:\d[\d.]*(?:e[+-]?\d+)?|nan|inf)\b')
 
 
 class RefusalLog:
     """
-    Warns of refusals that were not there before; other numbers in one are no news.
+    Warns of refusals that were not there lately; other numbers in one are no news.
+
+    A sender of several joints, or two senders, may give good and bad messages in turn for hours.
 
     Parameters
     ----------
-    logger : rclpy logger
-        Of the node.
+    say : callable
+        Takes a warning. It must not wait for the terminal: it is called in the loop.
+    clock : callable
+        Returns the time [s] of a clock that nobody sets.
 
     """
 
-    def __init__(self, logger: Any) -> None:
-        self._logger = logger
+    def __init__(self, say: Callable[[str], object],
+                 clock: Callable[[], float] = time.monotonic) -> None:
+        self._say, self._clock = say, clock
         self._before: tuple[str, ...] = ()
-        self._kinds: tuple[str, ...] = ()       # of these, without their numbers
+        self._seen_s: dict[str, float] = {}     # by kind: a refusal without its numbers
 
     def note(self, *refusals: str) -> None:
         """Take the present reasons, '' for none."""
         if refusals == self._before:
             return
+        now_s = self._clock()
+        # One that stood until now was seen now.
+        for kind in self._kinds(self._before):
+            self._seen_s[kind] = now_s
+        self._before = refusals
+        for refusal, kind in zip(refusals, self._kinds(refusals)):
+            seen_s = self._seen_s.get(kind)
+            if refusal and (seen_s is None or now_s - seen_s > AGAIN_AFTER_S):
+                self._say(f'a set point was refused: {refusal}')
+            self._seen_s[kind] = now_s
+        if len(self._seen_s) > MOST_KINDS:
+            self._seen_s = {kind: seen_s for kind, seen_s in self._seen_s.items()
+                            if now_s - seen_s <= AGAIN_AFTER_S}
+
+    @staticmethod
+    def _kinds(refusals: tuple[str, ...]) -> list[str]:
         # A value or an age differs from message to message.
-        kinds, self._before = self._kinds, refusals
-        self._kinds = tuple(_NUMBER.sub('#', refusal) for refusal in refusals)
-        for refusal, kind in zip(refusals, self._kinds):
-            if refusal and kind not in kinds:
-                self._logger.warning(f'a set point was refused: {refusal}')
+        return [_NUMBER.sub('#', refusal) for refusal in refusals]

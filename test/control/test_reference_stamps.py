@@ -14,8 +14,6 @@
 
 """What a wanted value must be stamped with: a sender with old stamps moves and vents nothing."""
 
-from types import SimpleNamespace
-
 from pam_actuation.control.joint_setpoint import JointSetpoint
 from pam_actuation.control.loop import ControllerLoop
 from pam_actuation.control.modes.tracked import CONTRACTION, FORCE
@@ -150,12 +148,33 @@ def test_a_joint_keeps_what_its_sound_sender_wants():
 
 def test_the_log_tells_a_reason_once_whatever_its_numbers():
     lines = []
-    log = RefusalLog(SimpleNamespace(warning=lines.append))
+    log = RefusalLog(lines.append)
     for age_s in (5.0, 5.1, 12.0):
         log.note('', f'a reference is stamped {age_s} s ago', '')
     log.note('', 'a reference is stamped before the newest one', '')
     assert lines == ['a set point was refused: a reference is stamped 5.0 s ago',
                      'a set point was refused: a reference is stamped before the newest one']
+
+
+def test_the_log_is_no_flood_where_good_and_bad_messages_come_in_turn():
+    """As of a sender that sends each joint a trajectory of its own, on one topic."""
+    lines, time_s = [], [0.0]
+    log = RefusalLog(lines.append, lambda: time_s[0])
+    other, old = 'joint_names right do not name this joint, left', 'a reference is 5 s old'
+
+    def after(s, *refusals):
+        time_s[0] += s
+        lines.clear()
+        log.note(*refusals)
+        return [line.removeprefix('a set point was refused: ') for line in lines]
+
+    assert after(0.0, other, '') == [other]
+    for _ in range(1000):
+        assert after(0.02, '', '') == after(0.02, other, '') == []
+    assert after(0.02, other, old) == [old]
+    assert after(60.0, '', '') == after(1.0, other, old) == []      # it stood until a second ago
+    after(1.0, '', '')
+    assert after(11.0, other, '') == [other]
 
 
 def states_after(last_ns, state_at):
