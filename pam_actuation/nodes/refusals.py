@@ -35,12 +35,15 @@ class RefusalLog:
         Takes a warning. It must not wait for the terminal: it is called in the loop.
     clock : callable
         Returns the time [s] of a clock that nobody sets.
+    what : str
+        Was refused, as words.
 
     """
 
     def __init__(self, say: Callable[[str], object],
-                 clock: Callable[[], float] = time.monotonic) -> None:
-        self._say, self._clock = say, clock
+                 clock: Callable[[], float] = time.monotonic,
+                 what: str = 'a set point was refused') -> None:
+        self._say, self._clock, self._what = say, clock, what
         self._before: tuple[str, ...] = ()
         self._seen_s: dict[str, float] = {}     # by kind: a refusal without its numbers
 
@@ -56,7 +59,7 @@ class RefusalLog:
         for refusal, kind in zip(refusals, self._kinds(refusals)):
             seen_s = self._seen_s.get(kind)
             if refusal and (seen_s is None or now_s - seen_s > AGAIN_AFTER_S):
-                self._say(f'a set point was refused: {refusal}')
+                self._say(f'{self._what}: {refusal}')
             self._seen_s[kind] = now_s
         if len(self._seen_s) > MOST_KINDS:
             self._seen_s = {kind: seen_s for kind, seen_s in self._seen_s.items()

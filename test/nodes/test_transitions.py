@@ -61,6 +61,33 @@ def test_other_failures_do_not_name_the_compiler():
 
 @pytest.mark.ros
 @pytest.mark.shared
+@pytest.mark.parametrize('asked', [{'id': 3}, {'id': 1, 'label': 'activate'}])
+def test_an_impossible_transition_is_refused_and_told_once(asked, context, capfd):
+    """The log of ROS waits for a terminal that is held, and the loop of the node with it."""
+    from lifecycle_msgs.msg import Transition
+    from lifecycle_msgs.srv import ChangeState
+    from pam_actuation.nodes.valve_watchdog import ValveWatchdog
+    node, said = ValveWatchdog(context=context, namespace='/muscle', enable_rosout=False), []
+    node.diagnostics.console.say = lambda word, time_ns, text: said.append(text)
+    ask = node._service_change_state.callback
+    try:
+        for _ in range(5):
+            request = ChangeState.Request(transition=Transition(**asked))
+            assert ask(request, ChangeState.Response()).success is False
+        words = asked.get('label', 'number 3')
+        assert said == [f'a transition was refused: {words} is not possible while the node is '
+                        'unconfigured; possible are configure (1), shutdown (5)']
+        for one in ({'id': 1}, {'id': 0, 'label': 'activate'}, {'label': 'deactivate'}):
+            request = ChangeState.Request(transition=Transition(**one))
+            assert ask(request, ChangeState.Response()).success
+        assert 'transition' not in capfd.readouterr().err
+    finally:
+        node.finish('over')
+        node.destroy_node()
+
+
+@pytest.mark.ros
+@pytest.mark.shared
 @pytest.mark.parametrize('is_sent', [True, False])
 def test_a_lost_request_or_answer_is_noticed(is_sent, tmp_path, monkeypatch):
     pytest.importorskip('rclpy')
