@@ -271,12 +271,13 @@ class ManagedNode(LifecycleNode):
 
     def fail(self, why: str, details: str = '') -> None:
         """Make the output safe, say why and end the process with exit code 1."""
-        self.get_logger().error(f'{why}\n{details}' if details else why)
         self.failure = self.failure or why
         self._make_safe(why)
         self._end_loops()
         self.exit_code = 1
         self.diagnostics.update(ERROR, self.last_status(why)[1])
+        # Last: the log waits for a terminal that is held, and all threads of the node with it.
+        self.get_logger().error(f'{why}\n{details}' if details else why)
 
     def _make_safe(self, why: str) -> None:
         """Call ``safe_stop``; a fault in it must not stop the way out."""
@@ -381,7 +382,6 @@ class ManagedNode(LifecycleNode):
         except StoppedEarly:
             return TransitionCallbackReturn.FAILURE
         except InputError as error:
-            self.get_logger().error(f'cannot {word}: {error}')
             self.input_error = error
             self.diagnostics.update(ERROR, f'cannot {word}: {error}')
             if action == self._configure:
@@ -389,12 +389,14 @@ class ManagedNode(LifecycleNode):
             elif self.loops:
                 self._end_loops()
                 self._make_safe(f'cannot {word}: {error}')
+            self.get_logger().error(f'cannot {word}: {error}')
             return TransitionCallbackReturn.FAILURE
         except Exception as error:
-            self.get_logger().error(f'cannot {word}:\n{traceback.format_exc()}')
+            details = traceback.format_exc()
             self._end_loops()
             self._make_safe(f'cannot {word}: {error}')
             self.diagnostics.update(ERROR, f'cannot {word}: {error}')
+            self.get_logger().error(f'cannot {word}:\n{details}')
             return TransitionCallbackReturn.ERROR
 
     def _configure(self) -> None:

@@ -104,6 +104,30 @@ def test_a_node_whose_loop_nobody_runs_says_so(context):
         node.destroy_node()
 
 
+@pytest.mark.parametrize('fails', [
+    lambda node: node.fail('broken on purpose'),
+    lambda node: node._transition('deactivate', lambda: {}['broken on purpose'])])
+def test_the_output_is_safe_before_the_log_is_written(fails, context):
+    """The log of ROS waits for a terminal that is held, and all threads of the node with it."""
+    done = []
+
+    class Node(ManagedNode):
+        NAME = 'failing'
+
+        def safe_stop(self, why):
+            done.append('safe')
+    node = Node(context=context, namespace='/muscle', enable_rosout=False)
+    try:
+        node.trigger_configure()
+        node.trigger_activate()
+        node.get_logger = lambda: SimpleNamespace(error=done.append, info=done.append)
+        fails(node)
+        assert done[0] == 'safe' and 'broken on purpose' in done[1]
+    finally:
+        node.finish('over')
+        node.destroy_node()
+
+
 def test_what_fails_at_the_end_of_an_active_node_is_told_and_the_rest_is_done(context):
     ended = []
 
