@@ -26,7 +26,7 @@ import queue
 import threading
 
 STDERR = 2
-LAST_WORDS_S = 0.2          # how long the end of a process waits for its last lines
+LAST_WORDS_S = 1.0          # how long the end of a process waits for its last lines
 MOST_WAITING = 1000         # lines; beyond them a held terminal loses some
 
 
@@ -45,6 +45,7 @@ class Console:
         self._name = name.strip('/').replace('/', '.')
         self._lines: queue.Queue[str | None] = queue.Queue(MOST_WAITING)
         self._thread: threading.Thread | None = None
+        self._closed = False
 
     def say(self, word: str, stamp_ns: int, text: str) -> None:
         """Have a line written, such as ``[WARN] [12.000000034] [muscle.valve_driver]: ...``."""
@@ -59,8 +60,9 @@ class Console:
             pass
 
     def close(self) -> None:
-        """Wait a little for what is still to be written."""
-        if self._thread is not None and self._thread.is_alive():
+        """Wait a little for what is still to be written; once, for a held terminal stays held."""
+        closed, self._closed = self._closed, True
+        if self._thread is not None and self._thread.is_alive() and not closed:
             try:
                 self._lines.put_nowait(None)
             except queue.Full:

@@ -21,7 +21,7 @@ from pam_actuation.control.tick import REASONS
 from pam_actuation.drivers.parameter import node_parameter
 from pam_actuation.messages import Pressure
 from pam_actuation.nodes import lockstep
-from pam_actuation.nodes.diagnostics import ERROR, OK, Values, WARN, WORDS
+from pam_actuation.nodes.diagnostics import ERROR, OK, Values, WARN
 from pam_actuation.nodes.lockstep import TickInput
 from pam_actuation.nodes.managed import ManagedNode
 from pam_actuation.nodes.parameters import valve_of_rig
@@ -105,8 +105,7 @@ class ControllerNode(ManagedNode):
         """Create what the loop sends and takes."""
         loop = self.loop
         assert loop is not None
-        self._refusals = RefusalLog(
-            lambda text: self.diagnostics.console.say(WORDS[WARN], self.now_ns(), text))
+        self._refusals = RefusalLog(self.get_logger().warning)
         for topic in (*loop.command_topics, 'controller_state'):
             self.add_publisher(topic)
         self._tracked = loop.measurement.sensor.topic

@@ -28,7 +28,6 @@ from typing import Any, TYPE_CHECKING
 
 from pam_actuation.messages import (
     HARDWARE_ID, LEVEL_ERROR, LEVEL_OK, LEVEL_STALE, LEVEL_WARN, Status)
-from pam_actuation.nodes.console import Console
 from pam_actuation.nodes.endpoints import CountedPublisher
 from pam_actuation.nodes.ros_messages import class_of
 from pam_actuation.topics.codec import encode
@@ -63,7 +62,6 @@ class DiagnosticsReporter:
         self.values_of: Callable[[], Values] = tuple
         self.remark = ''            # what is wrong besides, such as another node of the same name
         self.silent = True
-        self.console = Console(node.get_fully_qualified_name())
         self._said = OK, ''
         self._sent: tuple[int, str] | None = None
         self._sent_ns = 0
@@ -111,7 +109,7 @@ class DiagnosticsReporter:
         if node.stopping or node.exit_code is not None or node.input_error is not None:
             return              # the node logs itself why it ends; that is to be its last line
         if self._said != said and (level != OK or said[0] != OK):
-            self.console.say(WORDS[level], now_ns, message)
+            node.console.say(WORDS[level], now_ns, message)
 
     def _values(self) -> Values:
         """Return the values of the node; of one that failed, () where they fail as well."""

@@ -31,9 +31,11 @@ from pam_actuation.nodes.mismatches import Mismatches
 from pam_actuation.nodes.writers import WriterTake
 from rclpy.callback_groups import CallbackGroup
 from rclpy.duration import Duration
+from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
+from rclpy.qos import qos_policy_name_from_kind
 from rclpy.qos import QoSProfile
 
 WaitSet = rclpy_implementation.WaitSet
@@ -59,10 +61,18 @@ class CountedPublisher:
                  profile: QoSProfile | None = None) -> None:
         self._publisher = node.create_publisher(
             message_type, topic, copy(profile or qos.PUBLISHER),      # overrides change it
+            event_callbacks=PublisherEventCallbacks(incompatible_qos=self._unreached),
             qos_overriding_options=qos.overridable())
         self._node = node
         self.topic = self._publisher.topic_name
         self.count = 0
+
+    def _unreached(self, event: Any) -> None:
+        """Tell of a subscription that this publisher does not reach; the one of rclpy waits."""
+        policy = qos_policy_name_from_kind(event.last_policy_kind)
+        self._node.get_logger().warning(
+            f'a subscription of {self.topic} asks for another quality of service ({policy}), and '
+            'receives nothing')
 
     def publish(self, message: Any) -> None:
         """Send a ROS message (or serialized bytes) and count it."""

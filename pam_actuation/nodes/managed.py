@@ -38,6 +38,7 @@ from pam_actuation.nodes.diagnostics import DiagnosticsReporter, ERROR, OK, Valu
 from pam_actuation.nodes.endpoints import CountedPublisher, PolledSubscription, wait_until_matched
 from pam_actuation.nodes.lockstep import TickInput, TickInputs
 from pam_actuation.nodes.loops import Loop, LoopSet, LoopTime, NOT_SERVED, SteadyTime
+from pam_actuation.nodes.node_log import LoggedNode
 from pam_actuation.nodes.parameters import COMMON_PARAMETERS, declare, unused_qos
 from pam_actuation.nodes.realtime import run_in_realtime
 from pam_actuation.nodes.ros_messages import class_of
@@ -49,7 +50,7 @@ from pam_actuation.topics.quality import Quality
 from pam_actuation.topics.table import topic_of
 from pam_sim.errors import InputError
 from pam_sim.parameters import Parameter
-from rclpy.lifecycle import LifecycleNode, LifecycleState
+from rclpy.lifecycle import LifecycleState
 from rclpy.lifecycle import TransitionCallbackReturn
 
 EVERY_TICK_S = 1e-9     # in lockstep: due at every clock message
@@ -60,7 +61,7 @@ class StoppedEarly(Exception):
     """A signal came while a transition was under way."""
 
 
-class ManagedNode(LifecycleNode):
+class ManagedNode(LoggedNode):
     """
     A lifecycle node with one loop, counted publishers and diagnostics.
 

@@ -36,6 +36,7 @@ from pam_actuation.interrupts import leave_within
 from pam_actuation.nodes import arguments
 from pam_actuation.nodes.diagnostics import WARN
 from pam_actuation.nodes.managed import ManagedNode
+from pam_actuation.nodes.node_log import with_own_terminal
 from pam_actuation.rigging.processes import end_with_parent, LAUNCHED_BY
 from pam_actuation.ros_log import name_log_folder
 from pam_actuation.transport import prepare_middleware
@@ -133,9 +134,10 @@ def _run(node_class: type[ManagedNode], args: Sequence[str] | None, stopper: '_S
     try:
         if args is None:
             args = [sys.argv[0], *arguments.in_order(sys.argv[1:])]
+        args, node_class.log_on_console = with_own_terminal(args)
         prepare_middleware()
         name_log_folder()
-        rclpy.init(args=list(args), signal_handler_options=SignalHandlerOptions.NO)
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = node_class()
         if '--params-file' in args:
             from pam_actuation.nodes.hardware_check import check_given_files
@@ -179,7 +181,7 @@ def _run(node_class: type[ManagedNode], args: Sequence[str] | None, stopper: '_S
         executor.wake()
         serving.join(timeout=SERVICE_END_S)
         signal.set_wakeup_fd(-1)
-        node.diagnostics.console.close()
+        node.console.close()
         if serving.is_alive():
             # Everything is safe and sent; what is left is memory the system takes back. To
             # destroy the services of a node while another thread waits on them would crash.

@@ -16,7 +16,6 @@
 
 from typing import Any, TYPE_CHECKING
 
-from pam_actuation.nodes.diagnostics import WARN, WORDS
 from pam_actuation.nodes.refusals import RefusalLog
 
 if TYPE_CHECKING:
@@ -34,8 +33,7 @@ def refuse_impossible_transitions(node: 'ManagedNode') -> None:
     service = node._service_change_state
     original = service.callback
     log = RefusalLog(
-        lambda text: node.diagnostics.console.say(WORDS[WARN], node.now_ns(), text),
-        what='a transition was refused')
+        lambda text: node.get_logger().warning(text), what='a transition was refused')
 
     def change_state(request: Any, response: Any) -> Any:
         problem = _problem(node, request.transition)

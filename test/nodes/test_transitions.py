@@ -14,6 +14,7 @@
 """What is said of a node that does not make a transition."""
 
 import time
+from types import SimpleNamespace
 
 from pam_actuation.rigging.domain import DomainLock
 from pam_actuation.rigging.processes import end_all, node_environment, NodeProcess
@@ -68,7 +69,7 @@ def test_an_impossible_transition_is_refused_and_told_once(asked, context, capfd
     from lifecycle_msgs.srv import ChangeState
     from pam_actuation.nodes.valve_watchdog import ValveWatchdog
     node, said = ValveWatchdog(context=context, namespace='/muscle', enable_rosout=False), []
-    node.diagnostics.console.say = lambda word, time_ns, text: said.append(text)
+    node.get_logger = lambda: SimpleNamespace(warning=said.append, info=list)
     ask = node._service_change_state.callback
     try:
         for _ in range(5):
