@@ -172,6 +172,11 @@ class DriverLoop:
         self.safety.publishers = count
         self.safety.publisher_names = names and f': {names}'
 
+    def set_pressure_publishers(self, names: str) -> None:
+        """Tell who publishes pressure, '' for nobody: without a reading, that is no sensor."""
+        channel = self.safety.pressure
+        channel.sender = '' if channel.received else names
+
     def set_sender_fault(self, fault: tuple[str, str] | None) -> None:
         """Tell of a second sender: (key in ``FAULTS``, sentence), None where there is none."""
         self.safety.sender_fault = fault

@@ -112,7 +112,8 @@ class Channel:
 
     Attributes: ``stamp_ns`` and ``pressure_pa`` belong to the newest valid reading (None before
     the first), ``problem`` to the newest refused one ('' if none since). ``refused`` and
-    ``received`` count readings.
+    ``received`` count readings. ``sender`` names who publishes the topic, as far as known, while
+    no reading has arrived.
     """
 
     def __init__(self, oldest_s: float, ahead_s: float, lowest_pa: float,
@@ -124,7 +125,15 @@ class Channel:
         self.highest_pa = highest_pa
         self.received = 0
         self.refused = 0
+        self.sender = ''
         self.forget()
+
+    @property
+    def why(self) -> str:
+        """Return the end of a sentence on a missing reading: what is known of the reason."""
+        if self.problem:
+            return f'; the last one {self.problem}'
+        return self.sender and f'; {self.sender} publishes it, and nothing arrives'
 
     def forget(self) -> None:
         """Drop the reading (clock change, pause); the counters go on."""
@@ -136,6 +145,7 @@ class Channel:
     def offer(self, stamp_ns: int, pressure_pa: float, now_ns: int) -> bool:
         """Judge a reading; return True if it became the newest valid one."""
         self.received += 1
+        self.sender = ''
         self.implausible = not self.lowest_pa <= pressure_pa <= self.highest_pa     # so NaN
         problem = stamp_problem(stamp_ns, now_ns, self.oldest_s, self.ahead_s)
         if not math.isfinite(pressure_pa):

@@ -325,13 +325,13 @@ class SafetySupervisor:
     def _pressure_fault(self, now_ns: int, grace_s: float) -> Fault | None:
         lim = self.limits
         channel = self.pressure
-        why = f'; the last one {channel.problem}' if channel.problem else ''
+        why = channel.why
         if not self._seen_pressure:
             # A sensor that has not been discovered yet is not the same as none.
             if 0 <= now_ns - self._first_tick_ns < lim.first_pressure_wait_s * NS_PER_S or (
                     self.needs_pressure and not channel.received):
                 return 'no_pressure', 'waiting for the first measured pressure' + why
-            if channel.received:        # nor is one that is broken
+            if channel.received or channel.sender:      # nor one that is broken or not received
                 return 'pressure_timeout', 'no valid measured pressure since the start' + why
             self.warn('no_pressure_ppr',
                       'no measured pressure, so over-pressure is not supervised', now_ns)

@@ -325,6 +325,7 @@ class ValveDriver(ManagedNode):
             self.ear.publishers(topic, subscription.topic) for topic, subscription in (
                 ('pressure_command', self.commands), ('valve_command', self.raw_commands))
             if subscription))
+        self.loop.set_pressure_publishers(self.ear.publishers('pressure', self.pressures.topic)[1])
 
     def _on_emergency_stop(self, request: Any, response: Any) -> Any:
         with self.loops.lock:

@@ -17,6 +17,7 @@
 import math
 
 from pam_actuation.drivers.decision import OK, VENTED, WAITING
+from pam_actuation.drivers.loop import DriverLoop
 from pam_actuation.drivers.monitors import stamp_problem
 from pam_actuation.drivers.safety import SafetySupervisor
 from pam_sim.units import P_ATM_PA
@@ -43,6 +44,28 @@ def test_a_sensor_that_never_read_validly_is_not_the_same_as_none(bad, word, nee
         assert word in decision.message and decision.level == 2
     bench.pressure = P_ATM_PA + 100e3
     assert bench.last(20).state == OK
+
+
+def test_a_sensor_that_publishes_and_does_not_arrive_is_not_the_same_as_none():
+    """As one that sends best effort, or another type: who has it believes in its limit."""
+    bench = Bench(needs_pressure=False)
+    bench.pressure = None
+    loop = DriverLoop('ppr')
+    loop.safety = bench.safety
+    loop.set_pressure_publishers('/lab/sensor')
+    assert bench.last(1900).state == WAITING
+    decision = bench.last(1000)
+    assert decision.state == VENTED and decision.fault == 'pressure_timeout'
+    assert decision.message.endswith(
+        'since the start; /lab/sensor publishes it, and nothing arrives')
+    loop.set_pressure_publishers('')            # it ended: now there is none
+    assert 'not supervised' in bench.last(200).message
+    bench.pressure = P_ATM_PA + 100e3
+    assert bench.last(20).state == OK
+    loop.set_pressure_publishers('/lab/sensor')     # of which something arrived
+    bench.pressure = None
+    decision = bench.last(300)
+    assert decision.fault == 'pressure_timeout' and 'nothing arrives' not in decision.message
 
 
 def test_a_sensor_whose_clock_is_off_is_not_the_same_as_none():
