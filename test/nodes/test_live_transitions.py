@@ -162,5 +162,6 @@ def test_the_kind_of_time_is_not_changed_while_running_and_the_terminal_tells_wh
         'use_sim_time', value=True).to_parameter_msg()])
     result, = rig.call(SetParameters, 'valve_driver/set_parameters', request).results
     assert not result.successful and 'read when the node starts' in result.reason
-    said = rig.processes['valve_driver'].log_file.read_text(encoding='utf-8')
-    assert re.search(r'\[ERROR\] \[.*\] \[muscle.valve_driver\]: .*emergency stop', said), said
+    log = rig.processes['valve_driver'].log_file        # a thread of its own writes there
+    wait_for(lambda: re.search(r'\[ERROR\] \[.*\] \[muscle.valve_driver\]: .*emergency stop',
+                               log.read_text(encoding='utf-8')), 10.0, 'the line')
