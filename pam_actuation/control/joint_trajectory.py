@@ -26,8 +26,10 @@ import math
 from pam_actuation.control.modes.tracked import JOINT
 from pam_actuation.messages import AngleTrajectory
 from pam_sim.errors import InputError
+from pam_sim.units import NS_PER_S
 
 TOLERANCE_RAD = 0.02        # beyond the stops: a set point at the stop may be rounded
+MOST_S = 3600.0             # of a trajectory, waiting included: a stamp of another clock is later
 # Time from the start [ns], positions, velocities (perhaps none).
 Point = tuple[int, Sequence[float], Sequence[float]]
 WHERE = 'joint_trajectory'
@@ -63,8 +65,9 @@ def angle_trajectory(stamp_ns: int, names: tuple[str, ...], points: Sequence[Poi
     Raises
     ------
     InputError
-        Another joint, no points, lengths that do not fit, times that do not rise or lie in the
-        past, angles that are not finite or out of range, rates that no joint has.
+        Another joint, no points, lengths that do not fit, times that do not rise, lie in the
+        past or are more than an hour ahead, angles that are not finite or out of range, rates
+        that no joint has.
 
     """
     column = _column(names, joint)
@@ -98,6 +101,11 @@ def angle_trajectory(stamp_ns: int, names: tuple[str, ...], points: Sequence[Poi
         raise InputError('has no points', WHERE)
     if begin_ns + times[-1] < now_ns:
         raise InputError('lies in the past', WHERE)
+    ahead_s = (begin_ns + times[-1] - now_ns) / NS_PER_S
+    if ahead_s > MOST_S:
+        raise InputError(
+            f'ends in {ahead_s:.0f} s, allowed are {MOST_S:g} s; is header.stamp of another '
+            'clock?', WHERE)
     if begin_ns + times[0] > now_ns and math.isfinite(present_rad):
         times.insert(0, now_ns - begin_ns)
         angles.insert(0, min(max(present_rad, range_rad[0]), range_rad[1]))

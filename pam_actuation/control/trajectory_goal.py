@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import math
 
 from pam_actuation.control.course import Course, joined
-from pam_actuation.control.joint_trajectory import TOLERANCE_RAD
+from pam_actuation.control.joint_trajectory import MOST_S, TOLERANCE_RAD
 from pam_actuation.control.modes.tracked import JOINT
 from pam_actuation.messages import AngleTrajectory, NamedTrajectory
 from pam_sim.units import NS_PER_S
@@ -34,7 +34,6 @@ SUCCESSFUL, INVALID_GOAL, INVALID_JOINTS, OLD_HEADER_TIMESTAMP = 0, -1, -2, -3
 PATH_TOLERANCE_VIOLATED, GOAL_TOLERANCE_VIOLATED = -4, -5
 STEP_NS, AHEAD_NS = 20_000_000, 600_000_000     # of what is sent; the joint moves alone so long
 SILENT_NS = 500_000_000         # an angle that is older says nothing of the present one
-MOST_S = 3600.0                 # of a goal, waiting included
 SLACK_RAD = 1e-6                # at the stops, for angles that were rounded on their way
 
 

@@ -99,7 +99,9 @@ def test_a_whole_movement_counts_to_its_end_although_references_came_before():
     ({'points': ((0, (0.1, math.nan), ()),)}, 'nan rad is outside'),
     ({'points': ((0, (0.1, 0.1), (0.0, 57.3)),)},
      r'points\[0\]: velocity 57.3 rad/s is beyond what a joint does, -20 to 20 rad/s'),
-    ({'stamp_ns': NOW_NS - 200 * MS}, 'in the past')])
+    ({'stamp_ns': NOW_NS - 200 * MS}, 'in the past'),
+    ({'stamp_ns': NOW_NS + 86_400_000 * MS},
+     r'ends in 86400 s, allowed are 3600 s; is header.stamp of another clock\?')])
 def test_what_is_wrong_is_said(change, words):
     with pytest.raises(InputError, match=words):
         taken(**change)
