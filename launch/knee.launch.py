@@ -46,7 +46,7 @@ from pam_actuation.hardware.files import hardware_file
 from pam_actuation.namespaces import launch_namespace, name_in
 from pam_actuation.nodes.hardware_check import check_hardware
 from pam_actuation.nodes.launched import (
-    check_remaps, full_namespace, joint_nodes, launched_by, RigEnd, users_file)
+    check_remaps, check_time, full_namespace, joint_nodes, launched_by, RigEnd, users_file)
 from pam_actuation.rigging import layouts
 from pam_actuation.rigging.layouts import AWAITED_S, BY_SENSORS, BY_TOPIC, SIMULATED, TOPICS
 from pam_sim.joint import load_joint
@@ -217,6 +217,7 @@ def _note_names(context, end):
         given('experiment'), given('hardware'), given('joint'))
     seed = given('seed') or str(layouts.seed_in(place))
     check_remaps(context, place)
+    check_time(context, given)
     nodes = joint_nodes(given, place, int(seed), given('name'))
     check_hardware(nodes)
     noted = {'namespace': namespace, VALVE: valve, SEED: seed, EXPERIMENT: experiment,

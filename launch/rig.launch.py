@@ -41,7 +41,8 @@ from launch_ros.parameter_descriptions import ParameterValue
 from pam_actuation.hardware.files import hardware_file
 from pam_actuation.namespaces import launch_namespace
 from pam_actuation.nodes.hardware_check import check_hardware
-from pam_actuation.nodes.launched import full_namespace, launched_by, RigEnd, users_file
+from pam_actuation.nodes.launched import (
+    check_time, full_namespace, launched_by, RigEnd, users_file)
 from pam_actuation.nodes.pid_controller import PidNode
 from pam_actuation.rigging import layouts
 from pam_actuation.rigging.layouts import AWAITED_S, controller_node, NO_CONTROLLER
@@ -197,6 +198,7 @@ def _note_what_is_needed(context, end):
         return LaunchConfiguration(name).perform(context)
 
     end.shuts_launch_down = given('shutdown_at_end') == 'true'
+    check_time(context, given)
     kind, file = given('controller'), given('controller_file')
     experiment = layouts.experiment_of(given('experiment'), given('hardware'), OF_SIMULATION)
     is_simulated = given('hardware') == SIMULATED

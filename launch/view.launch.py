@@ -33,6 +33,7 @@ from launch.events import Shutdown
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
+from pam_actuation.nodes.launched import check_time
 from pam_actuation.rigging.model_view import check_installed
 from pam_actuation.rigging.model_view import model_view
 
@@ -68,6 +69,7 @@ def _programs(context):
     def given(name):
         return LaunchConfiguration(name).perform(context)
 
+    check_time(context, given)
     programs = model_view(
         given('rig'), given('namespace'), given('muscle'), given('rviz') == 'true',
         given('use_sim_time') == 'true')

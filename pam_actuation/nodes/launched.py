@@ -117,6 +117,22 @@ def check_remaps(context: Any, place: str) -> None:
                 f'as {place}/{SIDES[0]}/{name}', f'remap of {name}')
 
 
+def check_time(context: Any, given: Given) -> None:
+    """
+    Raise InputError where a SetParameter around a rig says another time than its argument.
+
+    What a launch file states of its nodes counts: they would follow another clock than the rest.
+    """
+    around: dict[str, Any] = dict(
+        one for one in context.launch_configurations.get('global_params', ())
+        if isinstance(one, tuple))          # others are names of files
+    stated, asked = around.get('use_sim_time'), given('use_sim_time')
+    if stated is not None and str(stated).lower() != asked:
+        raise InputError(
+            f'is {str(stated).lower()} by a SetParameter around this launch file, and {asked} by '
+            f'its argument; give use_sim_time:={str(stated).lower()} as well', 'use_sim_time')
+
+
 def joint_nodes(given: Given, place: str, seed: int, name: str = '') -> 'list[NodeSpec]':
     """
     Return the nodes that the arguments of the launch file of a joint lead to.

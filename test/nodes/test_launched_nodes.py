@@ -25,7 +25,7 @@ from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription  # no
 from launch.actions import OpaqueFunction, SetLaunchConfiguration           # noqa: E402
 from launch.launch_description_sources import PythonLaunchDescriptionSource  # noqa: E402
 from launch.utilities import perform_substitutions                          # noqa: E402
-from launch_ros.actions import Node, SetRemap                               # noqa: E402
+from launch_ros.actions import Node, SetParameter, SetRemap                 # noqa: E402
 from launch_ros.utilities import evaluate_parameters                        # noqa: E402
 from pam_actuation.namespaces import node_name_of                          # noqa: E402
 from pam_actuation.nodes.interfaces import node_class                       # noqa: E402
@@ -221,6 +221,20 @@ def test_simulated_time_is_that_of_all_nodes(installed):
     for file in ('rig.launch.py', 'knee.launch.py', 'view.launch.py'):
         nodes = described(file, use_sim_time='true')
         assert nodes and all(parameters['use_sim_time'] is True for parameters in nodes.values())
+
+
+@pytest.mark.parametrize('file', ['rig.launch.py', 'knee.launch.py', 'view.launch.py'])
+def test_a_time_that_is_stated_around_a_rig_is_not_overruled(file, installed):
+    """The argument counts, so that the rig would follow another clock than the rest."""
+    for stated, given in ((True, 'false'), (False, 'true'), (True, 'true'), (False, 'false')):
+        context = launch.LaunchContext()
+        SetParameter('use_sim_time', stated).execute(context)
+        if stated is (given == 'true'):
+            nodes = described(file, context, use_sim_time=given)
+            assert {one['use_sim_time'] for one in nodes.values()} == {stated}
+        else:
+            with pytest.raises(InputError, match=f'is {str(stated).lower()} by a SetParameter'):
+                described(file, context, use_sim_time=given)
 
 
 @pytest.mark.parametrize('controller, node', [
