@@ -46,7 +46,8 @@ from pam_actuation.hardware.files import hardware_file
 from pam_actuation.namespaces import launch_namespace, name_in
 from pam_actuation.nodes.hardware_check import check_hardware
 from pam_actuation.nodes.launched import (
-    check_remaps, check_time, full_namespace, joint_nodes, launched_by, RigEnd, users_file)
+    check_around, check_remaps, check_time, full_namespace, joint_nodes, launched_by, RigEnd,
+    users_file)
 from pam_actuation.rigging import layouts
 from pam_actuation.rigging.layouts import AWAITED_S, BY_SENSORS, BY_TOPIC, SIMULATED, TOPICS
 from pam_sim.joint import load_joint
@@ -220,6 +221,7 @@ def _note_names(context, end):
     check_time(context, given)
     nodes = joint_nodes(given, place, int(seed), given('name'))
     check_hardware(nodes)
+    check_around(context, given, nodes)
     noted = {'namespace': namespace, VALVE: valve, SEED: seed, EXPERIMENT: experiment,
              NAME: given('name') or name_in(place),
              HARDWARE_FILE: hardware_file(given('hardware')),

@@ -42,7 +42,7 @@ from pam_actuation.hardware.files import hardware_file
 from pam_actuation.namespaces import launch_namespace
 from pam_actuation.nodes.hardware_check import check_hardware
 from pam_actuation.nodes.launched import (
-    check_time, full_namespace, launched_by, RigEnd, users_file)
+    check_around, check_time, full_namespace, launched_by, RigEnd, users_file)
 from pam_actuation.nodes.pid_controller import PidNode
 from pam_actuation.rigging import layouts
 from pam_actuation.rigging.layouts import AWAITED_S, controller_node, NO_CONTROLLER
@@ -219,6 +219,7 @@ def _note_what_is_needed(context, end):
         given('output') if recorded == 'true' else '',
         given('accept_other_rig') == 'true', name=given('name'), seed=int(seed))
     check_hardware(nodes)
+    check_around(context, given, nodes)
     noted = {VALVE: valve, SEED: seed, EXPERIMENT: experiment,
              HARDWARE_FILE: hardware_file(given('hardware')),
              CONTROLLER: controller_node(name) if name else NO_CONTROLLER, CONTROLLER_NAME: name,

@@ -112,6 +112,36 @@ def check_users_file(file: str, nodes: Iterable[NodeSpec],
     return elsewhere if alone else []
 
 
+def check_stated_around(around: Sequence[tuple[str, object] | str], nodes: Iterable[NodeSpec],
+                        users_file: str = '') -> None:
+    """
+    Check what the launch files around say of all nodes.
+
+    ``around``: (name, value) of each SetParameter and the path of each SetParametersFromFile, the
+    last of which counts. ``users_file``: of the argument ``params_file``, '' for none.
+
+    Raises
+    ------
+    InputError
+        That file, or the file of hardware of a node, states another value, which would count.
+
+    """
+    for node in nodes:
+        full_name, stated = node_name_of(node.name, node.namespace), dict[str, object]()
+        for one in around:
+            if isinstance(one, tuple):
+                stated.update([one])
+            elif holds_parameters(tree := load_yaml(one)):
+                stated |= {name: values[-1] for name, values in _stated(full_name, tree).items()}
+        for file in filter(None, (node.parameter_file, users_file)):
+            for name, values in _stated(full_name, load_yaml(file)).items():
+                if name in stated and values[-1] != stated[name]:
+                    raise InputError(
+                        f'{stated[name]!r} of a launch file around is not what {file} states for '
+                        f'{full_name}, {values[-1]!r}, which would count; state it in one of the '
+                        'two', f'parameter {name}')
+
+
 def _stated(full_name: str, tree: Located) -> dict[str, list[object]]:
     """Return what a file states of each parameter of a node."""
     stated: dict[str, list[object]] = {}

@@ -27,7 +27,7 @@ from launch.events import matches_action, Shutdown
 from launch.events.process import ShutdownProcess
 from launch_ros.actions import SetParametersFromFile
 from pam_actuation.bags.ending import ERROR, INTERRUPTED, REFERENCE, tell_recorder
-from pam_actuation.nodes.hardware_check import check_users_file
+from pam_actuation.nodes.hardware_check import check_stated_around, check_users_file
 from pam_actuation.rigging import layouts
 from pam_actuation.rigging.processes import LAUNCHED_BY
 from pam_actuation.topics.table import OF_A_RUN
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 
 Given = Callable[[str], str]            # the value of a launch argument
 Handler = Callable[[Any, Any], list[Any]]
+_FILES_OF_RIGS: set[Any] = set()        # handed to nodes by these launch files
 SHARED = 'supply_pressure', 'controller_state'      # one supply may feed both muscles
 
 
@@ -133,6 +134,15 @@ def check_time(context: Any, given: Given) -> None:
             f'its argument; give use_sim_time:={str(stated).lower()} as well', 'use_sim_time')
 
 
+def check_around(context: Any, given: Given, nodes: 'Iterable[NodeSpec]') -> None:
+    """Raise InputError where a file of an argument overrules what a launch file around says."""
+    around = [one if isinstance(one, tuple) else os.path.abspath(one) for one in (
+        context.launch_configurations.get('global_params', ()))]
+    # A list that was there before a group keeps what is added within: the file of another rig.
+    check_stated_around([one for one in around if one not in _FILES_OF_RIGS], nodes,
+                        given('params_file'))
+
+
 def joint_nodes(given: Given, place: str, seed: int, name: str = '') -> 'list[NodeSpec]':
     """
     Return the nodes that the arguments of the launch file of a joint lead to.
@@ -189,4 +199,5 @@ def users_file(given: Given, nodes: 'Iterable[NodeSpec]', alone: bool = True) ->
         'learning': given('learning') == 'true',
         'use_sim_time': given('use_sim_time') == 'true',
         'realtime_priority': int(given('realtime_priority'))}, alone)
+    _FILES_OF_RIGS.add(os.path.abspath(file))
     return [*(LogInfo(msg=f'remark: {text}') for text in remarks), SetParametersFromFile(file)]

@@ -25,7 +25,8 @@ from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription  # no
 from launch.actions import OpaqueFunction, SetLaunchConfiguration           # noqa: E402
 from launch.launch_description_sources import PythonLaunchDescriptionSource  # noqa: E402
 from launch.utilities import perform_substitutions                          # noqa: E402
-from launch_ros.actions import Node, SetParameter, SetRemap                 # noqa: E402
+from launch_ros.actions import Node, SetParameter, SetParametersFromFile    # noqa: E402
+from launch_ros.actions import SetRemap                                     # noqa: E402
 from launch_ros.utilities import evaluate_parameters                        # noqa: E402
 from pam_actuation.namespaces import node_name_of                          # noqa: E402
 from pam_actuation.nodes.interfaces import node_class                       # noqa: E402
@@ -235,6 +236,30 @@ def test_a_time_that_is_stated_around_a_rig_is_not_overruled(file, installed):
         else:
             with pytest.raises(InputError, match=f'is {str(stated).lower()} by a SetParameter'):
                 described(file, context, use_sim_time=given)
+
+
+@pytest.mark.parametrize('by_file', [False, True])
+@pytest.mark.parametrize('argument', ['hardware', 'params_file'])
+@pytest.mark.parametrize('launch_file', ['rig.launch.py', 'knee.launch.py'])
+def test_a_limit_that_is_stated_around_a_rig_is_not_overruled(
+        launch_file, argument, by_file, tmp_path):
+    """The file of an argument counts, with a higher limit than the stack states."""
+    hardware, limits = tmp_path / 'hardware.yaml', tmp_path / 'limits.yaml'
+    hardware.write_text('/**/valve_driver: {ros__parameters: {max_pressure_gauge_pa: 5e+5}}\n')
+    if argument == 'hardware':
+        hardware.write_text(
+            '/**: {ros__parameters: {backend: dummy, max_pressure_gauge_pa: 5e+5}}\n')
+    for limit_pa in (3e5, 5e5):
+        limits.write_text(
+            f'/**/valve_driver: {{ros__parameters: {{max_pressure_gauge_pa: {limit_pa}}}}}\n')
+        context = launch.LaunchContext()
+        (SetParametersFromFile(str(limits)) if by_file else SetParameter(
+            'max_pressure_gauge_pa', limit_pa)).execute(context)
+        if limit_pa == 5e5:
+            assert described(launch_file, context, **{argument: str(hardware)})
+        else:
+            with pytest.raises(InputError, match='300000.0 of a launch file around is not what '):
+                described(launch_file, context, **{argument: str(hardware)})
 
 
 @pytest.mark.parametrize('controller, node', [
