@@ -126,7 +126,8 @@ FAULT_TABLE = (
           'followed', VENT, True, 'service ~/reset, then the next command'),
     Fault('no_pressure', 'No measured pressure yet',
           f'no valid pressure in the first {_LIMITS.first_pressure_wait_s:g} s '
-          '(first_pressure_wait_s); HSV: nothing on pressure since start',
+          '(first_pressure_wait_s); HSV: nothing on pressure since start; PPR: the same where '
+          'somebody publishes it, as in another quality of service or type',
           VENT, False, 'first valid reading, ' + _RAMP),
     Fault('no_pressure_ppr', 'No measured pressure at all',
           f'PPR: nothing on pressure in the first {_LIMITS.first_pressure_wait_s:g} s, and '
@@ -134,8 +135,7 @@ FAULT_TABLE = (
           'warning, over-pressure is not supervised; ends with the first valid reading'),
     Fault('pressure_timeout', 'Measured pressure lost',
           f'newest valid pressure older than {_LIMITS.measurement_timeout_s:g} s, or none in the '
-          f'first {_LIMITS.first_pressure_wait_s:g} s although there are readings or a publisher '
-          'of which nothing arrives, as of another quality of service or type (sensor lost; '
+          f'first {_LIMITS.first_pressure_wait_s:g} s although there are readings (sensor lost; '
           f'or only readings that are NaN, below {_LIMITS.lowest_plausible_gauge_pa * 1e-3:g} kPa '
           f'gauge, above {_LIMITS.highest_plausible_pa * 1e-3:g} kPa absolute, or stamped more '
           f'than {_LIMITS.stamp_ahead_s:g} s ahead)', VENT, False, 'next valid reading, ' + _RAMP),

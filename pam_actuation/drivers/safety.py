@@ -329,9 +329,9 @@ class SafetySupervisor:
         if not self._seen_pressure:
             # A sensor that has not been discovered yet is not the same as none.
             if 0 <= now_ns - self._first_tick_ns < lim.first_pressure_wait_s * NS_PER_S or (
-                    self.needs_pressure and not channel.received):
+                    (self.needs_pressure or channel.sender) and not channel.received):
                 return 'no_pressure', 'waiting for the first measured pressure' + why
-            if channel.received or channel.sender:      # nor one that is broken or not received
+            if channel.received:        # nor is one that is broken
                 return 'pressure_timeout', 'no valid measured pressure since the start' + why
             self.warn('no_pressure_ppr',
                       'no measured pressure, so over-pressure is not supervised', now_ns)
