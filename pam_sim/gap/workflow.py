@@ -25,11 +25,10 @@ from pam_sim.gap.criteria import CRITERIA, Criteria
 from pam_sim.gap.data.beyond_table import beyond_table
 from pam_sim.gap.data.checked import checked_runs, recording_of
 from pam_sim.gap.data.recording import Recording
-from pam_sim.gap.data.speeds import moves_at_one_speed
-from pam_sim.gap.data.split import FIT, SELECT
 from pam_sim.gap.data.supply import with_recorded_supply
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.plan.detectable import sizes_or_reasons
+from pam_sim.gap.proof import Prover
 from pam_sim.gap.propose.proposal import propose
 from pam_sim.gap.propose.surrogate import add_surrogate
 from pam_sim.gap.report.by_subsystem import add_place, subsystem_verdicts
@@ -41,13 +40,10 @@ from pam_sim.gap.report.units_seen import unit_remarks
 from pam_sim.gap.result import GapResult
 from pam_sim.gap.select.beginnings import promise_of_more
 from pam_sim.gap.select.context import context_of, SearchContext
-from pam_sim.gap.select.memory import as_sets, memories
-from pam_sim.gap.select.refit import within_ranges
-from pam_sim.gap.select.search import search
+from pam_sim.gap.select.memory import memories
 from pam_sim.gap.subsystems.problems import subsystem_problems
 from pam_sim.gap.subsystems.pulses_seen import shows_pulses
 from pam_sim.gap.verdict import decide, is_clear
-from pam_sim.gap.verify.confirmed import confirmed
 from pam_sim.gap.verify.materiality import materiality_on
 from pam_sim.gap.verify.validation import Validation
 from pam_sim.rig import Rig
@@ -216,31 +212,13 @@ def _answered(runs: Run | Sequence[Run], rig: Rig, certify: Run | None, options:
             context, context.base, p) > criteria.close_share for p in context.problems):
         result.simulations = estimator.simulations
         return result, None
-    outcome = search(context, only_singly)
-    progress(0.8)
-    estimator.use = (FIT, SELECT)
-    # What a fit does not touch stays as calibrated now.
-    base = estimator.base = estimator.fit_base()
-    progress(0.84)
-    final = base
-    if outcome.final.hypothesis.names:
-        final = within_ranges(context, estimator.polish(outcome.final))
-    progress(0.88)
-    one_speed = moves_at_one_speed(recordings, criteria)
-    # A proof at another speed tells creep from hysteresis, one at the same speed does not.
-    same_speed = one_speed and moves_at_one_speed([*recordings, held_out], criteria)
-    if one_speed and not same_speed:
-        outcome.named = as_sets(context, outcome.named, final)
-    outcome.named, validation, harms, unconfirmed = confirmed(
-        outcome.named, Validation(
-            held_out, is_certify, estimator, base, final, options.seed))
-    result.remarks += unconfirmed
-    progress(0.92)
-    if same_speed:
-        outcome.named = as_sets(context, outcome.named, validation.final)
+    prover = Prover(context, recordings, held_out, is_certify, options.seed, progress)
+    proof = prover.best(only_singly)
+    outcome, validation, harms = proof.outcome, proof.validation, proof.harms
+    result.remarks += proof.remarks
     own_runs = decide(result, outcome, validation, materiality)
     validation = own_runs.validation
-    result.at_one_speed = one_speed and set(memories()) <= set(result.ambiguity_set)
+    result.at_one_speed = prover.one_speed and set(memories()) <= set(result.ambiguity_set)
     result.subsystems = subsystem_verdicts(
         result, outcome.named, own_runs, criteria, materiality)
     result.where = places(result, outcome, own_runs)

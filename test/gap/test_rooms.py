@@ -25,7 +25,7 @@ import pytest
 
 FOLDER = Path(__file__).resolve().parents[2] / 'pam_sim' / 'gap'
 ROOMS = ('criteria', 'words', 'share', 'data', 'result', 'subsystems', 'fit', 'select', 'verify',
-         'report', 'plan', 'verdict', 'propose', 'workflow', '__init__')
+         'proof', 'report', 'plan', 'verdict', 'propose', 'workflow', '__init__')
 
 
 def room_of(path):

@@ -36,8 +36,8 @@ from pam_sim.gap.subsystems.problem import SubsystemProblem
 BEGINNINGS = 2               # effort: so many other first effects of a subsystem
 
 
-def begun_otherwise(context: SearchContext, selected: Selected, first: Sequence[NamedEffect]
-                    ) -> Selected:
+def begun_otherwise(context: SearchContext, selected: Selected, first: Sequence[NamedEffect],
+                    refuted: bool = False) -> Selected:
     """
     Return what a search finds that begins with another effect, if that leaves nothing open.
 
@@ -49,6 +49,8 @@ def begun_otherwise(context: SearchContext, selected: Selected, first: Sequence[
         What the search has found.
     first : list of NamedEffect
         What its forward selection added, in that order, with the rivals of each.
+    refuted : bool
+        Whether the proof leaves much of what is named, though the searched data leave little.
 
     """
     for problem in context.problems:
@@ -60,8 +62,12 @@ def begun_otherwise(context: SearchContext, selected: Selected, first: Sequence[
                          and r.share.get(s, 0.0) >= context.criteria.first_gain),
                         key=lambda r: -r.share[s])
         for rival in likely[:BEGINNINGS]:
-            if _leaves_more(context, problem, selected) and not context.out_of_time():
-                selected = _better(context, problem, selected, best, rival)
+            if context.out_of_time():
+                break
+            if refuted or _leaves_more(context, problem, selected):
+                found = _better(context, problem, selected, best, rival)
+                refuted = refuted and found is selected
+                selected = found
     return selected
 
 

@@ -52,6 +52,8 @@ class Outcome:
         All candidates at the baseline.
     mistaken : dict of str -> str
         Names that were dropped for an effect that explains more and is none of them.
+    first : list of NamedEffect
+        What the forward selection added at first, with the rivals of each.
 
     """
 
@@ -62,6 +64,7 @@ class Outcome:
     complete: bool = True
     screened: tuple[Screened, ...] = ()
     mistaken: dict[str, str] = field(default_factory=dict)
+    first: list[NamedEffect] = field(default_factory=list)
 
 
 def search(context: SearchContext, only_singly: bool = False) -> Outcome:
@@ -87,10 +90,26 @@ def search(context: SearchContext, only_singly: bool = False) -> Outcome:
         few = any(p.is_dealt_short for p in context.problems)
         selected = _grouped(every if few else context, selected)
         selected = begun_otherwise(every, selected, first)
+    return _outcome(context, selected, first)
+
+
+def searched_again(context: SearchContext, outcome: Outcome) -> Outcome:
+    """
+    Return what is found that begins with another effect, where the proof refutes what was.
+
+    The same outcome where no other beginning explains the searched data clearly better.
+    """
+    before = Selected(outcome.final, outcome.named, outcome.share, outcome.mistaken)
+    after = begun_otherwise(context, before, outcome.first, refuted=True)
+    return outcome if after is before else _outcome(context, after, outcome.first)
+
+
+def _outcome(context: SearchContext, selected: Selected, first: list[NamedEffect]) -> Outcome:
+    """Return the Outcome of what is selected, with the numbers that hide a gap."""
     fit, named, explained = with_wrong_numbers(
         context, selected.fit, selected.named, selected.explained)
     return Outcome(context.base, fit, named, explained, not context.out_of_time(),
-                   context.screened, selected.mistaken)
+                   context.screened, selected.mistaken, first)
 
 
 def _paired(context: SearchContext, selected: Selected) -> Selected:
