@@ -32,6 +32,7 @@ from pam_sim.gap.proof import Prover
 from pam_sim.gap.propose.proposal import propose
 from pam_sim.gap.propose.surrogate import add_surrogate
 from pam_sim.gap.report.by_subsystem import add_place, subsystem_verdicts
+from pam_sim.gap.report.exact_numbers import exact_numbers, LEAST_LEFT
 from pam_sim.gap.report.fingerprint import fingerprint
 from pam_sim.gap.report.late_force import late_force
 from pam_sim.gap.report.place import places
@@ -230,6 +231,9 @@ def _answered(runs: Run | Sequence[Run], rig: Rig, certify: Run | None, options:
         outcome.screened, rig, [s for p in estimator.problems for s in p.signals], materiality)
     if result.verdict in WANTING and (late := late_force(own_runs, criteria)):
         result.remarks.append(late)
+    if result.unexplained_fraction > LEAST_LEFT:
+        result.remarks += exact_numbers(
+            estimator, context.base, checked.certify_runs, options.seed)
     result.reason = explain(result, outcome, harms, bool(options.effects))
     if not outcome.complete:
         result.reason += CUT_SHORT.format(options.seconds)
