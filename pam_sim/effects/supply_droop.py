@@ -37,12 +37,26 @@ from pam_sim.units import GAS_CONSTANT_AIR, TEMPERATURE_K
 _SMALLEST_M3 = 1e-6         # below, one step would empty it
 
 
-def _pack(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
-    volume, full = values['reservoir_volume_m3'], numbers.parameters['supply_pa']
+def pa_per_kg(values: Mapping[str, float], name: str) -> float:
+    """
+    Return by how much a reservoir changes per mass of air [Pa/kg].
+
+    Raises
+    ------
+    InputError
+        It has a volume so small that one step would empty it. The text names the effect.
+
+    """
+    volume = values['reservoir_volume_m3']
     if volume < _SMALLEST_M3:
         raise InputError(f'`reservoir_volume_m3` is {volume:g}; allowed 0 (no reservoir) or at '
-                         f'least {_SMALLEST_M3:g} m3', 'supply_droop')
-    return {'pa_per_kg': GAS_CONSTANT_AIR * TEMPERATURE_K / volume,
+                         f'least {_SMALLEST_M3:g} m3', name)
+    return GAS_CONSTANT_AIR * TEMPERATURE_K / volume
+
+
+def _pack(values: Mapping[str, float], numbers: Numbers) -> dict[str, Any]:
+    full = numbers.parameters['supply_pa']
+    return {'pa_per_kg': pa_per_kg(values, 'supply_droop'),
             'compressor_flow_kg_per_s': values['compressor_flow_kg_per_s'],
             'low_pa': full - values['band_pa'], 'high_pa': full}
 
@@ -55,7 +69,7 @@ EFFECT = Effect(
     name='supply_droop',
     family='loss',
     subsystem='valve',
-    sentence='The supply pressure falls with use until a compressor refills the reservoir.',
+    sentence='The supply pressure falls with use until the reservoir is refilled.',
     source='Mass balance of the reservoir; two-point control of the compressor (design values).',
     equation='V_r dp_s/dt = R T (mdot_compressor - mdot_fill), compressor on below p_s0 - '
              'band, off at p_s0',

@@ -17,6 +17,7 @@
 from gap_runs import recorded
 import numpy as np
 from pam_sim import load_rig
+from pam_sim.gap import find_gap
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.supply import with_recorded_supply
 from pam_sim.gap.fit.estimator import Estimator
@@ -48,11 +49,16 @@ def context(preset, conductance, reservoir, with_supply):
                       ['supply_droop'])
 
 
+def with_compressor(found):
+    """Return the candidate whose reservoir a compressor refills."""
+    return next(c for c in found.pool if c.effect == 'supply_droop')
+
+
 def fitted(found):
     """Return (parameters of the reservoir, squared errors before and with it)."""
-    droop, = found.pool
-    fit = found.estimator.polish(found.estimator.fit(
-        Hypothesis((droop,)), found.screened[0].start))
+    droop = with_compressor(found)
+    start = next(s.start for s in found.screened if s.candidate == droop)
+    fit = found.estimator.polish(found.estimator.fit(Hypothesis((droop,)), start))
     return fit.settings()[0]['parameters'], found.estimator.cost(found.base), (
         found.estimator.cost(fit))
 
@@ -74,7 +80,7 @@ def test_the_recorded_supply_pressure_shows_the_compressor(preset, conductance, 
 
 def test_a_compressor_that_did_not_run_stays_nominal():
     found = context('dmsp_5_300_hanging_mass', 1.8e-10, (1e-3, 100e3, 2e-4), True)
-    droop, = found.pool
+    droop = with_compressor(found)
     assert [f.name for f in droop.free] == ['reservoir_volume_m3'] and found.left_out == ()
     assert fitted(found)[0]['reservoir_volume_m3'] == pytest.approx(1e-3, rel=0.1)
 
@@ -85,3 +91,16 @@ def test_without_a_recorded_supply_pressure_it_is_said_what_was_tried(conductanc
     found = context('dmsp_20_300_hanging_mass', conductance, (2e-3, 100e3, 0.6e-3), False)
     values, before, after = fitted(found)
     assert told in found.left_out[0] and after < 0.1 * before
+
+
+@pytest.mark.parametrize('volume_m3, refill_time_s', [(5e-4, 1.0), (2e-3, 3.0)])
+def test_a_reservoir_that_a_line_refills_is_named_with_its_size(volume_m3, refill_time_s):
+    given = load_rig('dmsp_20_300_hanging_mass', valve='hsv').with_(parameters={'C': 1e-9})
+    true = given.with_(effects=[{'name': 'supply_droop_line', 'parameters': {
+        'reservoir_volume_m3': volume_m3, 'refill_time_s': refill_time_s}}])
+    found = find_gap(recorded(true, SIGNAL, rate_hz=100), given, unnamed=(),
+                     effects=['supply_droop', 'leakage', 'dead_volume'])
+    effect, = found.effects
+    assert found.verdict == 'effects' and effect['formulation'] == 'supply_droop_line'
+    low, high = effect['equivalent']['reservoir_volume_m3']['ci95']
+    assert low < volume_m3 < high < 1.5 * volume_m3

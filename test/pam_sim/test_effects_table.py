@@ -41,6 +41,7 @@ fill_closing_pressure_pa creep_rate_pa_per_s
 valve loss leakage conductance_m3_per_s_pa mass_flow_at_400kpa_kg_per_s
 valve loss leakage_slit conductance_m3_per_s_pa mass_flow_at_400kpa_kg_per_s
 valve loss supply_droop reservoir_volume_m3
+valve loss supply_droop_line reservoir_volume_m3
 valve volume dead_volume extra_volume_m3
 valve volume thermal heat_exchange_time_s
 muscle friction coulomb_friction force_n
@@ -91,7 +92,8 @@ def test_named_as_results_name_it(line):
     for parameter in effect.parameters:
         assert parameter.unit and parameter.description
         assert parameter.lower <= parameter.default <= parameter.upper
-    hsv_only = ('supply_droop', 'dead_volume', 'thermal', 'valve_dead_zone_two_ramps')
+    hsv_only = ('supply_droop', 'supply_droop_line', 'dead_volume', 'thermal',
+                'valve_dead_zone_two_ramps')
     ppr_only = ('valve_hysteresis', 'flow_limit', 'vent_bleed', 'regulator_overshoot',
                 'vent_bleed_fill_creep', 'valve_dead_time_by_direction')
     expected = ('hsv',) if name in hsv_only else ('ppr',) if name in ppr_only else ('ppr', 'hsv')

@@ -253,9 +253,25 @@ def test_the_compressor_works_within_its_band():
     assert np.allclose((rate * 2e-5 / RT + used)[running], 2e-4, rtol=1e-3)
 
 
-def test_a_reservoir_one_step_would_empty_is_refused():
-    with pytest.raises(InputError, match='at least'):
-        held('hsv', ('supply_droop', {'reservoir_volume_m3': 1e-7})).simulate(pulse())
+@pytest.mark.parametrize('fidelity', ['averaged', 'switching'])
+def test_a_line_refills_the_reservoir_the_quicker_the_lower_it_is(fidelity):
+    volume, tau_s = 2e-4, 0.4
+    rig = held('hsv', ('supply_droop_line', {
+        'reservoir_volume_m3': volume, 'refill_time_s': tau_s}), fidelity=fidelity)
+    response = rig.simulate(pulse(fill=0.3, vent=0.1, last=600, count=3000))
+    t, full = response.time_s, response.supply_pa[0]
+    flow = np.gradient(response.filled_kg, 1e-3)
+    expected = solve_ivp(lambda now, p: (full - p) / tau_s - RT / volume * np.interp(now, t, flow),
+                         (0.0, t[-1]), [full], t_eval=t, max_step=5e-4).y[0]
+    fall = full - response.supply_pa
+    assert fall.max() > 4e3 and fall[-1] < 0.01 * fall.max()
+    assert np.max(np.abs(response.supply_pa - expected)) < 0.02 * fall.max()
+
+
+@pytest.mark.parametrize('name', ['supply_droop', 'supply_droop_line'])
+def test_a_reservoir_one_step_would_empty_is_refused(name):
+    with pytest.raises(InputError, match=f'{name}.*at least|at least.*{name}'):
+        held('hsv', (name, {'reservoir_volume_m3': 1e-7})).simulate(pulse())
 
 
 def test_dead_volume_is_the_parameter_by_another_name():

@@ -48,8 +48,8 @@ FOUND = ('{} was tried with the compressor that the recorded supply pressure sho
 FITTED = ('{} was tried with a band of {:.3g} kPa and a compressor of some g/s that the '
           'search fits, for the valves take {:.2g} g/s; state {} and {} in the model, or record '
           'the supply pressure')
-NOMINAL = ('{} was tried with a compressor of {:.2g} g/s within {:.3g} kPa alone; state {} and {} '
-           'in the model if yours differs')
+NOMINAL = ('{} was tried with a compressor of {:.2g} g/s within {:.3g} kPa, and with a line that '
+           'refills the reservoir; state {} and {} in the model if your compressor differs')
 
 
 @dataclass(frozen=True)
