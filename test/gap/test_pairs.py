@@ -128,3 +128,7 @@ def test_names_that_the_proof_refutes_are_looked_for_once_more(monkeypatch):
     monkeypatch.setattr('pam_sim.gap.proof.searched_again', lambda _, outcome: outcome)
     once = find_gap(searched, given, longer, names, unnamed=())
     assert [e['name'] for e in once.effects] == ['leakage'] and once.unexplained_fraction > 0.1
+    # A term that explains all shows that the leak stood for something else.
+    less = find_gap(searched, given, longer, names[:2], unnamed=('term',))
+    assert [e['name'] for e in less.effects] == ['leakage'] and less.proposal.explained > 0.9
+    assert any(r.startswith('With this term, leakage shrinks to less') for r in less.remarks)

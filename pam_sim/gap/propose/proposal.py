@@ -26,6 +26,7 @@ from pam_sim.gap.propose.ranges import ranges_of, waves_in
 from pam_sim.gap.propose.search import find_terms, Sum
 from pam_sim.gap.propose.words import range_texts
 from pam_sim.gap.propose.writing import EffectText, NAME
+from pam_sim.gap.report.reason import join
 from pam_sim.gap.result import GapResult
 from pam_sim.gap.select.comparison import gap
 from pam_sim.gap.subsystems.problem import SubsystemProblem
@@ -39,6 +40,8 @@ EFFECT_FILE, MODEL_FILE = f'{NAME}.py', 'proposed_model.yaml'
 NONE = 'No simple term explains the rest on the data of the proof, so none is proposed.'
 OTHER_PLACE = ('The term acts in {}, the place above is another one. The place is judged without '
                'the term; the term is proved on data to which it was not fitted.')
+VANISH = ('With this term, {} {} to less than a tenth of the size above: the term may be what is '
+          'missing, in {} place.')
 NO_TIME = 'The time ran out before a simple term was found that explains the rest.'
 
 
@@ -142,11 +145,27 @@ def propose(result: GapResult, validation: Validation,
                 and not proof.worse()):
             result.proposal = _written(found, proof)
             result.remarks.append(result.proposal.sentence)
+            gone = _vanished(final, proved, 1.0 - criteria.named_share)
+            if gone:
+                result.remarks.append(VANISH.format(
+                    join(gone), *(('shrink', 'their') if len(gone) > 1 else ('shrinks', 'its'))))
             own = result.proposal.subsystem
             if result.where and result.where[0].subsystem != own:
                 result.remarks.append(OTHER_PLACE.format(place_in_words(own)))
             return
     result.remarks.append(NO_TIME if out_of_time() else NONE)
+
+
+def _vanished(named: Fit, with_term: Fit, share: float) -> list[str]:
+    """Return the names of effects that keep less than a share of their size beside a term."""
+    found = []
+    after = dict(zip(with_term.hypothesis.effects, with_term.values()))
+    for candidate, values in zip(named.hypothesis.effects, named.values()):
+        sizes = [(abs(values[p.name]), abs(after.get(candidate, values)[p.name]))
+                 for p in candidate.free if not p.shape]
+        if sizes and all(now < share * was for was, now in sizes):
+            found.append(candidate.name)
+    return found
 
 
 def _refitted(learning: Estimator, final: Fit) -> Fit:

@@ -19,8 +19,6 @@ The critical pressure ratio of a data sheet is such a number. Effects may stand 
 a little.
 """
 
-from collections.abc import Mapping
-
 from pam_sim.gap.fit.estimator import Estimator
 from pam_sim.gap.fit.hypothesis import Fit
 from pam_sim.gap.select.comparison import gap
@@ -79,10 +77,9 @@ def _freed(estimator: Estimator, problem: SubsystemProblem, parameter: Parameter
            certify_runs: int, seed: int) -> tuple[float, str]:
     """Return the share of the gap that a number explains once it is free, and the sentence."""
     name, rig = parameter.name, estimator.rig
-    tolerance: Mapping[str, float | str] = {**rig.tolerance, name: TRIED}
-    free = type(problem)(rig.with_(tolerance=tolerance), problem.recordings, certify_runs, seed,
-                         estimator.criteria)
-    found = Estimator(rig.with_(tolerance=tolerance), [free], estimator.criteria)
+    tolerant = rig.with_(tolerance={name: TRIED})
+    free = type(problem)(tolerant, problem.recordings, certify_runs, seed, estimator.criteria)
+    found = Estimator(tolerant, [free], estimator.criteria)
     known, z = next((k, z) for k, z in zip(free.known, found.base.known_z[free.subsystem])
                     if k.name == name)
     share = 1.0 - max(gap(free, found.base.errors[free.subsystem]), 0.0) / before
