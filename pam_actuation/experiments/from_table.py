@@ -21,6 +21,7 @@ import numpy as np
 from pam_actuation.experiments.chain import DOMAINS
 from pam_actuation.experiments.experiment import Experiment, load_experiment
 from pam_actuation.experiments.primitives.samples import MOST_VALUES
+from pam_actuation.experiments.smooth_path import smooth_path
 from pam_actuation.tables.clock import clock_of, time_column
 from pam_actuation.tables.mapping import ColumnMap, TableMapping
 from pam_actuation.tables.table import no_column_in, Table
@@ -34,8 +35,8 @@ DOMAIN_OF = {'contraction': 'contraction', 'reference': 'contraction', 'force': 
              'reference_force': 'force', 'angle': 'joint_angle', 'reference_angle': 'joint_angle',
              'pressure': 'pressure', 'pressure_command': 'pressure', 'ppr_voltage': 'ppr_voltage'}
 # (units of a person for each SI unit, name, decimals in the file) of each domain.
-SHOWN = {'contraction': (1e3, 'mm', 6), 'force': (1.0, 'N', 3),
-         'joint_angle': (180.0 / np.pi, 'deg', 5), 'pressure': (1e-3, 'kPa gauge', 0),
+SHOWN = {'contraction': (1e3, 'mm', 7), 'force': (1.0, 'N', 3),
+         'joint_angle': (180.0 / np.pi, 'deg', 6), 'pressure': (1e-3, 'kPa gauge', 0),
          'ppr_voltage': (1.0, 'V', 4)}
 FEWEST_ROWS = 4
 LEAST_STEP_S, USUAL_STEP_S = 0.001, 0.01     # the reference is sent 100 times a second
@@ -178,7 +179,6 @@ def _rows(table: Table, mapping: TableMapping, column: str, one: ColumnMap, moti
 def _moved(t_s: FloatArray, values: FloatArray, motion: Motion, span: Sequence[float] | None,
            where: str) -> tuple[FloatArray, FloatArray, list[str]]:
     """Return the motion at equal distances of time, closed, smoothed and in its range, SI."""
-    from scipy.interpolate import PchipInterpolator
     if motion.period_s is not None:
         t_s = t_s * (motion.period_s / t_s[-1])
     duration_s = float(t_s[-1])
@@ -187,7 +187,7 @@ def _moved(t_s: FloatArray, values: FloatArray, motion: Motion, span: Sequence[f
                          f'{2.0 * USUAL_STEP_S:g} s are needed', where)
     step_s = float(np.clip(np.median(np.diff(t_s)), LEAST_STEP_S, USUAL_STEP_S))
     fine_s = np.linspace(0.0, duration_s, round(duration_s / step_s) + 1)
-    path = PchipInterpolator(t_s, values)(fine_s)
+    path = np.clip(smooth_path(t_s, values)(fine_s), values.min(), values.max())
     told: list[str] = []
     repeats = motion.cycles > 1
     if repeats:
@@ -202,7 +202,8 @@ def _moved(t_s: FloatArray, values: FloatArray, motion: Motion, span: Sequence[f
         told.append(f'one value each {1e3 * duration_s / count:.0f} ms, so that the file does '
                     'not become too long')
     at_s = np.linspace(0.0, duration_s, count + 1)
-    path = np.interp(at_s, fine_s, path)
+    low, high = float(path.min()), float(path.max())
+    path = np.clip(smooth_path(fine_s, path, repeats)(at_s), low, high)
     if span is not None:
         low, high = float(path.min()), float(path.max())
         if high - low <= 0.0:

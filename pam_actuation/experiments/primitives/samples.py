@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from pam_actuation.experiments.primitives.base import key, Primitive
+from pam_actuation.experiments.smooth_path import smooth_path
 
 MOST_VALUES = 15_000        # the text of an experiment stays below what a file may have
 
@@ -24,11 +25,11 @@ MOST_VALUES = 15_000        # the text of an experiment stays below what a file 
 @dataclass
 class Samples(Primitive):
     """
-    Smooth through values at equal distances of time; never beyond two neighbours.
+    Smooth through values at equal distances of time; never beyond the smallest and the largest.
 
-    Between them the path is a monotone cubic (PCHIP; Fritsch & Butland 1984, SIAM J. Sci. Stat.
-    Comput. 5(2)). With several cycles the last value must be the first, and the cycles follow
-    one another without a corner.
+    Between them the path is a cubic spline, and beside a step a monotone cubic (``smooth_path``).
+    With several cycles the last value must be the first, and the cycles follow one another
+    without a corner.
     """
 
     QUANTITIES = ('values',)
@@ -65,13 +66,15 @@ class Samples(Primitive):
     def _cubics(self) -> list[list[float]]:
         """Return the four coefficients of each interval, highest power first; time in s."""
         import numpy as np
-        from scipy.interpolate import PchipInterpolator
-        values = self.values
-        if self.cycles > 1:     # one neighbour more on either side: no corner between cycles
-            values = [values[-2], *values, values[1]]
-        path = PchipInterpolator(np.arange(len(values)) * self.every_s, values)
+        path = smooth_path(np.arange(len(self.values)) * self.every_s, np.array(self.values),
+                           self.cycles > 1)
         cubics: list[list[float]] = path.c.T.tolist()
-        return cubics[1:-1] if self.cycles > 1 else cubics
+        return cubics
+
+    @cached_property
+    def _range(self) -> tuple[float, float]:
+        """Return the smallest and the largest value."""
+        return min(self.values), max(self.values)
 
     def at(self, t_s: float) -> tuple[float, float]:
         """Return value and rate."""
@@ -83,7 +86,9 @@ class Samples(Primitive):
         place = min(int(t_s / self.every_s), len(self._cubics) - 1)
         a, b, c, d = self._cubics[place]
         s = t_s - place * self.every_s
-        return ((a * s + b) * s + c) * s + d, (3.0 * a * s + 2.0 * b) * s + c
+        low, high = self._range
+        value = min(max(((a * s + b) * s + c) * s + d, low), high)
+        return value, (3.0 * a * s + 2.0 * b) * s + c
 
 
 PRIMITIVE = Samples
