@@ -44,6 +44,7 @@ from pam_actuation.control.modes.files import KEYS as MODE_KEYS, read_mode
 from pam_actuation.control.modes.force import ForceController
 from pam_actuation.control.modes.joint import JointController
 from pam_actuation.control.sofc.persistence import load_rules
+from pam_actuation.control.suited import suited
 from pam_actuation.drivers.asked import asked_in
 from pam_sim.errors import InputError
 from pam_sim.joint.rig import JointRig
@@ -121,9 +122,13 @@ def load_controller(name_or_path_or_text: str | os.PathLike[str],
         folder = os.path.dirname(path)
         tree = load_yaml(path)
     controller = controller_from_tree(tree, rig, folder, accept_other_rig)
-    if '\n' not in text and rig is not None and getattr(rig, 'valve', '') in VALVES:
+    if '\n' not in text:
         from pam_actuation.resources import list_config
-        controller.other_valve = other_valve(text, rig.valve, list_config('controllers'))
+        presets = list_config('controllers')
+        if text in presets:
+            controller = suited(controller, rig)
+        if rig is not None and getattr(rig, 'valve', '') in VALVES:
+            controller.other_valve = other_valve(text, rig.valve, presets)
     if rules_file is not None:
         if controller.rules is None:
             raise InputError(f'a {controller.kind} controller has no rules', str(rules_file))

@@ -1,0 +1,111 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The model of a preset on a rig that moves otherwise than the one it was searched on."""
+
+from pathlib import Path
+
+import numpy as np
+from pam_actuation.control.config import load_controller
+from pam_actuation.control.sofc.settings import INERTIA
+from pam_actuation.control.suited import inertia_and_slope
+from pam_actuation.experiments import load_experiment
+from pam_actuation.resources import find_config
+from pam_actuation.tuning.closed_loop import ClosedLoop
+from pam_sim import load_rig
+import pytest
+
+LIGHT = """\
+muscle: dmsp_10_250
+load: hanging_mass
+valve: ppr
+parameters: {mass_kg: 2.0, damping_n_s_per_m: 100.0, T_m: 0.05}
+effects:
+  - {name: valve_dead_time, parameters: {delay_s: 0.02}}
+  - {name: hysteresis, parameters: {force_n: 2.0}}
+sensors: {pressure_noise_pa: 300.0, contraction_noise_m: 2.0e-5}
+"""
+SLOW = """\
+muscle: dmsp_20_300
+load: hanging_mass
+valve: ppr
+parameters: {mass_kg: 15.0, damping_n_s_per_m: 300.0, T_m: 0.15}
+effects:
+  - {name: valve_dead_time, parameters: {delay_s: 0.06}}
+  - {name: hysteresis, parameters: {force_n: 5.0}}
+sensors: {pressure_noise_pa: 300.0, contraction_noise_m: 2.0e-5}
+"""
+GAINS = ('predicted_proportional_pa_per_m', 'predicted_derivative_pa_s_per_m')
+
+
+def own(tmp_path, text):
+    """Return a rig of a file with this text."""
+    path = tmp_path / 'own_rig.yaml'
+    path.write_text(text)
+    return load_rig(str(path))
+
+
+def late_error_mm(controller, rig):
+    """Return the error [mm] of the last third of a sine."""
+    loop = ClosedLoop(rig, load_experiment('sine_half_hz'), preview_s=0.6, slow_start=True)
+    run = loop.run(controller)
+    return 1e3 * float(np.sqrt(np.mean(run.error_m[2 * loop.ticks // 3:]**2)))
+
+
+@pytest.mark.parametrize('text, before_mm, now_mm', [(LIGHT, 0.8, 0.1), (SLOW, 4.0, 0.2)])
+def test_a_preset_with_a_model_does_not_swing_on_a_light_load(tmp_path, text, before_mm, now_mm):
+    rig = own(tmp_path, text)
+    searched = load_controller(find_config('controllers', 'sofc_model_ppr'), rig)
+    assert late_error_mm(searched, rig) > before_mm        # what the preset did
+    assert late_error_mm(load_controller('sofc_model_ppr', rig), rig) < now_mm
+
+
+@pytest.mark.parametrize('preset', ['sofc_model_ppr', 'sofc_model_hsv', 'sofc_ppr', 'pid'])
+@pytest.mark.parametrize('name', ['dmsp_5_300_realistic', 'dmsp_10_250_hanging_mass',
+                                  'dmsp_20_300_hanging_mass', 'dmsp_40_300_hanging_mass'])
+def test_rigs_like_that_of_the_presets_take_them_as_they_are(preset, name):
+    rig = load_rig(name)
+    settings = load_controller(find_config('controllers', preset), rig).settings
+    assert load_controller(preset, rig).settings == settings
+
+
+def test_only_a_preset_is_suited_to_a_rig_and_a_file_counts_as_written(tmp_path):
+    rig = own(tmp_path, SLOW)
+    path = tmp_path / 'mine.yaml'
+    path.write_text(Path(find_config('controllers', 'sofc_model_ppr')).read_text())
+    mine, preset = (load_controller(one, rig).settings for one in (path, 'sofc_model_ppr'))
+    assert mine[INERTIA] == 17000.0
+    inertia, slope = inertia_and_slope(rig)
+    assert preset[INERTIA] == pytest.approx(17000.0 * inertia / 2.3e4)
+    for name in GAINS:
+        assert preset[name] == pytest.approx(mine[name] * slope / 9.5e6)
+    assert {name for name in mine if mine[name] != preset[name]} == {INERTIA, *GAINS}
+    # What is written down has these numbers, so a recording is replayed anywhere.
+    again = load_controller(load_controller('sofc_model_ppr', rig).to_yaml())
+    assert again.settings == preset
+
+
+def test_a_heavy_load_has_more_inertia_and_no_more_feedback(tmp_path):
+    rig = own(tmp_path, SLOW.replace('mass_kg: 15.0', 'mass_kg: 110.0'))
+    mine = load_controller(find_config('controllers', 'sofc_model_ppr'), rig).settings
+    preset = load_controller('sofc_model_ppr', rig).settings
+    assert preset[INERTIA] > 1.4 * mine[INERTIA]
+    assert all(preset[name] == mine[name] for name in GAINS)
+
+
+def test_a_rig_that_says_nothing_of_its_motion_leaves_a_preset_alone():
+    assert inertia_and_slope(load_rig('dmsp_5_300_isometric')) is None
+    assert inertia_and_slope(load_rig('dmsp_5_300_driven')) is None
+    heavy = load_rig('dmsp_5_300_realistic').with_(parameters={'mass_kg': 60.0})
+    assert inertia_and_slope(heavy) is None                # no pressure holds it up
