@@ -55,6 +55,7 @@ def run(args: argparse.Namespace) -> int:
     from pam_actuation.drivers.vented import check_rig_vents
     from pam_actuation.rigging.session import run_experiment
     from pam_actuation.report.full_valves import full_valves_in
+    from pam_actuation.report.swinging import swinging_in
     from pam_sim.rig_text import rig_title
     experiment, rig, controller = load_setup(args)
     check_rig_vents(rig)
@@ -73,6 +74,7 @@ def run(args: argparse.Namespace) -> int:
     wall_s = time.perf_counter() - started
     if result.complete and result.bag:
         remarks += full_valves_in(result.bag, experiment, rig.valve)
+        remarks += swinging_in(result.bag, experiment)
     # A node that was killed could not report its last count.
     counted = '' if result.failure else f', {sum(result.published.values())} published'
     if counted and result.of_others:

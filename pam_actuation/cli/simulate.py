@@ -42,6 +42,7 @@ def run(args: argparse.Namespace) -> int:
     from pam_actuation.bags.place import check_bag_target
     from pam_actuation.experiments.offline import simulate_experiment
     from pam_actuation.report.full_valves import full_valves_in
+    from pam_actuation.report.swinging import swinging_in
     from pam_sim.rig_text import rig_title
     experiment, rig, controller = load_setup(args)
     remarks = tell_remarks(args, experiment, rig.valve, rig, controller, args.rig)
@@ -56,6 +57,7 @@ def run(args: argparse.Namespace) -> int:
         bar.update(experiment.duration_s - bar.n)
     result['wall_s'] = time.perf_counter() - started
     remarks += full_valves_in(result['bag'], experiment, rig.valve)
+    remarks += swinging_in(result['bag'], experiment)
     # The keys of `pam run`, so that one program reads both.
     result |= {'complete': True, 'failure': '', 'remarks': remarks,
                'published': result['counts'], 'recorded': result['counts'], 'exit_codes': {},
