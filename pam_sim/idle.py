@@ -26,7 +26,7 @@ from pam_sim.joint.model_file import joint_preset_names
 from pam_sim.located_yaml import load_yaml
 from pam_sim.model_file import preset_names
 from pam_sim.parameters import Parameter
-from pam_sim.units import gauge_kpa
+from pam_sim.units import gauge_kpa, P_ATM_PA
 from pam_sim.valve import hsv, ppr
 
 if TYPE_CHECKING:
@@ -66,8 +66,8 @@ def _idle(data: Any, rig: 'Rig') -> Iterator[str]:
     """Give what a mapping states for a muscle and what does nothing there, each in words."""
     if not isinstance(data, Mapping):       # the name of a preset
         return
-    numbers = Numbers(_DT_S, _SUBSTEP_S, rig.valve, rig.fidelity, rig.parameters,
-                      muscle=rig.muscle)
+    numbers = Numbers(_DT_S, _SUBSTEP_S, rig.valve, rig.fidelity,
+                      {**rig.parameters, 'p_atm': P_ATM_PA}, muscle=rig.muscle)
     for item in data.get('effects') or ():
         why = _why_idle(get_effect(item['name']), item.get('parameters') or {}, rig, numbers)
         if why:
@@ -112,7 +112,7 @@ def _idle_compressor(item: Mapping[str, Any], rig: 'Rig') -> Iterator[str]:
 def _is_read(parameter: Parameter, rig: 'Rig', numbers: Numbers) -> bool:
     """Return whether an effect of the rig depends on a number of the other valve."""
     other = numbers._replace(parameters={
-        **rig.parameters, parameter.name: 1.01 * rig.parameters[parameter.name] + 1e-9})
+        **numbers.parameters, parameter.name: 1.01 * rig.parameters[parameter.name] + 1e-9})
     acting = [(one.parameters, effect) for one in rig.effects
               for effect in [get_effect(one.name)] if effect.is_active(one.parameters, numbers)]
     if parameter.name == 'V_dead' and any('pressure_rate' in e.hooks for _, e in acting):

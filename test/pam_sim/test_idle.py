@@ -69,6 +69,17 @@ def test_numbers_of_the_other_valve_are_told_unless_an_effect_reads_them(effect,
             assert (name in idle) != moves(rig, rig.with_(parameters={name: nominal})), name
 
 
+@pytest.mark.parametrize('valve, stated', [
+    ('ppr', 'C: 1e-9, V_dead: 1e-5'), ('hsv', 'K_m: 9.0e+4, T_m: 0.05, ppr_highest_v: 7')])
+def test_numbers_of_the_other_valve_may_stand_beside_any_effect(valve, stated, tmp_path):
+    for name, effect in effects().items():
+        if valve not in effect.valves:
+            continue
+        _, said = told(tmp_path, f'rig: dmsp_5_300_hanging_mass\nvalve: {valve}\nparameters: '
+                                 f'{{{stated}}}\neffects: [{{name: {name}}}]\n')
+        assert len(said) <= 1, name        # it ended with a traceback
+
+
 @pytest.mark.parametrize('text, valve, said', [
     ('rig: dmsp_5_300_hanging_mass\nfidelity: switching\n', None, 'fidelity switching is of hsv'),
     ('rig: dmsp_5_300_hanging_mass\nvalve: hsv\nfidelity: switching\n', None, ''),
