@@ -126,7 +126,7 @@ def load_controller(name_or_path_or_text: str | os.PathLike[str],
         from pam_actuation.resources import list_config
         presets = list_config('controllers')
         if text in presets:
-            controller = suited(controller, rig)
+            controller = suited(controller, text, rig)
         if rig is not None and getattr(rig, 'valve', '') in VALVES:
             controller.other_valve = other_valve(text, rig.valve, presets)
     if rules_file is not None:

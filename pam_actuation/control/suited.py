@@ -15,30 +15,35 @@
 """
 The model of a preset, on a rig that moves otherwise than the one it was searched on.
 
-The presets ``sofc_model_…`` of a muscle were searched on ``dmsp_5_300_realistic`` and rigs about
-it. Their model finds the inertia within a factor (``inertia_range``) of the setting, and their
-feedback was as strong as that rig bears. A light load on a thick muscle has a tenth of the
-inertia per pascal, and moves twice as far per pascal. There a model of the other rig makes the
-muscle swing by millimetres. What the rig's file states is therefore used, as it is for the
-static inverse.
+The presets ``sofc_model_…`` were searched on one rig or joint and on others about it. Their model
+finds the inertia within a factor (``inertia_range``) of the setting, and their feedback was as
+strong as that rig bears. A light load on a thick muscle has a tenth of the inertia per pascal,
+and moves twice as far per pascal. There a model of the other rig makes the muscle swing by
+millimetres, and a limb by 20 degrees. What the file of the rig states is therefore used, as it is
+for the static inverse.
 """
 
 import math
 from typing import TYPE_CHECKING
 
 from pam_actuation.control.compiled_controller import CompiledController
+from pam_actuation.control.modes.joint import CO_CONTRACTION_GAUGE_PA, JointController
 from pam_actuation.control.sofc.settings import INERTIA, predicted_gains
+from pam_sim.joint.rig import JointRig
 from pam_sim.rig import Rig
+from pam_sim.units import P_ATM_PA
 
 if TYPE_CHECKING:
     from pam_actuation.control.config import Controller
-    from pam_sim.joint.rig import JointRig
 
-# Of the rig of the presets at the strain below: pressure per acceleration, and per contraction.
+# Of the rig of the presets of a muscle, at the strain below: pressure per acceleration, and per
+# contraction.
 HOME_INERTIA_PA_S2_PER_M, HOME_SLOPE_PA_PER_M = 2.3e4, 9.5e6
 STRAIN = 14e-3 / 300e-3         # the middle of its motions
 LEAST_SLOPE = 0.6               # of that at home: above, the feedback stays as it is
-_PART_OF_LOAD, _PART_OF_LENGTH = 0.02, 0.002
+# Of the joints of the other presets, by a part of their names: pressure per acceleration.
+HOME_OF_JOINTS_PA_S2_PER_M = {'joint': 6.45e4, 'knee': 1.737e5}
+_PART_OF_LOAD, _PART_OF_LENGTH, _STEP_PA = 0.02, 0.002, 2e3
 
 
 def inertia_and_slope(rig: Rig) -> tuple[float, float] | None:
@@ -64,26 +69,63 @@ def inertia_and_slope(rig: Rig) -> tuple[float, float] | None:
     return found if all(math.isfinite(one) and one > 0.0 for one in found) else None
 
 
-def suited(controller: 'Controller', rig: 'JointRig | Rig | None') -> 'Controller':
+def joint_inertia(joint: JointRig) -> float | None:
+    """
+    Return the pressure per acceleration [Pa s2/m] of a joint in the middle of its range, or None.
+
+    The pressure is half of the difference of both muscles, about the usual co-contraction. The
+    acceleration is that of the contraction of the flexor. None where a pressure makes no torque.
+    """
+    middle_rad = 0.5 * sum(joint.range_rad)
+    mean_pa = P_ATM_PA + CO_CONTRACTION_GAUGE_PA
+    flexing, extending = (joint.static_torque_n_m(middle_rad, mean_pa + one, mean_pa - one)
+                          for one in (_STEP_PA, -_STEP_PA))
+    torque_per_pa = (flexing - extending) / (2.0 * _STEP_PA)
+    if not torque_per_pa > 0.0:
+        return None
+    return float(joint.parameters['inertia_kg_m2']
+                 / (joint.parameters['flexor_radius_m'] * torque_per_pa))
+
+
+def suited(controller: 'Controller', preset: str, rig: JointRig | Rig | None) -> 'Controller':
     """
     Return a preset with the inertia of a rig, where that is far from the one of its own rig.
 
     Within ``inertia_range`` of it the preset stays as it is, since its model finds the rest. A
-    muscle that moves further per pascal gets so much less feedback on the predicted error.
-    A controller without a model, of a joint or of a force is returned unchanged.
+    muscle that moves further per pascal gets so much less feedback on the predicted error, and a
+    joint as much less as it has less inertia. A controller without a model, or of a force, is
+    returned unchanged.
+
+    Parameters
+    ----------
+    controller : Controller
+        As its file has it.
+    preset : str
+        Its name.
+    rig : Rig, JointRig or None
+        What it shall run on.
+
     """
-    if not isinstance(controller, CompiledController) or not isinstance(rig, Rig):
-        return controller
-    settings = controller.settings
+    settings, changed = controller.settings, {}
     gains = predicted_gains(settings) if controller.kind == 'sofc' else []
-    found = inertia_and_slope(rig) if gains else None
-    if found is None:
+    if not gains:
         return controller
-    changed = {}
-    times = found[0] / HOME_INERTIA_PA_S2_PER_M
+    times, weaker = 1.0, 1.0
+    if isinstance(rig, Rig) and isinstance(controller, CompiledController):
+        found = inertia_and_slope(rig)
+        if found is not None:
+            times = found[0] / HOME_INERTIA_PA_S2_PER_M
+            slope = found[1] / HOME_SLOPE_PA_PER_M
+            weaker = slope if slope < LEAST_SLOPE else 1.0
+    elif isinstance(rig, JointRig) and isinstance(controller, JointController):
+        inertia = joint_inertia(rig)
+        home = next((number for name, number in HOME_OF_JOINTS_PA_S2_PER_M.items()
+                     if f'_{name}_' in preset), None)
+        if inertia is not None and home is not None:
+            times = inertia / home
+            weaker = times if times < 1.0 / settings['inertia_range'] else 1.0
     if not 1.0 / settings['inertia_range'] <= times <= settings['inertia_range']:
         changed[INERTIA] = settings[INERTIA] * times
-    weaker = found[1] / HOME_SLOPE_PA_PER_M
-    if weaker < LEAST_SLOPE:
+    if weaker < 1.0:
         changed |= {name: settings[name] * weaker for name in gains}
     return controller.with_settings(changed) if changed else controller

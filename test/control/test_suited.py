@@ -19,11 +19,13 @@ from pathlib import Path
 import numpy as np
 from pam_actuation.control.config import load_controller
 from pam_actuation.control.sofc.settings import INERTIA
-from pam_actuation.control.suited import inertia_and_slope
+from pam_actuation.control.suited import inertia_and_slope, joint_inertia
 from pam_actuation.experiments import load_experiment
 from pam_actuation.resources import find_config
 from pam_actuation.tuning.closed_loop import ClosedLoop
+from pam_actuation.tuning.joint_loop import JointLoop
 from pam_sim import load_rig
+from pam_sim.joint import load_rig_or_joint
 import pytest
 
 LIGHT = """\
@@ -45,6 +47,29 @@ effects:
   - {name: valve_dead_time, parameters: {delay_s: 0.06}}
   - {name: hysteresis, parameters: {force_n: 5.0}}
 sensors: {pressure_noise_pa: 300.0, contraction_noise_m: 2.0e-5}
+"""
+LIMB = """\
+load: antagonistic_joint
+""" + ''.join(f"""\
+{side}:
+  muscle: dmsp_20_300
+  load: driven
+  valve: ppr
+  parameters: {{damping_n_s_per_m: 300.0, T_m: 0.08}}
+  effects:
+    - {{name: valve_dead_time, parameters: {{delay_s: 0.03}}}}
+    - {{name: hysteresis, parameters: {{force_n: 5.0, force_per_pa: 4.5e-5}}}}
+  sensors: {{pressure_noise_pa: 300.0, contraction_noise_m: 1.0e-5, force_noise_n: 1.0}}
+""" for side in ('flexor', 'extensor')) + """\
+parameters:
+  flexor_radius_m: 0.025
+  extensor_radius_m: 0.025
+  flexor_contraction_at_zero_m: 0.025
+  extensor_contraction_at_zero_m: 0.025
+  limb_mass_kg: 1.0
+  centre_of_mass_m: 0.15
+  inertia_kg_m2: 0.05
+  damping_n_m_s: 0.05
 """
 GAINS = ('predicted_proportional_pa_per_m', 'predicted_derivative_pa_s_per_m')
 
@@ -109,3 +134,31 @@ def test_a_rig_that_says_nothing_of_its_motion_leaves_a_preset_alone():
     assert inertia_and_slope(load_rig('dmsp_5_300_driven')) is None
     heavy = load_rig('dmsp_5_300_realistic').with_(parameters={'mass_kg': 60.0})
     assert inertia_and_slope(heavy) is None                # no pressure holds it up
+
+
+def test_a_preset_of_a_joint_does_not_swing_with_a_light_limb(tmp_path):
+    path = tmp_path / 'limb.yaml'
+    path.write_text(LIMB)
+    joint = load_rig_or_joint(path)
+    searched = load_controller(find_config('controllers', 'sofc_model_joint_ppr'), joint)
+    preset = load_controller('sofc_model_joint_ppr', joint)
+    times = joint_inertia(joint) / 6.45e4
+    assert times < 0.5
+    for name in (INERTIA, *GAINS):
+        assert preset.settings[name] == pytest.approx(times * searched.settings[name])
+    loop = JointLoop(joint, load_experiment('joint_tuning'), slow_start=True)
+    swings_deg, calm_deg = (
+        float(np.degrees(np.sqrt(np.mean(run.error[2 * len(run.error) // 3:]**2))))
+        for run in (loop.run(searched), loop.run(preset)))
+    assert swings_deg > 10.0 and calm_deg < 0.2
+
+
+@pytest.mark.parametrize('name, kind', [
+    ('joint_dmsp_5_300', 'joint'), ('joint_dmsp_5_300_realistic', 'joint'),
+    ('knee_dmsp_20_300', 'knee'), ('knee_dmsp_20_300_realistic', 'knee')])
+@pytest.mark.parametrize('valve', ['ppr', 'hsv'])
+def test_the_joints_of_the_presets_take_them_as_they_are(name, kind, valve):
+    joint = load_rig_or_joint(name, valve)
+    for preset in (f'sofc_model_{kind}_{valve}', f'sofc_{kind}_{valve}'):
+        settings = load_controller(find_config('controllers', preset), joint).settings
+        assert load_controller(preset, joint).settings == settings
