@@ -104,7 +104,10 @@ def _tracking(result: 'TuneResult') -> Section:
         time_s, reference, error = loop.tracked(rebuild(controller, {}))
         lines.append(figures.line(time_s, error, name, role))
     wanted = figures.line(time_s, reference, 'wanted', 'second')
-    return Section('tracking', 'A run that was not searched', paragraph(
+    searched = {one.experiment.name for one in result.problem.loops} if result.problem else set()
+    heading = 'A run that was not searched' if loop.experiment.name not in searched else (
+        'The searched motion with other noise')
+    return Section('tracking', heading, paragraph(
         f'Experiment {loop.experiment.name} on the model, with sensor noise of its own.') + plot(
             figures.stack([(f'reference [{unit}]', [wanted]), (f'error [{unit}]', lines)],
                           'time [s]')))

@@ -193,6 +193,8 @@ class TuneResult:
         verdict = f'-> {self.held_out_after:.3f}{shown}, better'
         if sum(one.after - one.before for one in others) > 0.0:
             verdict += ' on what was searched, worse on what was not'
+        elif not others:
+            verdict += ' on the motions that were searched; no other was tried'
         if not self.improved:
             verdict = (f'before, {self.held_out_found:.3f}{shown} with what was found, '
                        'not better: settings left as they were')

@@ -102,6 +102,7 @@ def test_the_page_shows_search_rules_and_recordings(run, rig, tmp_path):
     recordings = check_recordings([run], rig, result.controller)
     tuning_report(tmp_path / 'page.html', result, recordings, rig, [experiment], [run])
     page = (tmp_path / 'page.html').read_text()
-    for words in ('held-out cost after', 'A run that was not searched', 'The initial rules',
-                  'trustworthy for tuning', 'would have commanded', 'short_sine'):
+    for words in ('held-out cost after', 'The searched motion with other noise',
+                  'The initial rules', 'trustworthy for tuning', 'would have commanded',
+                  'short_sine'):
         assert words in page, words

@@ -241,3 +241,6 @@ def test_what_is_better_only_where_it_was_searched_is_told(rig):
         replace(result.held_out_runs[1], before=0.1, after=after)]) for after in (0.05, 0.2))
     assert 'worse on what was not' in worse.text()
     assert ', better\n' in better.text() and 'worse' not in better.text()
+    alone = replace(better, held_out_runs=better.held_out_runs[:1])
+    assert 'better on the motions that were searched; no other was tried' in alone.text()
+    assert 'no other was tried' not in better.text() + worse.text()
