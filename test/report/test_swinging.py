@@ -79,7 +79,7 @@ def run_of(swing_m, pushed_n=0.0):
 
 def test_the_sentence_tells_size_frequency_and_what_to_do():
     said = swinging(run_of(0.003))
-    assert said.startswith('the muscle swings by ± 3 mm at 4.2 Hz, from 0 to 2')
+    assert said.startswith('the muscle swings by ± 3.0 mm at 4.2 Hz, from 0 to 2')
     assert 'pam tune --model RIG' in said
     assert 'swings by' in swinging_section([('first', run_of(0.003))]).body
     assert swinging_section([('first', run_of(0.0))]) is None
