@@ -154,6 +154,10 @@ class Located(Mapping[str, Any]):
         return Located({key: _copied(value) for key, value in self._values.items()}, self._lines,
                        self.name, self.line)
 
+    def with_(self, **values: Any) -> 'Located':
+        """Return a copy with other values of some keys, which keep their lines."""
+        return Located({**self.copy(), **values}, self._lines, self.name, self.line)
+
     def plain(self) -> dict[str, Any]:
         """Return nested plain dicts and lists."""
         return {key: _plain(value) for key, value in self._values.items()}

@@ -44,7 +44,7 @@ from pam_actuation.control.modes.files import KEYS as MODE_KEYS, read_mode
 from pam_actuation.control.modes.force import ForceController
 from pam_actuation.control.modes.joint import JointController
 from pam_actuation.control.sofc.persistence import load_rules
-from pam_actuation.control.suited import suited
+from pam_actuation.control.suited import for_muscle, suited
 from pam_actuation.drivers.asked import asked_in
 from pam_sim.errors import InputError
 from pam_sim.joint.rig import JointRig
@@ -113,22 +113,21 @@ def load_controller(name_or_path_or_text: str | os.PathLike[str],
 
     """
     text = os.fspath(name_or_path_or_text)
-    folder = '.'
+    folder, presets = '.', list[str]()
     if '\n' in text:
         tree = load_yaml(text, name='controller text')
     else:
-        from pam_actuation.resources import find_config
+        from pam_actuation.resources import find_config, list_config
         path = find_config('controllers', text)
-        folder = os.path.dirname(path)
+        folder, presets = os.path.dirname(path), list_config('controllers')
         tree = load_yaml(path)
+    if text in presets:
+        tree = for_muscle(tree, rig)
     controller = controller_from_tree(tree, rig, folder, accept_other_rig)
-    if '\n' not in text:
-        from pam_actuation.resources import list_config
-        presets = list_config('controllers')
-        if text in presets:
-            controller = suited(controller, text, rig)
-        if rig is not None and getattr(rig, 'valve', '') in VALVES:
-            controller.other_valve = other_valve(text, rig.valve, presets)
+    if text in presets:
+        controller = suited(controller, text, rig)
+    if presets and rig is not None and getattr(rig, 'valve', '') in VALVES:
+        controller.other_valve = other_valve(text, rig.valve, presets)
     if rules_file is not None:
         if controller.rules is None:
             raise InputError(f'a {controller.kind} controller has no rules', str(rules_file))

@@ -27,9 +27,11 @@ import math
 from typing import TYPE_CHECKING
 
 from pam_actuation.control.compiled_controller import CompiledController
+from pam_actuation.control.modes.force import STIFFNESS
 from pam_actuation.control.modes.joint import CO_CONTRACTION_GAUGE_PA, JointController
 from pam_actuation.control.sofc.settings import INERTIA, predicted_gains
 from pam_sim.joint.rig import JointRig
+from pam_sim.located_yaml import Located
 from pam_sim.rig import Rig
 from pam_sim.units import P_ATM_PA
 
@@ -40,6 +42,8 @@ if TYPE_CHECKING:
 # contraction.
 HOME_INERTIA_PA_S2_PER_M, HOME_SLOPE_PA_PER_M = 2.3e4, 9.5e6
 STRAIN = 14e-3 / 300e-3         # the middle of its motions
+# Of the muscle of a preset of a force, and how far another may be off and count as the same.
+HOME_FORCE_PER_PA, SAME_FORCE = 2.18e-4, 0.3
 LEAST_SLOPE = 0.6               # of that at home: above, the feedback stays as it is
 # Of the joints of the other presets, by a part of their names: pressure per acceleration.
 HOME_OF_JOINTS_PA_S2_PER_M = {'joint': 6.45e4, 'knee': 1.737e5}
@@ -85,6 +89,32 @@ def joint_inertia(joint: JointRig) -> float | None:
         return None
     return float(joint.parameters['inertia_kg_m2']
                  / (joint.parameters['flexor_radius_m'] * torque_per_pa))
+
+
+def force_per_pa(rig: Rig) -> float:
+    """Return the force that a pascal makes [N/Pa], about 300 kPa and the middle of the stroke."""
+    law = rig.muscle.law.law
+    high_n, low_n = (float(law.formula_n(CO_CONTRACTION_GAUGE_PA + one, STRAIN))
+                     for one in (_STEP_PA, -_STEP_PA))
+    return rig.parameters['force_map_gain'] * (high_n - low_n) / (2.0 * _STEP_PA)
+
+
+def for_muscle(tree: Located, rig: JointRig | Rig | None) -> Located:
+    """
+    Return the file of a preset of a force, as it suits a muscle of another size.
+
+    So many newtons count as one metre there as suit the muscle it was searched on. A muscle that
+    makes ten times the force of a pascal would get ten times the feedback, and swing. So ten
+    times as many newtons count as one metre.
+    """
+    block = tree.get('force', dict)
+    stated = None if block is None else STIFFNESS.read(block)
+    if block is None or stated is None or not isinstance(rig, Rig):
+        return tree
+    times = force_per_pa(rig) / HOME_FORCE_PER_PA
+    if not times > 0.0 or abs(times - 1.0) <= SAME_FORCE:
+        return tree
+    return tree.with_(force=block.with_(**{STIFFNESS.name: stated * times}))
 
 
 def suited(controller: 'Controller', preset: str, rig: JointRig | Rig | None) -> 'Controller':

@@ -19,10 +19,11 @@ from pathlib import Path
 import numpy as np
 from pam_actuation.control.config import load_controller
 from pam_actuation.control.sofc.settings import INERTIA
-from pam_actuation.control.suited import inertia_and_slope, joint_inertia
+from pam_actuation.control.suited import force_per_pa, inertia_and_slope, joint_inertia
 from pam_actuation.experiments import load_experiment
 from pam_actuation.resources import find_config
 from pam_actuation.tuning.closed_loop import ClosedLoop
+from pam_actuation.tuning.force_loop import ForceLoop
 from pam_actuation.tuning.joint_loop import JointLoop
 from pam_sim import load_rig
 from pam_sim.joint import load_rig_or_joint
@@ -70,6 +71,22 @@ parameters:
   centre_of_mass_m: 0.15
   inertia_kg_m2: 0.05
   damping_n_m_s: 0.05
+"""
+FORCE = """\
+muscle: {muscle}
+load: isometric
+valve: ppr
+parameters: {{T_m: 0.08}}
+effects:
+  - {{name: valve_dead_time, parameters: {{delay_s: 0.03}}}}
+sensors: {{pressure_noise_pa: 300.0, force_noise_n: 1.0}}
+"""
+FORCE_SINE = """\
+name: own_force
+domain: force
+segments:
+  - ramp: {{to_n: {low:.1f}, duration_s: 2.0}}
+  - sine: {{center_n: {middle}, amplitude_n: {half}, frequency_hz: 1.0, cycles: 20}}
 """
 GAINS = ('predicted_proportional_pa_per_m', 'predicted_derivative_pa_s_per_m')
 
@@ -162,3 +179,25 @@ def test_the_joints_of_the_presets_take_them_as_they_are(name, kind, valve):
     for preset in (f'sofc_model_{kind}_{valve}', f'sofc_{kind}_{valve}'):
         settings = load_controller(find_config('controllers', preset), joint).settings
         assert load_controller(preset, joint).settings == settings
+
+
+@pytest.mark.filterwarnings('ignore::pam_sim.muscle.law.ExtrapolationWarning')
+@pytest.mark.parametrize('muscle, middle', [('dmsp_20_300', 400), ('dmsp_40_300', 1600)])
+def test_a_preset_of_a_force_suits_a_muscle_that_pulls_harder(muscle, middle, tmp_path):
+    rig = own(tmp_path, FORCE.format(muscle=muscle))
+    searched = load_controller(find_config('controllers', 'sofc_force_ppr'), rig)
+    preset = load_controller('sofc_force_ppr', rig)
+    assert preset.stiffness_n_per_m == pytest.approx(1769.5 * force_per_pa(rig) / 2.18e-4)
+    loop = ForceLoop(rig, load_experiment(FORCE_SINE.format(
+        low=0.75 * middle, middle=middle, half=0.25 * middle)), slow_start=True)
+    swings_n, calm_n = (float(np.sqrt(np.mean(run.error[2 * len(run.error) // 3:]**2)))
+                        for run in (loop.run(searched), loop.run(preset)))
+    assert swings_n > 0.05 * middle and calm_n < 0.003 * middle
+
+
+@pytest.mark.parametrize('name', ['dmsp_5_300_isometric', 'dmsp_5_300_isometric_realistic',
+                                  'dmsp_5_300_driven'])
+def test_rigs_of_the_preset_of_a_force_keep_its_number(name):
+    for valve in ('ppr', 'hsv'):
+        controller = load_controller(f'sofc_force_{valve}', load_rig(name, valve=valve))
+        assert controller.stiffness_n_per_m == 1769.5

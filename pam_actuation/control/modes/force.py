@@ -72,13 +72,13 @@ STATE = record(
 )
 
 _FILTER_S = 0.05        # memory of the filter of the contraction
-_STIFFNESS = Key(
+STIFFNESS = Key(
     'stiffness_n_per_m', float, 'So many newtons count as one metre in settings and rules.',
     otherwise='slope of the nominal force', unit='N/m', lower=1.0, upper=1e7)
 _CONTRACTION = Key(
     'contraction_m', float, 'Contraction until the first one is measured.',
     otherwise='that of an isometric rig, else 0', unit='m', lower=0.0, upper=1.0)
-KEYS = (_STIFFNESS, _CONTRACTION,
+KEYS = (STIFFNESS, _CONTRACTION,
         Key('surface', dict, 'Pressure over force and contraction, as a recording keeps it.',
             otherwise='from the rig'))
 
@@ -321,7 +321,7 @@ class ForceMode:
             own = block.get('surface', dict)
         stiffness = contraction = None
         if block is not None:
-            stiffness, contraction = _STIFFNESS.read(block), _CONTRACTION.read(block)
+            stiffness, contraction = STIFFNESS.read(block), _CONTRACTION.read(block)
         if rig is None:
             if own is None or stiffness is None:
                 raise tree.error(
