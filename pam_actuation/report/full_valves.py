@@ -18,23 +18,40 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from pam_actuation.bags.facts import recorded_muscle
-from pam_actuation.bags.load import load_run
+from pam_actuation.bags.load_joint import load_recording, MEASURED
 from pam_actuation.report.metrics import saturation_share
 from pam_actuation.report.page import paragraph, Section
 from pam_actuation.rig_files.by_size import by_size
+from pam_sim.joint.parameters import SIDES
+from pam_sim.run import Run
 
 if TYPE_CHECKING:
     from pam_actuation.experiments.experiment import Experiment
-    from pam_sim.run import Run
 
 MOST = 0.1                   # of the messages fully open; presets need none for smooth motions
 SMALL = 0.8                  # of the conductance by size: worth a word
 
 
-def full_valves(run: 'Run') -> str:
-    """Return a sentence where the valves of a run that tracks stood fully open for long, or ''."""
+def full_valves(run: Run) -> str:
+    """
+    Return a sentence where the valves of a run that tracks stood fully open for long, or ''.
+
+    Of a joint, those of each muscle count by themselves.
+    """
+    if MEASURED not in run:
+        return _of_muscle(run, 'a valve') if 'reference' in run else ''
+    if 'joint_reference' not in run:
+        return ''
+    return '; '.join(filter(None, (_of_muscle(Run(
+        {name.removeprefix(f'{side}/'): one for name, one in run.topics.items()
+         if name.startswith(f'{side}/')}, run.metadata, f'{run.namespace}/{side}', run.path),
+        f'a valve of the {side}') for side in SIDES)))
+
+
+def _of_muscle(run: Run, which: str) -> str:
+    """Return the sentence on the valves of one muscle, '' where they were large enough."""
     share = saturation_share(run)
-    if share is None or share[0] is not None or share[1] <= MOST or 'reference' not in run:
+    if share is None or share[0] is not None or share[1] <= MOST:
         return ''
     rig = recorded_muscle(run.metadata, run.namespace)
     number = '' if rig is None else f' (C is {rig.parameters["C"]:.3g} m3/(s Pa)'
@@ -42,20 +59,20 @@ def full_valves(run: 'Run') -> str:
         usual = by_size(rig.muscle.bore_m, rig.muscle.length_m)['C']
         number += f'; {usual.value:.3g} by the size of the muscle)' \
             if rig.parameters['C'] < SMALL * usual.value else ')'
-    return (f'a valve stood fully open for {100 * share[1]:.0f} % of the time, so the valves '
+    return (f'{which} stood fully open for {100 * share[1]:.0f} % of the time, so the valves '
             'limit this motion, and the error says little of the controller; take larger valves'
             f'{number}, a higher supply pressure or a slower motion')
 
 
 def full_valves_in(bag: str, experiment: 'Experiment', valve: str) -> list[str]:
     """Return that sentence of a bag that was just recorded, if any."""
-    if valve != 'hsv' or not experiment.asks_for_motion or experiment.domain == 'joint_angle':
+    if valve != 'hsv' or not experiment.asks_for_motion:
         return []
-    said = full_valves(load_run(bag))
+    said = full_valves(load_recording(bag))
     return [said] if said else []
 
 
-def full_valves_section(runs: 'Iterable[tuple[str, Run]]') -> Section | None:
+def full_valves_section(runs: Iterable[tuple[str, Run]]) -> Section | None:
     """Return the section on such runs by their titles, None where there is none."""
     told = [(title, said) for title, run in runs if (said := full_valves(run))]
     return Section('full_valves', 'Valves too small', ''.join(

@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 from pam_actuation.report import errors, figures, metrics, signals
+from pam_actuation.report.full_valves import full_valves_section
 from pam_actuation.report.learning import learned_worse, times_rolled_back
 from pam_actuation.report.page import plot, render, Section, table
 from pam_actuation.report.pages import (
@@ -152,7 +153,8 @@ def joint_report(runs: Sequence[Run], out_path: str | os.PathLike[str],
     spread = over_seeds(list(zip(titles, runs, found)))
     sections = [*filter(None, [
         early_section(runs), implausible_section(list(zip(titles, runs))),
-        swinging_section(zip(titles, runs)), _merits(named),
+        full_valves_section(zip(titles, runs)), swinging_section(zip(titles, runs)),
+        _merits(named),
         seeds_section(spread), cycle_chart([
             (title, np.degrees(one.cycle_rmse_rad), one.cycle_parts) for title, one in named],
             '°'), _overlaid(list(zip(titles, runs)))])]

@@ -64,3 +64,23 @@ def test_simulation_and_report_tell_it(tmp_path, capsys, monkeypatch):
                    for one in json.loads(capsys.readouterr().out)['remarks']) == told
         page = (tmp_path / 'report.html').read_text()
         assert ('Valves too small' in page) == bool(told)
+
+
+def test_a_joint_is_told_of_the_valves_of_each_muscle(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    small = ('joint: joint_dmsp_5_300\nflexor: {rig: dmsp_5_300_driven, '
+             'parameters: {C: 2.0e-11}}\nextensor: dmsp_5_300_driven\n')
+    (tmp_path / 'small.yaml').write_text(small)
+    for rig, told in (('small.yaml', 1), ('joint_dmsp_5_300', 0)):
+        assert main(['simulate', 'joint_tuning', '--rig', rig, '--valve', 'hsv', '--out', 'bag',
+                     '--overwrite', '--json']) == 0
+        remarks = json.loads(capsys.readouterr().out)['remarks']
+        said = [one for one in remarks if 'stood fully open' in one]
+        assert len(said) == told
+        assert main(['report', 'bag', '--out', 'page.html', '--overwrite', '--json']) == 0
+        assert [one for one in json.loads(capsys.readouterr().out)['remarks']
+                if 'stood fully open' in one] == said
+        assert ('Valves too small' in (tmp_path / 'page.html').read_text()) == bool(told)
+        for one in said:
+            assert one.startswith('a valve of the flexor stood fully open')
+            assert '(C is 2e-11 m3/(s Pa); ' in one and 'extensor' not in one
