@@ -139,7 +139,10 @@ class Chain:
             raise InputError(
                 f'{name} reaches {worst:.6g} {unit} after {t:.3g} s; allowed for '
                 f'{domain.name} is {allowed}', where)
-        for t, _, rate in samples:
+        # Between two of these as well: a spike of one value is at rest on it.
+        halves = [duration_s * (k + 0.5) / count for k in range(count)]
+        for t, rate in (*((t, rate) for t, _, rate in samples),
+                        *((t, primitive.at(t)[1]) for t in halves)):
             if not abs(rate) <= domain.fastest:
                 raise InputError(
                     f'{name} moves at {abs(rate):.4g} {unit}/s after {t:.3g} s; allowed '

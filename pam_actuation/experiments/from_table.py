@@ -28,7 +28,7 @@ from pam_actuation.tables.table import no_column_in, Table
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.located_yaml import dump_yaml
-from pam_sim.units import P_ATM_PA
+from pam_sim.units import counted, P_ATM_PA
 
 # Domain of an experiment by the name of the signal in `--map`.
 DOMAIN_OF = {'contraction': 'contraction', 'reference': 'contraction', 'force': 'force',
@@ -42,6 +42,7 @@ FEWEST_ROWS = 4
 LEAST_STEP_S, USUAL_STEP_S = 0.001, 0.01     # the reference is sent 100 times a second
 OPEN_SHARE = 0.1            # of the range, by which a cycle may miss its start: design value
 MOTION_HZ = 6.0             # a usual low pass of human motion (Winter 2009, chapter 3)
+GAP_S, GAP_STEPS = 0.1, 5.0  # without values: worth a word, and so many usual steps
 NOISY = 1.5                 # speed over speed below MOTION_HZ that is worth a word
 _TWO_PASSES = (2.0 ** 0.5 - 1.0) ** 0.25     # of the cut-off that a second order pass keeps
 _BEGIN_S, _RAMP_S, _HOLD_S, _END_S = 1.0, 2.0, 1.0, 0.5
@@ -120,6 +121,7 @@ def experiment_from(tables: Collection[Table], mapping: TableMapping, name: str,
     domain = DOMAINS[DOMAIN_OF[signal]]
     factor, unit, decimals = SHOWN[domain.name]
     zero = P_ATM_PA if domain.name == 'pressure' else 0.0
+    gaps = _gaps(t_s, max(motion.begin_s, 0.0))
     span = motion.span and [zero + end / factor for end in motion.span]
     t_s, values, more = _moved(t_s, values, motion, span, table.source)
     every_s = max(float(t_s[-1]) / (len(t_s) - 1), USUAL_STEP_S)
@@ -139,10 +141,20 @@ def experiment_from(tables: Collection[Table], mapping: TableMapping, name: str,
     low, high = (factor * (float(end) - zero) for end in (values.min(), values.max()))
     speed = factor * float(np.abs(np.diff(values)).max()) / every_s
     times = f'{motion.cycles} cycles of ' if motion.cycles > 1 else ''
-    return Made(load_experiment(text), text, (
+    return Made(_checked(text, table.source), text, (
         f'{low:.4g} to {high:.4g} {unit}, {times}{t_s[-1]:.4g} s, at most {speed:.3g} '
         f'{unit.removesuffix(" gauge")}/s',
-        f'column "{column}", {told}', *more))
+        f'column "{column}", {told}', *gaps, *more))
+
+
+def _checked(text: str, where: str) -> Experiment:
+    """Return the experiment of a text; what it asks too much of is told with the table."""
+    try:
+        return load_experiment(text)
+    except InputError as error:
+        said = str(error).partition(': ')[2]
+        raise InputError(f'{said}; --lowpass takes single wrong values off, --period with a '
+                         'longer time makes it slower, --range smaller', where) from None
 
 
 def _held(tables: Collection[Table], one: ColumnMap) -> tuple[Table, str]:
@@ -174,6 +186,18 @@ def _rows(table: Table, mapping: TableMapping, column: str, one: ColumnMap, moti
         raise InputError(f'{int(kept.sum())} numbers of column "{column}" lie in the part asked '
                          f'for; at least {FEWEST_ROWS} are needed', table.source)
     return t_s[kept] - t_s[kept][0], values[kept], f'{int(kept.sum())} values, {told}'
+
+
+def _gaps(t_s: FloatArray, begin_s: float) -> list[str]:
+    """Return a sentence where values are missing for long, as after a marker was hidden."""
+    steps = np.diff(t_s)
+    wide = np.flatnonzero(steps > max(GAP_S, GAP_STEPS * float(np.median(steps))))
+    if not wide.size:
+        return []
+    longest = int(wide[np.argmax(steps[wide])])
+    return [f'no values for {steps[longest]:.2g} s from {begin_s + t_s[longest]:.4g} s on'
+            + (f', and {counted(wide.size - 1, "more gap")}' if wide.size > 1 else '')
+            + '; the motion goes smoothly across, choose a part without with --from and --to']
 
 
 def _moved(t_s: FloatArray, values: FloatArray, motion: Motion, span: Sequence[float] | None,

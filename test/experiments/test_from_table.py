@@ -137,3 +137,23 @@ def test_a_long_recording_stays_a_file_that_can_be_loaded(here, capsys):
     again = load_experiment(one.to_yaml())      # as a bag keeps it
     assert again.at(200.0) == one.at(200.0)
     assert one.at(204.0)[0] == pytest.approx(0.01 + 0.004 * np.sin(0.3 * 200.0), abs=1e-6)
+
+
+def test_a_gap_in_the_table_is_told_and_a_spike_is_refused_with_a_way_on(here, capsys):
+    t_s = np.arange(0.0, 6.0, 0.01)
+    knee = 30.0 + 20.0 * np.sin(2.0 * np.pi * t_s)
+    kept = ~((t_s > 2.0) & (t_s < 3.2)) & ~((t_s > 4.0) & (t_s < 4.3))
+    write(here / 'gap.csv', {'t': t_s[kept], 'knee': knee[kept]})
+    made('gap.csv', '--map', 'contraction=knee', '--range', '4:20')
+    told = capsys.readouterr().out
+    assert 'no values for 1.2 s from 2 s on, and 1 more gap; the motion goes smoothly' in told
+    write(here / 'whole.csv', {'t': t_s, 'knee': knee})
+    made('whole.csv', '--map', 'contraction=knee', '--range', '4:20')
+    assert 'no values' not in capsys.readouterr().out
+    knee[300] = 400.0
+    write(here / 'spike.csv', {'t': t_s, 'knee': knee})
+    assert main(['experiments', '--samples', 'spike.csv', '--map', 'contraction=knee', '--range',
+                 '4:20']) == 2
+    said = capsys.readouterr().err
+    assert 'spike.csv: samples moves at 2.' in said and '--lowpass takes single wrong' in said
+    assert not (here / 'spike.yaml').exists()
