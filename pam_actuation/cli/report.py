@@ -48,6 +48,7 @@ def run(args: argparse.Namespace) -> int:
     from pam_actuation.report.pages import bag_report, default_titles
     from pam_actuation.report.sections.over_seeds import same_remarks
     from pam_actuation.report.swinging import swinging
+    from pam_actuation.report.unlike import unlike
     out = args.out or default_page(args.bag, args.overwrite)
     if args.out:
         check_outputs(args, args.out)
@@ -56,11 +57,13 @@ def run(args: argparse.Namespace) -> int:
     note_implausible(args, runs)
     write = joint_report if any(MEASURED in run for run in runs) else bag_report
     summary = write(runs, out, of=origin(args.bag, out))
-    remarks = [*recording_remarks(runs), *filter(None, map(full_valves, runs)), *(
-        f'{title}: {said}' for title, run in zip(default_titles(runs), runs)
-        if (said := swinging(run))), *(
-        f'{title}: {said}' for title, facts in summary.items()
-        for said in facts.get('learned_worse', ())), *same_remarks(summary.get('over_seeds', {}))]
+    named = list(zip(default_titles(runs), runs))
+    remarks = [
+        *recording_remarks(runs), *filter(None, [unlike(named), *map(full_valves, runs)]),
+        *(f'{title}: {said}' for title, run in named if (said := swinging(run))),
+        *(f'{title}: {said}' for title, facts in summary.items()
+          for said in facts.get('learned_worse', ())),
+        *same_remarks(summary.get('over_seeds', {}))]
     emit(args, {'report': out, 'remarks': remarks, **summary},
          '\n'.join([*(f'remark: {text}' for text in remarks), f'report: {out}']))
     return EXIT_DONE

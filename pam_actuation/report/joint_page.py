@@ -37,6 +37,7 @@ from pam_actuation.report.sections.provenance import provenance
 from pam_actuation.report.sections.timing import timing
 from pam_actuation.report.steps import ANGLE, as_data, responses, settling_text, StepResponse
 from pam_actuation.report.swinging import swinging_section
+from pam_actuation.report.unlike import unlike_section
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.files import write_text
@@ -154,7 +155,7 @@ def joint_report(runs: Sequence[Run], out_path: str | os.PathLike[str],
     sections = [*filter(None, [
         early_section(runs), implausible_section(list(zip(titles, runs))),
         full_valves_section(zip(titles, runs)), swinging_section(zip(titles, runs)),
-        _merits(named),
+        unlike_section(list(zip(titles, runs))), _merits(named),
         seeds_section(spread), cycle_chart([
             (title, np.degrees(one.cycle_rmse_rad), one.cycle_parts) for title, one in named],
             '°'), _overlaid(list(zip(titles, runs)))])]

@@ -32,6 +32,7 @@ from pam_actuation.report.sections.provenance import provenance
 from pam_actuation.report.sections.signals_plot import time_plots
 from pam_actuation.report.sections.timing import timing
 from pam_actuation.report.swinging import swinging_section
+from pam_actuation.report.unlike import unlike_section
 from pam_sim.errors import InputError
 from pam_sim.files import StrPath, write_text
 
@@ -86,7 +87,8 @@ def bag_report(runs: 'Sequence[Run]', out_path: StrPath, titles: Sequence[str] |
     spread = over_seeds(list(zip(titles, runs, measured)))
     sections = [early_section(runs), implausible_section(list(zip(titles, runs))),
                 full_valves_section(zip(titles, runs)), swinging_section(zip(titles, runs)),
-                metrics(named), seeds_section(spread), cycles(named),
+                unlike_section(list(zip(titles, runs))), metrics(named), seeds_section(spread),
+                cycles(named),
                 overlaid(list(zip(titles, runs)))]
     for k, (title, run) in enumerate(zip(titles, runs)):
         heading = 'Signals over time' + (f': {title}' if len(runs) > 1 else '')

@@ -82,7 +82,7 @@ def over_seeds(measured: 'Sequence[Measured]') -> dict[str, dict[str, Any]]:
         if '' in seeds or len(set(seeds)) < 2:
             continue
         figures = [one.to_dict() for _, _, one in runs]
-        found[f'{_kind(runs[0][1])}: {", ".join(titles)}'] = {
+        found[f'{controller_kind(runs[0][1])}: {", ".join(titles)}'] = {
             'runs': titles, 'seeds': seeds, 'same': _measured_the_same([r for _, r, _ in runs]),
             **{name: spread for _, name, _, _ in _FIGURES
                if (spread := _spread([one.get(name) for one in figures])) is not None}}
@@ -116,7 +116,7 @@ def _learns(run: 'Run') -> bool:
         (run['controller_state'].values.get('learning', np.zeros(1)) == 1.0).any())
 
 
-def _kind(run: 'Run') -> str:
+def controller_kind(run: 'Run') -> str:
     """Return the kind of the controller of a run."""
     try:
         return str(load_yaml(run.metadata['controller']).get('controller'))

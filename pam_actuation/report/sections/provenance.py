@@ -19,11 +19,15 @@ from typing import TYPE_CHECKING
 
 from pam_actuation.bags.ending import ending_of
 from pam_actuation.bags.facts import NOT_RECORDED, recorded, recorded_rig_title
+from pam_actuation.experiments.reference import POINT_NS, POINTS
 from pam_actuation.report import signals
 from pam_actuation.report.page import Section, table, text
 
 if TYPE_CHECKING:
     from pam_sim.run import Run
+
+# As far as ``reference_generator`` tells it.
+LIVE_PREVIEW_S = (POINTS - 1) * POINT_NS / 1e9
 
 
 def provenance(runs: 'list[tuple[str, Run]]') -> Section:
@@ -51,7 +55,7 @@ def provenance(runs: 'list[tuple[str, Run]]') -> Section:
         fields.append(('Controller', lambda run: (run.metadata or {}).get(
             'controller_other_rig', 'made for this rig')))
     if any('preview_s' in (run.metadata or {}) for _, run in runs):
-        fields.append(('Reference told ahead', lambda run: _preview(run)))
+        fields.append(('Reference told ahead', lambda run: told_ahead(run)))
     rows = [[name] + [read(run) for _, run in runs] for name, read in fields]
     body = table([''] + [name for name, _ in runs], rows, 'facts')
     for name, run in runs:
@@ -72,10 +76,14 @@ def _valve(run: 'Run') -> str:
     return f'{seen.upper()}, by its signal' if seen else NOT_RECORDED
 
 
-def _preview(run: 'Run') -> str:
+def told_ahead(run: 'Run') -> str:
     """Return how far ahead a simulated controller was told the reference."""
     told = (run.metadata or {}).get('preview_s')
-    return 'as live' if told is None else f'{told} s'
+    try:
+        live = told is None or float(told) >= LIVE_PREVIEW_S
+    except ValueError:          # of another program
+        live = False
+    return 'as live' if live else f'{told} s'
 
 
 def _counts(run: 'Run') -> str:
