@@ -153,6 +153,11 @@ def _controller(args: argparse.Namespace, runs: 'list[RecordedRun]',
     from pam_actuation.control.modes.tracked import CONTRACTION, JOINT, tracked_by
     from pam_sim.errors import InputError
     from pam_sim.joint import JointRig
+    if not isinstance(rig, JointRig) and rig.is_driven:
+        raise InputError(
+            f'the load `{rig.load}` of {rig.name} has its contraction prescribed, and a '
+            'controller of a force cannot be tuned; the presets sofc_force_ppr and '
+            'sofc_force_hsv suit muscles of any size', 'controller')
     controller = load_controller(
         args.controller or _first(runs, 'controller') or _preset(args, rig),
         rig, rules_file=args.rules, accept_other_rig=args.accept_other_rig)
@@ -204,14 +209,13 @@ def _preset(args: argparse.Namespace, rig: 'Rig | JointRig') -> str:
 def _experiments(args: argparse.Namespace, runs: 'list[RecordedRun]', rig: 'Rig | JointRig'
                  ) -> 'tuple[list[Experiment], list[Experiment]]':
     """Return the experiments of the search and those of the held-out check."""
-    from pam_actuation.control.modes.files import joint_size
     from pam_actuation.experiments import load_experiment
     from pam_sim.joint import JointRig
     domain = 'contraction'
     presets: tuple[str, ...] = EXPERIMENTS
     checked = CHECK
     if isinstance(rig, JointRig):
-        domain, (presets, checked) = 'joint_angle', OF_A_JOINT[joint_size(rig)]
+        domain, (presets, checked) = 'joint_angle', _of_joint(rig)
     if args.experiment:
         search = [load_experiment(one) for one in args.experiment]
     else:
@@ -222,6 +226,23 @@ def _experiments(args: argparse.Namespace, runs: 'list[RecordedRun]', rig: 'Rig 
     if args.check:
         return search, [load_experiment(one) for one in args.check]
     return search, [load_experiment(checked), *search]
+
+
+def _of_joint(joint: 'JointRig') -> tuple[tuple[str, ...], str]:
+    """Return the presets for a joint of this size; those of the other where it cannot do them."""
+    from pam_actuation.control.modes.files import joint_size
+    from pam_actuation.experiments import load_experiment
+    from pam_sim.errors import InputError
+    size = joint_size(joint)
+    for one in (size, *(other for other in OF_A_JOINT if other != size)):
+        presets, checked = OF_A_JOINT[one]
+        try:
+            for name in (*presets, checked):
+                load_experiment(name).check_reachable(joint)
+        except InputError:
+            continue
+        return presets, checked
+    return OF_A_JOINT[size]
 
 
 def _preview(args: argparse.Namespace, runs: 'list[RecordedRun]') -> tuple[float, list[str]]:

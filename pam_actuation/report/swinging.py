@@ -148,11 +148,13 @@ def swinging(run: 'Run') -> str:
 
 def _sentence(found: Swinging, what: str) -> str:
     unit = found.unit if found.unit == '°' else f' {found.unit}'
+    way_on = ('give its file weaker gains' if found.unit == 'N'
+              else 'tune it (pam tune --model RIG)')
     digits = 0 if found.amplitude >= 10.0 else 1
     return (f'the {what} swings by ± {found.amplitude:.{digits}f}{unit} at '
             f'{found.frequency_hz:.1f} Hz, from {found.begin_s:.0f} to {found.end_s:.0f} s, '
             'which its reference does not ask for: the feedback is too strong or too late for '
-            'this rig; take another controller, or tune it (pam tune --model RIG)')
+            f'this rig; take another controller, or {way_on}')
 
 
 def swinging_in(bag: str, experiment: 'Experiment') -> list[str]:

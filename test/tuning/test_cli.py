@@ -17,8 +17,10 @@
 import json
 
 from pam_actuation.cli.main import main
+from pam_actuation.cli.tune import _of_joint
 from pam_actuation.control.config import load_controller
 from pam_sim import load_rig
+from pam_sim.joint import load_joint
 import pytest
 
 QUICK = ('tune', '--model', 'dmsp_5_300_realistic', '--controller', 'sofc_untuned',
@@ -81,3 +83,22 @@ def test_a_bag_of_a_motion_nobody_announced_is_tuned_for_one(tmp_path, capsys):
         costs[stated] = found['cost_before_mm']
         assert ('told the reference 0 s ahead' in str(found['remarks'])) == (stated == ())
     assert costs[()] == costs['--preview', '0'] != costs['--preview', '0.6']
+
+
+@pytest.mark.parametrize('rig', ['dmsp_5_300_isometric', 'dmsp_5_300_driven'])
+@pytest.mark.parametrize('more', [(), ('--controller', 'sofc_force_ppr')])
+def test_a_controller_of_a_force_cannot_be_tuned_and_a_preset_is_named(
+        tmp_path, capsys, rig, more):
+    assert main(['tune', '--model', rig, *more, '--out', str(tmp_path / 'tuned.yaml')]) == 2
+    said = capsys.readouterr().err
+    assert 'a controller of a force cannot be tuned; the presets sofc_force_ppr' in said
+    assert not any(tmp_path.iterdir())
+
+
+def test_a_joint_is_tuned_on_the_experiments_that_it_can_do():
+    bench, leg = load_joint('joint_dmsp_5_300'), load_joint('knee_dmsp_20_300')
+    assert _of_joint(bench) == (('joint_tuning',), 'joint_tuning_check')
+    assert _of_joint(leg) == (('knee_tuning',), 'knee_tuning_check')
+    # A limb as heavy as a leg that turns about 0 degrees.
+    limb = bench.with_(parameters={'inertia_kg_m2': leg.parameters['inertia_kg_m2']})
+    assert _of_joint(limb) == _of_joint(bench)
