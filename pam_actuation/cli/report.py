@@ -42,6 +42,7 @@ def run(args: argparse.Namespace) -> int:
     """Load the bags and write the page."""
     from pam_actuation.bags.load_joint import load_recording, MEASURED
     from pam_actuation.bags.oddities import recording_remarks
+    from pam_actuation.report.ahead import ahead
     from pam_actuation.report.full_valves import full_valves
     from pam_actuation.report.joint_page import joint_report
     from pam_actuation.report.origin import default_page, origin
@@ -60,7 +61,8 @@ def run(args: argparse.Namespace) -> int:
     named = list(zip(default_titles(runs), runs))
     remarks = [
         *recording_remarks(runs), *filter(None, [unlike(named), *map(full_valves, runs)]),
-        *(f'{title}: {said}' for title, run in named if (said := swinging(run))),
+        *(f'{title}: {said}' for title, run in named
+          for said in filter(None, (swinging(run), ahead(run)))),
         *(f'{title}: {said}' for title, facts in summary.items()
           for said in facts.get('learned_worse', ())),
         *same_remarks(summary.get('over_seeds', {}))]

@@ -54,8 +54,7 @@ def run(args: argparse.Namespace) -> int:
     from pam_actuation.bags.place import check_bag_target
     from pam_actuation.drivers.vented import check_rig_vents
     from pam_actuation.rigging.session import run_experiment
-    from pam_actuation.report.full_valves import full_valves_in
-    from pam_actuation.report.swinging import swinging_in
+    from pam_actuation.report.tracked import tracked_remarks
     from pam_sim.rig_text import rig_title
     experiment, rig, controller = load_setup(args)
     check_rig_vents(rig)
@@ -73,8 +72,7 @@ def run(args: argparse.Namespace) -> int:
             tell=lambda text: bar.write(f'pam run: {text}', file=sys.stderr))
     wall_s = time.perf_counter() - started
     if result.complete and result.bag:
-        remarks += full_valves_in(result.bag, experiment, rig.valve)
-        remarks += swinging_in(result.bag, experiment)
+        remarks += tracked_remarks(result.bag, experiment)
     # A node that was killed could not report its last count.
     counted = '' if result.failure else f', {sum(result.published.values())} published'
     if counted and result.of_others:

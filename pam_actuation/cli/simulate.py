@@ -41,8 +41,7 @@ def run(args: argparse.Namespace) -> int:
     """Simulate and say what was recorded; exit code 1 if a driver vented on a fault."""
     from pam_actuation.bags.place import check_bag_target
     from pam_actuation.experiments.offline import simulate_experiment
-    from pam_actuation.report.full_valves import full_valves_in
-    from pam_actuation.report.swinging import swinging_in
+    from pam_actuation.report.tracked import tracked_remarks
     from pam_sim.rig_text import rig_title
     experiment, rig, controller = load_setup(args)
     remarks = tell_remarks(args, experiment, rig.valve, rig, controller, args.rig)
@@ -56,8 +55,7 @@ def run(args: argparse.Namespace) -> int:
             preview_s=args.preview)
         bar.update(experiment.duration_s - bar.n)
     result['wall_s'] = time.perf_counter() - started
-    remarks += full_valves_in(result['bag'], experiment, rig.valve)
-    remarks += swinging_in(result['bag'], experiment)
+    remarks += tracked_remarks(result['bag'], experiment)
     # The keys of `pam run`, so that one program reads both.
     result |= {'complete': True, 'failure': '', 'remarks': remarks,
                'published': result['counts'], 'recorded': result['counts'], 'exit_codes': {},

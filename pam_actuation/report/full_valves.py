@@ -15,18 +15,14 @@
 """On/off valves that are too small for the motion they were asked for."""
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 from pam_actuation.bags.facts import recorded_muscle
-from pam_actuation.bags.load_joint import load_recording, MEASURED
+from pam_actuation.bags.load_joint import MEASURED
 from pam_actuation.report.metrics import saturation_share
 from pam_actuation.report.page import paragraph, Section
 from pam_actuation.rig_files.by_size import by_size
 from pam_sim.joint.parameters import SIDES
 from pam_sim.run import Run
-
-if TYPE_CHECKING:
-    from pam_actuation.experiments.experiment import Experiment
 
 MOST = 0.1                   # of the messages fully open; presets need none for smooth motions
 SMALL = 0.8                  # of the conductance by size: worth a word
@@ -62,14 +58,6 @@ def _of_muscle(run: Run, which: str) -> str:
     return (f'{which} stood fully open for {100 * share[1]:.0f} % of the time, so the valves '
             'limit this motion, and the error says little of the controller; take larger valves'
             f'{number}, a higher supply pressure or a slower motion')
-
-
-def full_valves_in(bag: str, experiment: 'Experiment', valve: str) -> list[str]:
-    """Return that sentence of a bag that was just recorded, if any."""
-    if valve != 'hsv' or not experiment.asks_for_motion:
-        return []
-    said = full_valves(load_recording(bag))
-    return [said] if said else []
 
 
 def full_valves_section(runs: Iterable[tuple[str, Run]]) -> Section | None:

@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 from pam_actuation.report import errors, figures, metrics, signals
+from pam_actuation.report.ahead import ahead_section
 from pam_actuation.report.full_valves import full_valves_section
 from pam_actuation.report.learning import learned_worse, times_rolled_back
 from pam_actuation.report.page import plot, render, Section, table
@@ -155,7 +156,8 @@ def joint_report(runs: Sequence[Run], out_path: str | os.PathLike[str],
     sections = [*filter(None, [
         early_section(runs), implausible_section(list(zip(titles, runs))),
         full_valves_section(zip(titles, runs)), swinging_section(zip(titles, runs)),
-        unlike_section(list(zip(titles, runs))), _merits(named),
+        ahead_section(zip(titles, runs)), unlike_section(list(zip(titles, runs))),
+        _merits(named),
         seeds_section(spread), cycle_chart([
             (title, np.degrees(one.cycle_rmse_rad), one.cycle_parts) for title, one in named],
             '°'), _overlaid(list(zip(titles, runs)))])]

@@ -19,6 +19,7 @@ from typing import Any, TYPE_CHECKING
 
 from pam_actuation.bags.facts import recorded_muscle
 from pam_actuation.bags.oddities import recording_remarks
+from pam_actuation.report.ahead import ahead_section
 from pam_actuation.report.errors import by_part
 from pam_actuation.report.full_valves import full_valves_section
 from pam_actuation.report.metrics import run_metrics, RunMetrics
@@ -87,8 +88,8 @@ def bag_report(runs: 'Sequence[Run]', out_path: StrPath, titles: Sequence[str] |
     spread = over_seeds(list(zip(titles, runs, measured)))
     sections = [early_section(runs), implausible_section(list(zip(titles, runs))),
                 full_valves_section(zip(titles, runs)), swinging_section(zip(titles, runs)),
-                unlike_section(list(zip(titles, runs))), metrics(named), seeds_section(spread),
-                cycles(named),
+                ahead_section(zip(titles, runs)), unlike_section(list(zip(titles, runs))),
+                metrics(named), seeds_section(spread), cycles(named),
                 overlaid(list(zip(titles, runs)))]
     for k, (title, run) in enumerate(zip(titles, runs)):
         heading = 'Signals over time' + (f': {title}' if len(runs) > 1 else '')

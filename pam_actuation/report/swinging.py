@@ -14,19 +14,18 @@
 
 """A muscle or a joint that swings at a frequency nobody asked for."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from pam_actuation.bags.load_joint import load_recording
 from pam_actuation.control.sent_reference import wanted_at
 from pam_actuation.report import signals
 from pam_actuation.report.page import paragraph, Section
 from pam_sim.annotations import FloatArray
 
 if TYPE_CHECKING:
-    from pam_actuation.experiments.experiment import Experiment
+    from pam_actuation.report.errors import Signal
     from pam_sim.run import Run
 
 # (reference, its field, measured topic, its field, factor to the unit, unit, least amplitude)
@@ -129,21 +128,26 @@ def swinging(run: 'Run') -> str:
     pushed = signals.series(run, 'external_force')
     if pushed is not None and pushed[1].any():
         return ''
-    for topic, field, of, measured, factor, unit, least in TRACKED:
-        asked, moved = signals.series(run, topic, field), signals.series(run, of, measured)
-        if asked is None or moved is None or len(asked[0]) < 2 or not (
-                np.isfinite(asked[1]).any()):
-            continue
-        begin_s, end_s = max(asked[0][0], moved[0][0]), min(asked[0][-1], moved[0][-1])
+    for reference, moved, unit, least in followed(run):
+        begin_s, end_s = max(reference[0][0], moved[0][0]), min(reference[0][-1], moved[0][-1])
         if end_s - begin_s < WINDOW_S:
             continue
         time_s = np.arange(begin_s, end_s, 1.0 / RATE_HZ)
         found = find_swinging(
-            time_s, factor * wanted_at(time_s, *asked), factor * np.interp(time_s, *moved),
-            least, unit)
+            time_s, wanted_at(time_s, *reference), np.interp(time_s, *moved), least, unit)
         if found is not None:
             return _sentence(found, 'joint' if unit == '°' else 'muscle')
     return ''
+
+
+def followed(run: 'Run') -> 'Iterator[tuple[Signal, Signal, str, float]]':
+    """Give reference, measured motion, their unit and the least amplitude worth a word."""
+    for topic, field, of, measured, factor, unit, least in TRACKED:
+        asked, moved = signals.series(run, topic, field), signals.series(run, of, measured)
+        if asked is None or moved is None or len(asked[0]) < 2 or not len(moved[0]) or not (
+                np.isfinite(asked[1]).any()):
+            continue
+        yield (asked[0], factor * asked[1]), (moved[0], factor * moved[1]), unit, least
 
 
 def _sentence(found: Swinging, what: str) -> str:
@@ -155,14 +159,6 @@ def _sentence(found: Swinging, what: str) -> str:
             f'{found.frequency_hz:.1f} Hz, from {found.begin_s:.0f} to {found.end_s:.0f} s, '
             'which its reference does not ask for: the feedback is too strong or too late for '
             f'this rig; take another controller, or {way_on}')
-
-
-def swinging_in(bag: str, experiment: 'Experiment') -> list[str]:
-    """Return that sentence of a bag that was just recorded, if any."""
-    if not experiment.asks_for_motion:
-        return []
-    said = swinging(load_recording(bag))
-    return [said] if said else []
 
 
 def swinging_section(runs: 'Iterable[tuple[str, Run]]') -> Section | None:
