@@ -14,21 +14,19 @@
 
 """MAT files of MATLAB and GNU Octave, up to version 7; 7.3 is HDF5."""
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection
 import re
-from typing import Any, TYPE_CHECKING
+from typing import TYPE_CHECKING
 import warnings
 
-import numpy as np
 from pam_actuation.tables.formats import hdf5
-from pam_actuation.tables.formats.arrays import tables_of
+from pam_actuation.tables.formats.structs import Walk
 from pam_actuation.tables.table import Table
 from pam_sim.errors import InputError
 
 if TYPE_CHECKING:
     import pandas as pd
 
-_DEEPEST = 6
 _TWICE = re.compile('Duplicate variable name "(.*?)"')       # what SciPy warns of
 OBJECTS = ('it holds objects of MATLAB, such as a table, which only MATLAB reads; write them '
            'there with writetable, or as arrays with table2array')
@@ -46,30 +44,18 @@ def read(path: str, every: int, wanted: Collection[str] | None,
         return hdf5.read(path, every, wanted, progress)
     except (matlab.MatReadError, ValueError, TypeError, IndexError, OSError, KeyError) as error:
         raise InputError(f'is no readable MAT file: {error}', path) from None
-    found = tables_of(path, _arrays({name: value for name, value in content.items()
-                                     if not name.startswith('__')}), every)
+    walk = Walk({name: value for name, value in content.items() if not name.startswith('__')})
+    found = walk.tables(path, every)
     objects = {name for name, value in content.items() if isinstance(value, matlab.MatlabOpaque)}
     if objects and not found:
         raise InputError(f'has no array; {OBJECTS}', path)
     twice = {name for one in told for name in _TWICE.findall(str(one.message))} - objects
-    remarks = [OBJECTS] if objects else []
+    remarks = ([OBJECTS] if objects else []) + walk.remarks
     remarks += [f'`{name}` stands more than once in it; the last one was taken'
                 for name in sorted(twice)]
     for table in found:
         table.remarks += remarks
     return found
-
-
-def _arrays(content: dict[str, Any], prefix: str = '', depth: int = 0
-            ) -> Iterator[tuple[str, Any]]:
-    """Return name and value of every array, those within structs by ``struct.field``."""
-    for name, value in content.items():
-        fields = getattr(value, '_fieldnames', None)
-        if fields is not None and depth < _DEEPEST:
-            yield from _arrays({field: getattr(value, field) for field in fields},
-                               f'{prefix}{name}.', depth + 1)
-        elif isinstance(value, np.ndarray):
-            yield f'{prefix}{name}', value
 
 
 def write(frame: 'pd.DataFrame', path: str) -> None:
