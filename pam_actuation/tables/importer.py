@@ -29,6 +29,7 @@ from pam_actuation.bags.writer import BagWriter
 from pam_actuation.messages import VALVE_NAMES
 from pam_actuation.namespaces import JOINT, MUSCLE, namespace_of
 from pam_actuation.tables.clock import clock_of, own_time
+from pam_actuation.tables.crossed import crossed
 from pam_actuation.tables.guess import is_exported, unit_of_column
 from pam_actuation.tables.lengths import size_of_mapping
 from pam_actuation.tables.mapping import TableMapping
@@ -247,7 +248,8 @@ def _check(result: Recording, size: Size, accept: bool) -> None:
         if BY_NAME[name].topic.endswith('contraction') and (
                 held_m := held_at_m(values, size)) is not None:
             result.told.append(f'{name}: the muscle is held at {1e3 * held_m:.4g} mm')
-    found = doubts(result.signals, result.mapping.signals, size)
+    found = doubts(result.signals, result.mapping.signals, size) + crossed(
+        result.signals, result.mapping.signals)
     wrong = next((one for one in found if one.is_wrong), None)
     if wrong is not None and not accept:
         raise InputError(f'{wrong.sentence}. (--accept takes the values as they are)')

@@ -1,0 +1,114 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Columns of a file that were taken for one another: of another muscle, or of a command."""
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+from pam_actuation.tables.mapping import ColumnMap
+from pam_actuation.tables.plausible import Doubt
+from pam_actuation.tables.signals import BY_NAME, of_muscles
+from pam_actuation.topics.table import topic_of
+from pam_sim.annotations import FloatArray, IntArray
+from pam_sim.joint.parameters import SIDES
+
+COMMANDS = ('pressure_command', 'ppr_voltage')      # a pressure follows them
+LEAST_RISE_PA = 2e4                 # of a pressure that moves, and of one that is wanted
+LAGS_S = np.arange(0.0, 0.51, 0.05)                 # of a valve behind its command
+AGAINST, ALONG = -0.3, 0.7          # correlation of a pressure with a command
+FEWEST = 50                         # values
+
+Signals = Mapping[str, tuple[IntArray, FloatArray]]
+
+
+def crossed(signals: Signals, mapped: Mapping[str, ColumnMap]) -> list[Doubt]:
+    """
+    Return a doubt on each signal that seems to be another one.
+
+    That is a measured signal that equals another signal of its quantity value by value, and a
+    pressure that falls where its command rises.
+
+    Parameters
+    ----------
+    signals : dict of str to tuple of ndarray
+        Stamps [ns] and SI values by name of the signal, NaN where missing.
+    mapped : dict of str to ColumnMap
+        Where they come from.
+
+    """
+    equal = list(_equal_pairs(signals))
+    said = [f'{_named(one, mapped)}: each value is that of {_named(other, mapped)}; is it '
+            'measured, or the same column twice?' for one, other in equal]
+    taken = {name for pair in equal for name in pair}
+    return [Doubt(text) for text in (*said, *_against_command(signals, mapped, taken))]
+
+
+def _named(name: str, mapped: Mapping[str, ColumnMap]) -> str:
+    return f'{name} (column "{mapped[name].column}")'
+
+
+def _equal_pairs(signals: Signals) -> Iterator[tuple[str, str]]:
+    """Yield a measured signal and another one of its quantity with the same values."""
+    names = [name for name in signals if not BY_NAME[name].is_rate]
+    for place, one in enumerate(names):
+        for other in names[place + 1:]:
+            if BY_NAME[one].quantity != BY_NAME[other].quantity:
+                continue
+            measured = [name for name in (one, other)
+                        if topic_of(BY_NAME[name].topic).is_measured]
+            values = signals[one][1]
+            if measured and np.isfinite(values).sum() >= FEWEST and np.ptp(
+                    values[np.isfinite(values)]) > 0.0 and np.array_equal(
+                    values, signals[other][1], equal_nan=True):
+                yield measured[0], other if measured[0] == one else one
+
+
+def _against_command(signals: Signals, mapped: Mapping[str, ColumnMap], taken: set[str]
+                     ) -> Iterator[str]:
+    """Yield a sentence on each pressure that falls where its command rises."""
+    for place, names in of_muscles(signals).items():
+        command = next((name for name in COMMANDS if name in names), '')
+        pressure = f'{place}pressure'
+        if not command or 'pressure' not in names or pressure in taken:
+            continue
+        own = _following(signals, pressure, f'{place}{command}')
+        if own is None:
+            continue
+        others = [f'{side}/{command}' for side in SIDES
+                  if place and f'{side}/' != place and f'{side}/{command}' in signals]
+        if others and own < -AGAINST and (_following(signals, pressure, others[0]) or 0.0) > ALONG:
+            yield (f'{_named(pressure, mapped)}: it follows {_named(others[0], mapped)}, and not '
+                   f'{_named(f"{place}{command}", mapped)}; are the columns exchanged?')
+        elif own < AGAINST:
+            yield (f'{_named(pressure, mapped)}: it falls where '
+                   f'{_named(f"{place}{command}", mapped)} rises; are they of two muscles?')
+
+
+def _following(signals: Signals, pressure: str, command: str) -> float | None:
+    """Return the largest correlation of a pressure with a command before; None where open."""
+    (stamp_ns, pressure_pa), (sent_ns, sent) = signals[pressure], signals[command]
+    known, said = np.isfinite(pressure_pa), np.isfinite(sent)
+    stamp_ns, pressure_pa = stamp_ns[known], pressure_pa[known]
+    sent_ns, sent = sent_ns[said], sent[said]
+    if min(len(stamp_ns), len(sent_ns)) < FEWEST or np.ptp(pressure_pa) < LEAST_RISE_PA:
+        return None
+    found = []
+    for lag_s in LAGS_S:
+        place = np.searchsorted(sent_ns, stamp_ns - int(1e9 * lag_s), side='right') - 1
+        there = place >= 0
+        held = sent[place[there]]
+        if there.sum() >= FEWEST and np.ptp(held) > 0.0 and np.ptp(pressure_pa[there]) > 0.0:
+            found.append(float(np.corrcoef(pressure_pa[there], held)[0, 1]))
+    return max(found, default=None)
