@@ -55,7 +55,8 @@ COLUMNS = {
     'contraction_cm': ('contraction', 1e-2), 'contraction_in': ('contraction', INCH_M),
     'contraction_%': ('strain', 0.01), 'strain_%': ('strain', 0.01),
     **{f'{name}_{unit}': (name, newton) for name in ('force', 'load') for unit, newton in (
-        ('kn', 1e3), ('kg', KGF_N), ('kgf', KGF_N), ('lbf', LBF_N))},
+        ('kn', 1e3), ('kg', KGF_N), ('kgf', KGF_N), ('lbf', LBF_N), ('lb', LBF_N),
+        ('lbs', LBF_N))},
 }
 _IN_BRACKETS = re.compile(r'[\s_]*[\[(]\s*([^\])]*?)\s*[\])]$')
 # From about the atmosphere on, rows so close to the lowest pressure, moved by less than a share.

@@ -231,6 +231,7 @@ def test_tables_with_too_few_points_are_refused(tmp_path):
 
 @pytest.mark.parametrize('head, factors', [
     ('Pressure (psi),Length [in],Force (lbf)', (6894.757293168361, 0.0254, 4.4482216152605)),
+    ('Pressure (psi),Length (in),Force (lbs)', (6894.757293168361, 0.0254, 4.4482216152605)),
     ('pressure_bar,length_cm,force_kg', (1e5, 1e-2, 9.80665)),
     ('Pressure gauge [MPa],Length (mm),Force [kN]', (1e6, 1e-3, 1e3)),
     ('Pressure_kPa, Length  mm,Force [kgf]', (1e3, 1e-3, 9.80665))])

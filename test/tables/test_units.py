@@ -46,7 +46,8 @@ def test_what_is_no_pressure(text):
 @pytest.mark.parametrize('text, quantity, size', [
     ('daN', 'force', 10.0), ('kp', 'force', 9.80665), ('kp/cm²', PRESSURE, 98066.5),
     ('kg/cm2', PRESSURE, 98066.5), ('N/mm²', PRESSURE, 1e6), ('V DC', 'voltage', 1.0),
-    ('inches', 'length', 0.0254)])
+    ('inches', 'length', 0.0254), ('lbs', 'force', 4.4482216152605),
+    ('Pounds', 'force', 4.4482216152605)])
 def test_units_that_testing_machines_write(text, quantity, size):
     assert unit_of_text(text, quantity).factor == pytest.approx(size)
 
