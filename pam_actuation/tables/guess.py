@@ -41,6 +41,7 @@ LOWEST_AIR = 0.6                  # of it: the air of the highest towns
 # What names of other programs end in that says only where in a message the number stands.
 _PLACE = re.compile(r'(?<=.)/(data|value|[xyz])([.\[]\d+\]?)?$')
 FEW_BELOW = 0.02                  # share of the rows; fewer may be a sensor that drops out
+_EXT = re.compile(r'(?<![^\W_])ext(?![^\W_])', re.IGNORECASE)
 _STRAIN = re.compile(r'\b(strain|epsilon|ratio)\b')
 _Meaning = tuple[ColumnMap, str] | Question     # what a column is and why, or what must be asked
 
@@ -284,6 +285,8 @@ def _signals_of(table: Table, column: str) -> list[Signal]:
         return [exported]
     own, unit = _heading_of(table, column), unit_of_column(table, column)
     names = [own.name, *([own.inlet] if own.inlet else [])]
+    if _is_beside_a_flexor(table, column):
+        names = [_EXT.sub('extensor', one) for one in names]
     # A unit after a stroke, as in `p/bar`, or the last part of a path.
     for texts in (names, [_name_of(table, column)] if own.unit else []):
         found = [of_words(words_in(name), path, unit) for path, _, name in (
@@ -291,6 +294,12 @@ def _signals_of(table: Table, column: str) -> list[Signal]:
         if any(found):
             return list(dict.fromkeys(one for one in found if one is not None))
     return []
+
+
+def _is_beside_a_flexor(table: Table, column: str) -> bool:
+    """Return whether `ext` means the extensor, as in `P_ext` beside `P_flex`: else external."""
+    flexor = _EXT.sub('flex', column.lower())
+    return flexor != column.lower() and flexor in {one.lower() for one in table.columns}
 
 
 def is_exported(column: str, signal: Signal) -> bool:

@@ -70,6 +70,17 @@ def test_what_does_not_go_together_is_told(table, options, words, capsys):
     assert words in capsys.readouterr().err
 
 
+def test_ext_is_the_extensor_beside_a_column_of_the_flexor(table, capsys):
+    text = open(table, encoding='utf-8').read().replace('extensor', 'ext').replace(
+        'flexor', 'flex')
+    for one, words in ((text, 'extensor/pressure in kPa_gauge'),
+                       (text.replace('p_flex ', 'p_other ').replace('u_flex ', 'u_other '), '')):
+        open(table, 'w', encoding='utf-8').write(one.replace(' [kPa]', ' [kPa gauge]'))
+        assert main(['import', table, '--preview']) == 0
+        said = capsys.readouterr().out
+        assert ('extensor/' in said) == bool(words) and words in said
+
+
 def test_a_joint_without_its_angle_is_refused(table, capsys):
     text = open(table, encoding='utf-8').read().replace('knee angle [deg]', 'other')
     open(table, 'w', encoding='utf-8').write(text)
