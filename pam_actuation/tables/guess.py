@@ -330,7 +330,7 @@ def _of_column(table: Table, column: str, signal: Signal, missing: Collection[st
         return of_output_column(signal, column, shown, text)
     if unit is None:
         return Question(signal.name, column, f'{shown}: in which unit?',
-                        tuple(_plausible(signal, low, high)))
+                        tuple(plausible_units(signal, low, high)))
     if unit.is_complete:
         by = 'message type' if column in table.by_type else 'name'
         return ColumnMap(column, unit), f'unit {unit.name} by {by}'
@@ -370,7 +370,7 @@ _LARGEST = {PRESSURE: 1e6, LENGTH: 0.12, 'force': 2000.0, VOLTAGE: 10.5, 'duty':
             ANGLE: 3.5}
 
 
-def _plausible(signal: Signal, low: float, high: float) -> list[str]:
+def plausible_units(signal: Signal, low: float, high: float) -> list[str]:
     """Return the units in which a range fits a rig; all of them where none does."""
     # A length may count from anywhere.
     largest = high - low if signal.quantity == LENGTH else max(abs(low), abs(high))

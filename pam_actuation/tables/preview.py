@@ -21,20 +21,24 @@ from typing import Any
 import numpy as np
 from pam_actuation.tables.clock import clock_of, FEWEST_RISING, own_time, time_column
 from pam_actuation.tables.day_and_time import pair_of
-from pam_actuation.tables.guess import falls_below_atmosphere, Guess, unit_of_column
+from pam_actuation.tables.guess import (
+    BELOW_ATMOSPHERE, falls_below_atmosphere, Guess, plausible_units, unit_of_column)
 from pam_actuation.tables.lengths import length_column
 from pam_actuation.tables.mapping import usual_unit
 from pam_actuation.tables.parts import likely_signals, measured_by, name_of_parts
 from pam_actuation.tables.questions import needs_gain
 from pam_actuation.tables.signals import are_of_joint, BY_NAME
 from pam_actuation.tables.table import Table
-from pam_actuation.tables.units import ABSOLUTE, DATE, form_of, GAUGE, unit_of_text, VOLTAGE
+from pam_actuation.tables.units import (
+    ABSOLUTE, DATE, form_of, GAUGE, PRESSURE, unit_of_text, VOLTAGE)
 from pam_actuation.tables.words import words_of
 from pam_actuation.topics.table import OF_A_RUN, short_name
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
+from pam_sim.units import P_ATM_PA
 
 _MOST_COLUMNS = 60
+_MOST_KPA = 2e3                      # no muscle stands more
 # Words of a likely column, and the gain of a sensor of 4 to 20 mA (10 bar, 100 mm).
 _EXAMPLES = {'pressure': (r'\bp\b|press', 62.5),
              'contraction': (r'\bx\b|dist|pos|disp|stroke|contract', 6.25)}
@@ -132,9 +136,12 @@ def how_to_begin(tables: Collection[Table], found: Guess) -> str:
     left = {column: table for table in tables if not _is_of_internals(table)
             for column in unread([table], found) if not _is_constant(table, column)}
     said: dict[str, str] = {}
-    times = [one for one, table in left.items() if _is_a_time(table, one, found)]
+    times = [one for strictly in (True, False) for one, table in left.items()
+             if _is_a_time(table, one, found, strictly)]
     if times:
         del left[times[0]]
+    left = {one: table for one, table in left.items()
+            if not _counts_rows(table, one, found) and 'header' not in words_of(one).split()}
     for fits in (_has_the_topic, _is_likely, _is_called, _has_the_unit, _has_no_unit):
         for signal in ('pressure', 'contraction', 'force', 'ppr_voltage'):
             column = next((one for one, table in left.items() if signal not in said
@@ -187,14 +194,32 @@ def _has_no_unit(table: Table, column: str, signal: str) -> bool:
     return signal in _EXAMPLES and unit_of_column(table, column) in ('', 'mA')
 
 
-def _is_a_time(table: Table, column: str, found: Guess) -> bool:
-    """Return whether a column rises from row to row in a table whose time is not known."""
+def _is_a_time(table: Table, column: str, found: Guess, strictly: bool) -> bool:
+    """
+    Return whether a column rises from row to row in a table whose time is not known.
+
+    Not strictly, it stands still in less than half of the rows: a time in ms of quicker rows.
+    """
     mapping = found.mapping
     if (mapping.rate_hz or table.stamp_ns is not None or unit_of_column(table, column)
             or time_column(table, mapping) is not None):
         return False
     values = _finite(table, column)
-    return len(values) == len(table) >= FEWEST_RISING and bool((np.diff(values) > 0.0).all())
+    if len(values) != len(table) or len(table) < FEWEST_RISING:
+        return False
+    steps = np.diff(values)
+    return bool((steps > 0.0).all() if strictly else
+                (steps >= 0.0).all() and (steps > 0.0).mean() > 0.5)
+
+
+def _counts_rows(table: Table, column: str, found: Guess) -> bool:
+    """Return whether a column without a unit counts the rows, or is the time once more."""
+    if unit_of_column(table, column):
+        return False
+    values, time = _finite(table, column), time_column(table, found.mapping)
+    is_count = len(values) >= FEWEST_RISING and bool((np.diff(values) == 1.0).all())
+    return is_count or time is not None and table.name_of(time.column) is not None and (
+        np.array_equal(values, _finite(table, table.require(time.column))))
 
 
 def _is_constant(table: Table, column: str) -> bool:
@@ -222,13 +247,24 @@ def _option(table: Table, column: str, signal: str) -> str:
     if unit is None and quantity != VOLTAGE and measured_by(words_of(column)) == {VOLTAGE}:
         return f'--map {signal}="{column}:{form_of(quantity)}"'     # such as `Voltage_0`
     if unit is None:
-        more = f':zero=4:gain={_EXAMPLES[signal][1]:g}' if text == 'mA' else ''
-        return f'--map {signal}="{column}:{usual_unit(quantity)}{more}"'
+        if text == 'mA':
+            return (f'--map {signal}="{column}:{usual_unit(quantity)}:zero=4:'
+                    f'gain={_EXAMPLES[signal][1]:g}"')
+        return f'--map {signal}="{column}:{_usual_unit(signal, finite)}"'
     if unit.is_complete:
         return f'--map {signal}="{column}:{unit.name}"'
     is_gauge = falls_below_atmosphere(finite, unit).any()
     other = '' if is_gauge else f' (or {unit.name}_{ABSOLUTE})'
     return f'--map {signal}="{column}:{unit.name}_{GAUGE}"{other}'
+
+
+def _usual_unit(signal: str, finite: FloatArray) -> str:
+    """Return the unit in which most programs write a signal, or one for a pressure in Pa."""
+    usual = usual_unit(BY_NAME[signal].quantity)
+    if BY_NAME[signal].quantity != PRESSURE or not len(finite) or finite.max() < _MOST_KPA:
+        return usual
+    fitting = plausible_units(BY_NAME[signal], float(finite.min()), float(finite.max()))
+    return fitting[-1] if finite.min() > BELOW_ATMOSPHERE * P_ATM_PA else fitting[0]
 
 
 def unread(tables: Collection[Table], found: Guess) -> list[str]:

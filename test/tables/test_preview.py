@@ -80,3 +80,35 @@ def test_a_column_that_rises_is_proposed_as_the_time(tmp_path, capsys):
     said = capsys.readouterr().out
     assert ('--map time="data[0]:s" --map pressure="data[1]:kPa_gauge" --map '
             'contraction="data[2]:mm"' in said)
+
+
+def test_what_counts_rows_or_time_is_proposed_as_no_signal(tmp_path, capsys):
+    rows = np.arange(400)
+    time_s = np.floor(0.6 * rows) / 1e3             # written in ms, two rows of some
+    np.savetxt(tmp_path / 'm.csv', np.column_stack([np.sin(rows), 30 + rows % 7, time_s]), '%.6g')
+    assert main(['import', str(tmp_path / 'm.csv'), '--preview']) == 0
+    assert '--map time="#3:s" --map pressure="#1:kPa_gauge"' in capsys.readouterr().out
+    savemat(tmp_path / 'm.mat', {'tout': 0.01 * rows, 'k': rows, 'time': 0.01 * rows,
+                                 'a': np.sin(rows), 'b': 2e5 + 1e5 * np.sin(rows)})
+    assert main(['import', str(tmp_path / 'm.mat'), '--preview']) == 0
+    said = capsys.readouterr().out
+    assert '--map pressure="a:kPa_gauge" --map contraction="b:' in said
+
+
+def test_a_pressure_in_pascal_is_proposed_in_pascal(tmp_path, capsys):
+    rows = np.arange(400)
+    savemat(tmp_path / 'm.mat', {'time': 0.01 * rows, 'tank': 3e5 + 2e5 * np.sin(rows)})
+    assert main(['import', str(tmp_path / 'm.mat'), '--preview']) == 0
+    assert '--map pressure="tank:Pa_abs"' in capsys.readouterr().out
+
+
+def test_a_table_of_rostopic_is_called_by_the_fields_of_its_message(tmp_path, capsys):
+    rows = [f'{1_600_000_000_000_000_037 + k * 10_000_000},{k},0,pam,{101325 + 900 * k:.1f},0.0'
+            for k in range(300)]
+    (tmp_path / 'p.csv').write_text('\n'.join([
+        '%time,field.header.seq,field.header.stamp,field.header.frame_id,field.fluid_pressure,'
+        'field.variance', *rows, '']), encoding='utf-8')
+    assert main(['import', str(tmp_path / 'p.csv'), '--preview']) == 0
+    said = capsys.readouterr().out
+    assert 'pressure in Pa_abs (unit Pa_abs by message type)' in said
+    assert 'time' in next(line for line in said.splitlines() if ' #1 ' in line)

@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 Opened = Callable[[], Any]
 _OPEN: dict[str, Callable[..., Any]] = {'.gz': gzip.open, '.bz2': bz2.open, '.xz': lzma.open}
 _CHUNK_ROWS = 250_000
+_FIELD, _FLUID = 'field.', 'field.fluid_pressure'
 _PACKED_FACTOR = 6                       # how much longer a packed text may be
 
 
@@ -109,9 +110,22 @@ def tables_of_text(path: str, opened: Opened, size: float, every: int,
         columns = {X_VALUE: _times(layout, every * numbers), **{
             name: values for name, values in columns.items() if name != X_VALUE}}
         units[X_VALUE] = 's'
-    return [Table(path, columns, units, lines,
+    table = Table(path, columns, units, lines,
                   remarks=[*remarks, *found.remarks], numbered=found.numbered,
-                  called=layout.called, decimal=layout.decimal)]
+                  called=layout.called, decimal=layout.decimal)
+    _name_fields(table)
+    return [table]
+
+
+def _name_fields(table: Table) -> None:
+    """Call the columns of ``rostopic echo -p`` by the fields of the message."""
+    of_message = list(table.columns)[1:]
+    if not of_message or not all(name.startswith(_FIELD) for name in of_message):
+        return
+    table.called.update({name: name.removeprefix(_FIELD) for name in of_message})
+    if {_FLUID, f'{_FIELD}variance'} <= set(of_message):         # sensor_msgs/FluidPressure
+        table.units[_FLUID] = 'Pa'
+        table.by_type.add(_FLUID)
 
 
 def _times(layout: TextLayout, numbers: IntArray) -> 'pd.Series':
