@@ -30,6 +30,7 @@ from pam_actuation.tables.formats.damage import (
     check_quotes, NOT_CLOSED, WatchedText, whole_rows)
 from pam_actuation.tables.formats.labview import header_rows, X_VALUE
 from pam_actuation.tables.formats.layout_of_text import layout_of, SAMPLE_BYTES, TextLayout
+from pam_actuation.tables.formats.serial_log import serial_log
 from pam_actuation.tables.table import MOST_ROWS, Table
 from pam_sim.annotations import IntArray
 from pam_sim.errors import InputError
@@ -77,7 +78,13 @@ def tables_of_text(path: str, opened: Opened, size: float, every: int,
         As ``formats.read_tables``.
 
     """
-    layout = layout_of(_head(path, opened), path)
+    head = _head(path, opened)
+    log = serial_log(head, path)
+    if log is None:
+        layout = layout_of(head, path)
+    else:
+        opened = log.opened(opened)
+        layout = log.named(layout_of(_head(path, opened), path))
     rows = size / layout.line_bytes / every
     if rows > MOST_ROWS and not is_packed:
         raise InputError(
