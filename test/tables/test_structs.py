@@ -115,3 +115,49 @@ def test_a_long_list_of_vectors_is_left_out_with_a_remark(tmp_path, capsys):
     savemat(path, {'t': TIME_S, 'p_kPa_gauge': PRESSURE_KPA, 'images': cells})
     assert main(['import', str(path), '--out', str(tmp_path / 'bag')]) == 1
     assert '`images` holds 70 arrays' in capsys.readouterr().out
+
+
+def test_lists_of_structs_and_cells_of_version_7_3(tmp_path, capsys):
+    h5py = pytest.importorskip('h5py')
+    path = tmp_path / 'rec.mat'
+    with h5py.File(path, 'w', userblock_size=512) as file:
+        kept = file.create_group('#refs#')
+
+        def written(group, name, value):
+            """Write a value as MATLAB does, and return its place."""
+            if isinstance(value, str):
+                letters = np.array([[ord(one)] for one in value] or [[0], [0]], dtype=np.uint16)
+                place = group.create_dataset(name, data=letters)
+                place.attrs['MATLAB_class'] = np.bytes_('char')
+                if not value:
+                    place.attrs['MATLAB_empty'] = np.uint8(1)
+            else:
+                place = group.create_dataset(name, data=np.atleast_2d(value))
+                place.attrs['MATLAB_class'] = np.bytes_('double')
+            return place
+
+        def listed(group, name, values):
+            place = group.create_dataset(name, (len(values), 1), dtype=h5py.ref_dtype)
+            for number, value in enumerate(values):
+                place[number, 0] = written(kept, f'r{len(kept)}', value).ref
+            return place
+
+        x, y = file.create_group('rec/X'), file.create_group('rec/Y')
+        for group in (file['rec'], x, y):
+            group.attrs['MATLAB_class'] = np.bytes_('struct')
+        written(x, 'Name', 'Time')
+        written(x, 'Data', TIME_S)
+        listed(y, 'Name', ['Model Root/Pressure/Out1', 'Model Root/Position [mm]'])
+        listed(y, 'Unit', ['kPa', ''])
+        listed(y, 'Data', [PRESSURE_KPA, POSITION_MM])
+        # A table of MATLAB, which only MATLAB reads.
+        log = written(file, 'log', np.arange(6.0))
+        log.attrs['MATLAB_object_decode'] = np.int32(3)
+        listed(file, 'notes', ['one', 'two']).attrs['MATLAB_class'] = np.bytes_('cell')
+    with open(path, 'r+b') as stream:
+        stream.write(b'MATLAB 7.3 MAT-file'.ljust(124) + b'\x00\x02IM')
+    assert main(['import', str(path), '--out', str(tmp_path / 'bag')]) == 1
+    assert 'rec.mat: it holds objects of MATLAB' in capsys.readouterr().out
+    run = load_run(tmp_path / 'bag')
+    np.testing.assert_allclose(run['pressure']['pressure_pa'], 101_325.0 + 1e3 * PRESSURE_KPA)
+    np.testing.assert_allclose(run['contraction']['contraction_m'], 1e-3 * POSITION_MM)

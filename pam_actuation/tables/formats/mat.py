@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 import warnings
 
 from pam_actuation.tables.formats import hdf5
-from pam_actuation.tables.formats.structs import Walk
+from pam_actuation.tables.formats.structs import OBJECTS, Walk
 from pam_actuation.tables.table import Table
 from pam_sim.errors import InputError
 
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _TWICE = re.compile('Duplicate variable name "(.*?)"')       # what SciPy warns of
-OBJECTS = ('it holds objects of MATLAB, such as a table, which only MATLAB reads; write them '
-           'there with writetable, or as arrays with table2array')
 
 
 def read(path: str, every: int, wanted: Collection[str] | None,

@@ -27,11 +27,30 @@ import numpy as np
 from pam_actuation.tables.formats.arrays import columns_of, MOST, SHORTEST, tables_of, Title
 from pam_actuation.tables.table import Table
 
+OBJECTS = ('it holds objects of MATLAB, such as a table, which only MATLAB reads; write them '
+           'there with writetable, or as arrays with table2array')
 _DEEPEST = 6
 _MOST_RECORDINGS = 1000
 _NAMES = ('name', 'label', 'title', 'blockname')        # fields that say what a signal is
 _VALUES = ('data', 'values', 'value', 'samples')        # fields that hold its values
 _UNITS = ('unit', 'units')
+
+
+class Struct:
+    """
+    A struct of a file that SciPy does not read, with its fields as attributes.
+
+    Parameters
+    ----------
+    fields : dict of str to object
+        Values by name.
+
+    """
+
+    def __init__(self, fields: Mapping[str, Any]) -> None:
+        """Keep the fields."""
+        self._fieldnames = list(fields)
+        self.__dict__.update(fields)
 
 
 class Walk:
