@@ -22,6 +22,7 @@ from pam_actuation.bags.oddities import silent_remarks
 from pam_actuation.bags.plausibility import (
     GAUGE_HINT, Implausible, SHARE_HINT, Size, value_findings)
 from pam_actuation.bags.sensor_faults import course_remarks
+from pam_actuation.tables.converter import converter_end
 from pam_actuation.tables.guess import is_thin_air
 from pam_actuation.tables.lengths import LEAST_KEPT
 from pam_actuation.tables.mapping import ColumnMap
@@ -253,7 +254,7 @@ def _of_values(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Size
         return [*found, Doubt(f'the value never changes ({_shown(signal, float(finite.min()))}): '
                               'is the sensor connected?')]
     looks = (_hardly_moves, _pulls_much, _pushes, _moves_no_muscle, _gauge_or_absolute,
-             _other_unit, _is_a_share)
+             _other_unit, _is_a_share, _at_the_end)
     doubted = [look(signal, mapped, finite, size) for look in looks]
     return [*found, *(doubt for doubt in doubted if doubt is not None)]
 
@@ -353,6 +354,12 @@ def _is_a_share(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Siz
         return None
     return Doubt(f'it reaches {float(raw.max()):.3g} % only, at which no valve opens: is it a '
                  f'share of 1? Then write {replace(mapped, unit=share).option(signal.name)}')
+
+
+def _at_the_end(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Size
+                ) -> Doubt | None:
+    said = converter_end(_raw(mapped, finite), mapped.zero) if mapped.gain != 1.0 else ''
+    return Doubt(said) if said else None
 
 
 def against(text: str, mapped: ColumnMap, quantity: str) -> str:

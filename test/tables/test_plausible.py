@@ -458,3 +458,22 @@ def test_a_gauge_pressure_that_ends_near_zero_is_not_asked_for(tmp_path, monkeyp
         assert main(['import', 'm.csv', '--out', 'bag', '--overwrite']) == 0
         assert load_run('bag')['pressure']['pressure_pa'].min() == pytest.approx(
             P_ATM_PA + 1e5 * low_bar)
+
+
+@pytest.mark.parametrize('counts, options, words', [
+    (np.maximum(np.arange(400) % 200 - 20, 0), 'zero=30:gain=1.5',
+     'the converter reads 0, its lowest, for 10 % of the rows: what lies below is lost'),
+    (np.minimum(900 + np.arange(400) % 200, 1023), 'gain=0.3',
+     'the converter reads 1023, the largest number of 10 bits, for 38 % of the rows: what lies '
+     'above is lost'),
+    (np.minimum(900 + np.arange(400) % 200, 1000), 'gain=0.3', ''),
+    (np.maximum(np.arange(400) % 200 - 20, 0), 'gain=1.5', ''),
+    (np.minimum(200 + np.arange(400) % 200, 255), 'gain=1', '')])
+def test_counts_at_the_end_of_a_converter_are_told(counts, options, words, tmp_path, capsys):
+    path = tmp_path / 'run.csv'
+    np.savetxt(path, np.column_stack([0.01 * np.arange(400), counts]), '%.6g', ',', comments='',
+               header='t_s,force')
+    main(['import', str(path), '--out', str(tmp_path / 'bag'), '--map',
+          f'force=force:N:{options}'])
+    said = capsys.readouterr().out
+    assert ('the converter reads' in said) == bool(words) and words in said
