@@ -34,7 +34,7 @@ from pam_sim.gap.propose.surrogate import add_surrogate
 from pam_sim.gap.report.by_subsystem import add_place, subsystem_verdicts
 from pam_sim.gap.report.exact_numbers import exact_numbers, LEAST_LEFT
 from pam_sim.gap.report.fingerprint import fingerprint
-from pam_sim.gap.report.late_force import late_force
+from pam_sim.gap.report.late_force import late_contraction, late_force
 from pam_sim.gap.report.place import places
 from pam_sim.gap.report.reason import explain
 from pam_sim.gap.report.units_seen import unit_remarks
@@ -229,8 +229,9 @@ def _answered(runs: Run | Sequence[Run], rig: Rig, certify: Run | None, options:
     result.fingerprint = fingerprint(estimator, validation.base, validation.final)
     result.minimum_detectable = sizes_or_reasons(
         outcome.screened, rig, [s for p in estimator.problems for s in p.signals], materiality)
-    if result.verdict in WANTING and (late := late_force(own_runs, criteria)):
-        result.remarks.append(late)
+    if result.verdict in WANTING:
+        result.remarks += [late for late_by in (late_force, late_contraction)
+                           if (late := late_by(own_runs, criteria))]
     if result.unexplained_fraction > LEAST_LEFT:
         result.remarks += exact_numbers(
             estimator, context.base, checked.certify_runs, options.seed)

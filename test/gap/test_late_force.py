@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A load cell that is late by more than a skew of stamps is told as what it is."""
+"""A sensor that is late by more than a skew of stamps is told as what it is."""
 
 import re
 
@@ -23,22 +23,22 @@ from pam_sim.gap.report.late_force import shift_of
 from pam_sim.run import Run, Series
 import pytest
 
-LATE = 'its force is about'
+LATE, LATE_MOTION = 'its force is about', 'its contraction is about'
 
 
-def late(late_s, rig=None):
-    """Return a recording whose force is stamped so late."""
+def late(late_s, rig=None, topic='force'):
+    """Return a recording of which a topic is stamped so late."""
     run = recorded(rig or nominal(), voltages(12.0))
-    force = run.topics['force']
-    moved = Series(force.stamp_ns + round(1e9 * late_s), force.values)
-    return Run({**run.topics, 'force': moved}, {}, '/muscle', 'simulated')
+    own = run.topics[topic]
+    moved = Series(own.stamp_ns + round(1e9 * late_s), own.values)
+    return Run({**run.topics, topic: moved}, {}, '/muscle', 'simulated')
 
 
-def remarks(run):
-    """Return the verdict, and the remarks on a late force."""
+def remarks(run, words=LATE):
+    """Return the verdict, and the remarks on a late sensor."""
     result = find_gap(run, nominal(), effects=['creep', 'coulomb_friction'], unnamed=())
     assert_form(result)
-    return result.verdict, [one for one in result.remarks if LATE in one]
+    return result.verdict, [one for one in result.remarks if words in one]
 
 
 @pytest.mark.parametrize('late_s, word', [(0.012, 'late'), (-0.012, 'early')])
@@ -54,6 +54,21 @@ def test_a_force_with_stamps_of_another_clock_is_told_with_its_size(late_s, word
     (0.001, []), (0.0, [{'name': 'coulomb_friction', 'parameters': {'force_n': 2.0}}])])
 def test_a_usual_skew_or_a_motion_that_errs_is_no_late_force(late_s, effects):
     assert remarks(late(late_s, nominal().with_(effects=effects)))[1] == []
+
+
+@pytest.mark.parametrize('late_s', [0.06, 0.15])
+def test_a_contraction_of_a_slow_camera_is_told_with_its_delay(late_s):
+    verdict, told = remarks(late(late_s, topic='contraction'), LATE_MOTION)
+    assert verdict == 'unknown' and len(told) == 1
+    size, share = re.search(
+        LATE_MOTION + r' (\d+) ms late: that explains (\d+) %', told[0]).groups()
+    assert int(size) == pytest.approx(1e3 * late_s, abs=2) and int(share) > 90
+
+
+def test_a_motion_that_errs_otherwise_is_no_late_contraction():
+    run = late(0.0, nominal().with_(effects=[{
+        'name': 'bladder_stiffness', 'parameters': {'stiffness_n_per_m': 2000.0}}]))
+    assert remarks(run, LATE_MOTION)[1] == []
 
 
 def test_a_shift_is_found_with_its_share():
