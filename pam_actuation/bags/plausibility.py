@@ -86,8 +86,9 @@ class Size(NamedTuple):
         Length at rest.
     max_strain : float
         Largest contraction, as a fraction of it.
-    known_by : {'', 'rig', 'length'}
-        What says so: the rig, or the length alone; '' where it is taken for a DMSP-5-300.
+    known_by : {'', 'rig', 'length', 'any'}
+        What says so: the rig, or the length alone; '' where it is taken for a DMSP-5-300, 'any'
+        where no muscle on a rig shortens by more.
     simulated : bool
         Whether the values are of a simulation. A simulated muscle may be below the atmosphere.
     is_held : bool
@@ -114,6 +115,8 @@ class Size(NamedTuple):
     @property
     def said(self) -> str:
         """Return where the largest contraction comes from, in words."""
+        if self.known_by == 'any':
+            return 'no muscle shortens by more'
         why = {'rig': ', by `max_strain` of its rig', 'length': ': none shortens by more'}
         return (f'{100.0 * self.max_strain:.3g} % of a {1e3 * self.length_m:.0f} mm muscle'
                 f'{why.get(self.known_by, ", as no rig is stated")}')
@@ -141,7 +144,8 @@ def recorded_size(metadata: Mapping[str, str]) -> Size:
     size = size._replace(simulated='software_version' in metadata and not origin)
     if size.known_by or origin != 'imported':
         return size
-    return Size(float(metadata.get('length_m') or MOST_M / MOST_STRAIN), MOST_STRAIN, 'length')
+    told = metadata.get('length_m')
+    return Size(float(told or MOST_M / MOST_STRAIN), MOST_STRAIN, 'length' if told else 'any')
 
 
 def topic_remarks(info: 'TopicInfo', stamp_ns: IntArray, received_ns: IntArray,

@@ -92,3 +92,15 @@ def test_a_way_out_is_named_only_where_it_leads_out(table, capsys, values, ways)
     assert all(way in said for way in ways) and '--rig' in said, said
     for way in ('zero=', 'gain=-1'):
         assert (way in said) == any(way in one for one in ways), said
+
+
+def test_a_bag_of_a_table_names_no_muscle_that_nobody_stated(tmp_path, capsys):
+    table = tmp_path / 'run.csv'
+    time_s = 0.01 * np.arange(300)
+    np.savetxt(table, np.column_stack([time_s, 20.0 * np.sin(time_s) - 2.0]), '%.6f', ',',
+               comments='', header='t_s,x_mm')
+    assert main(['import', str(table), '--out', str(tmp_path / 'bag')]) == 1
+    assert 'as no rig is stated' in capsys.readouterr().out
+    main(['info', str(tmp_path / 'bag')])
+    said = ''.join(capsys.readouterr())
+    assert 'leaves 0 to 500 mm (no muscle shortens by more)' in said and '1163' not in said
