@@ -38,9 +38,9 @@ EXAMPLE = 'pam characterise --simulate dmsp_5_300_realistic --out surfaces'
 
 def add_arguments(parser: Parser) -> None:
     """Declare the options of the verb."""
-    parser.add_argument('source', type=source, nargs='*', metavar='BAG|CSV',
+    parser.add_argument('source', type=source, nargs='*', metavar='BAG|TABLE',
                         help='bags, one fixed load or one held length each, or one table '
-                             'measured by others')
+                             'measured by others, CSV or Excel')
     parser.add_argument('--out', type=out_path, required=True, metavar='DIR',
                         help='folder for the results')
     parser.add_argument('--simulate', type=source, metavar='RIG', default=None,
@@ -124,16 +124,16 @@ def _characterised(args: argparse.Namespace, sources: list[str]) -> 'Characteris
     """Return the Characterisation of bags or of one table."""
     from pam_actuation.bags.load import load_run
     from pam_actuation.bags.oddities import recording_remarks
-    from pam_actuation.tables.separated import rows_of_text
+    from pam_actuation.tables.separated import ENDINGS, rows_of_text
     from pam_sim.characterise import characterise_held, characterise_runs, characterise_table
     from pam_sim.characterise.tables import read_measured_table
     from pam_sim.errors import InputError
     if not sources:
-        raise InputError('give bags, a CSV table, or --simulate RIG')
+        raise InputError('give bags, a table, or --simulate RIG')
     if args.held_mm is not None and (args.simulate or args.load_n):
         raise InputError('goes with recordings of held lengths; a fixed load is another record',
                          '--held-mm')
-    tables = [path for path in sources if str(path).lower().endswith('.csv')]
+    tables = [path for path in sources if str(path).lower().endswith(ENDINGS)]
     if not args.simulate:
         asked = 'a table' if tables else 'bags'
         refuse_unused(args, add_arguments, UNUSED[asked], asked)
@@ -156,7 +156,7 @@ def _characterised(args: argparse.Namespace, sources: list[str]) -> 'Characteris
     if args.held_mm is not None:
         raise InputError('goes with bags; a table says its lengths itself', '--held-mm')
     if len(sources) > 1:
-        raise InputError('a table comes alone; give either one CSV file or bags', tables[0])
+        raise InputError('a table comes alone; give either one table or bags', tables[0])
     dimensions = _dimensions(args, [])
     assert dimensions is not None       # without runs they are given, or missing
     measured = read_measured_table(tables[0], rows_of_text)

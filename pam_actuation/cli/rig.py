@@ -58,7 +58,7 @@ def add_arguments(parser: Parser) -> None:
                         help='largest contraction, as a share of the length at rest (default: '
                         '0.25; with another --angle-deg what the braid allows; that of the force '
                         'map, if larger)')
-    parser.add_argument('--force-map', type=source, default=None, metavar='FILE.csv',
+    parser.add_argument('--force-map', type=source, default=None, metavar='FILE',
                         help='static table of the muscle, as "pam characterise" writes it, or '
                         'force over pressure and length as others measure it')
     parser.add_argument('--load', default='hanging_mass', metavar='NAME',

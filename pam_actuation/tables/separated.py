@@ -24,25 +24,31 @@ from pam_sim.errors import InputError
 from pam_sim.files import refuse_pipe, StrPath
 from pam_sim.muscle.lookup_table import lines_and_source
 
+EXCEL = '.xlsx'
+ENDINGS = ('.csv', '.tsv', '.txt', EXCEL)          # of tables of points
+
 
 def rows_of_text(path: StrPath) -> tuple[list[list[str]], str]:
     """
     Return (rows, text of the ``#`` lines), as ``read_commented_csv`` does, of any separator.
 
     Encoding, separator and decimal sign are found as ``pam import`` finds them. Numbers have
-    decimal points in the result.
+    decimal points in the result. Of an Excel file the one sheet that is not empty is read.
 
     Raises
     ------
     InputError
-        The file cannot be read as text, or a number such as 1.016 stands beside decimal commas.
+        The file cannot be read as text, has several sheets, or a number such as 1.016 stands beside decimal commas.
 
     """
     refuse_pipe(path)
-    try:
-        raw = Path(path).read_bytes()
-    except OSError as error:
-        raise InputError(f'cannot be read as a table: {error}', str(path)) from None
+    if str(path).lower().endswith(EXCEL):
+        raw = _only_sheet(str(path))
+    else:
+        try:
+            raw = Path(path).read_bytes()
+        except OSError as error:
+            raise InputError(f'cannot be read as a table: {error}', str(path)) from None
     text = raw.decode(encoding_of(raw, str(path)), errors='replace').removeprefix('\ufeff')
     lines, source = lines_and_source(text.splitlines())
     try:
@@ -62,3 +68,14 @@ def rows_of_text(path: StrPath) -> tuple[list[list[str]], str]:
                                  f'with decimal commas: {SENTENCE}', str(path))
         rows[1:] = [[cell.replace(',', '.') for cell in row] for row in rows[1:]]
     return rows, source
+
+
+def _only_sheet(path: str) -> bytes:
+    """Return the sheet of a workbook that is not empty, as text with tabs."""
+    from pam_actuation.tables.formats.workbook import sheets_of
+    held = {title: text for title, text in sheets_of(path).items() if text}
+    if len(held) != 1:
+        names = ', '.join(f'"{title}"' for title in held)
+        raise InputError(f'has {len(held)} sheets that hold cells'
+                         + (f', {names}: save that of the table as CSV' if held else ''), path)
+    return next(iter(held.values()))

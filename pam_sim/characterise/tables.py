@@ -58,6 +58,7 @@ COLUMNS = {
         ('kn', 1e3), ('kg', KGF_N), ('kgf', KGF_N), ('lbf', LBF_N), ('lb', LBF_N),
         ('lbs', LBF_N))},
 }
+_OF_PRESSURE = re.compile(r'(?:\w*[_ ])?[\d.,]+[_ ]*(?:pa|kpa|mpa|bar|psi)')      # `2_bar`
 _IN_BRACKETS = re.compile(r'[\s_]*[\[(]\s*([^\])]*?)\s*[\])]$')
 # From about the atmosphere on, rows so close to the lowest pressure, moved by less than a share.
 NEAR_ATMOSPHERE_PA, LEVEL_PA, RESTS = 5e3, 3e3, 0.02
@@ -107,6 +108,11 @@ def read_measured_table(path: StrPath, rows_of: RowsOf = read_commented_csv) -> 
     if len(head) == 1 and (sign := next((one for one in ';\t|' if one in head[0]), None)):
         raise InputError(f'separates columns by {sign!r}; write commas, and decimal points in the '
                          'numbers', str(path))
+    if len(pressures := [one for one in head if _OF_PRESSURE.fullmatch(one)]) > 1:
+        raise InputError(
+            f'has a column for each pressure, such as `{rows[0][head.index(pressures[0])]}`; '
+            'write a row for each point, with columns such as pressure_bar, '
+            f'{head[0] if head[0] in COLUMNS else "length_mm"}, force_N', str(path))
     if unknown:
         raise InputError(
             f'has the column `{unknown[0]}`; known are {", ".join(COLUMNS)}, branch', str(path))

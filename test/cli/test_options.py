@@ -93,7 +93,7 @@ def test_every_number_of_every_verb_has_a_range():
 
 def test_what_is_written_or_read_is_never_an_empty_name():
     words = {action.dest for _, action in _options() if action.metavar in (
-        'DIR', 'FILE', 'FILE.yaml', 'NAME|FILE', 'FILE|BAG|CONTROLLER', 'BAG|CSV', 'RIG', 'RUN')
+        'DIR', 'FILE', 'FILE.yaml', 'NAME|FILE', 'FILE|BAG|CONTROLLER', 'BAG|TABLE', 'RIG', 'RUN')
         and _kind(action) not in ('out_path', 'source')}
     assert not words
 

@@ -90,3 +90,47 @@ def test_the_reader_of_commas_says_what_separates(tmp_path):
     path.write_text(COMMA)
     with pytest.raises(InputError, match="separates columns by ';'; write commas, and decimal"):
         read_measured_table(path)
+
+
+def workbook(path, **sheets):
+    """Write sheets of rows as an Excel file, numbers as numbers."""
+    book = pytest.importorskip('openpyxl').Workbook()
+    book.remove(book.active)
+    for title, rows in sheets.items():
+        sheet = book.create_sheet(title)
+        for row in rows:
+            sheet.append([float(one) if one[:1].isdigit() else one for one in row])
+    book.save(path)
+
+
+def test_a_workbook_of_forces_is_a_table_too(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'map.csv').write_bytes(TEXTS['commas'])
+    workbook('map.xlsx', Tabelle1=ROWS, Tabelle2=[])
+    for name in ('map.csv', 'map.xlsx'):
+        assert main(['characterise', name, '--length-m', '0.2', '--bore-m', '0.02', '--out',
+                     f'{name}_out']) == 0
+        assert main(['rig', 'new', '--force-map', name, '--length-mm', '200', '--bore-mm', '20',
+                     '--out', f'{name}.yaml']) == 0
+    for name in ('{}_out/lookup.csv', '{}_force_map.csv'):
+        texts = [[line for line in (tmp_path / name.format(one)).read_text().splitlines()
+                  if not line.startswith('#')] for one in ('map.csv', 'map.xlsx')]
+        assert texts[0] == texts[1]
+    workbook('two.xlsx', up=ROWS, down=ROWS)
+    capsys.readouterr()
+    assert main(['characterise', 'two.xlsx', '--length-m', '0.2', '--out', 'two']) == 2
+    assert ('two.xlsx: has 2 sheets that hold cells, "up", "down": save that of the table as CSV'
+            in capsys.readouterr().err)
+
+
+@pytest.mark.parametrize('head, first', [
+    ('Contraction [%],0 bar,1 bar,2 bar', '0 bar'), ('length_mm,p_100_kPa,p_200_kPa', 'p_100_kPa'),
+    ('Length (mm),F [100 kPa],F [200 kPa]', 'F [100 kPa]')])
+def test_a_column_for_each_pressure_is_told(head, first, tmp_path, capsys):
+    path = tmp_path / 'map.csv'
+    path.write_text(f'{head}\n' + ''.join(
+        ','.join(str(k * n) for n in range(head.count(',') + 1)) + '\n' for k in range(1, 6)))
+    assert main(['characterise', str(path), '--length-m', '0.2', '--out',
+                 str(tmp_path / 'out')]) == 2
+    said = capsys.readouterr().err
+    assert f'has a column for each pressure, such as `{first}`; write a row' in said

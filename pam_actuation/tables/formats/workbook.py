@@ -40,14 +40,7 @@ def read(path: str, every: int, wanted: Collection[str] | None,
     A sheet is read as the text it would be saved as, so names, units and settings above the rows
     are found as in a CSV file. See ``formats.read_tables``.
     """
-    openpyxl = needs('openpyxl', 'openpyxl', 'an Excel file')
-    try:
-        book = openpyxl.load_workbook(path, read_only=True, data_only=True)
-        sheets = {sheet.title: _as_text(sheet) for sheet in book.worksheets}
-        book.close()
-    except (zipfile.BadZipFile, KeyError, ValueError, OSError, TypeError,
-            openpyxl.utils.exceptions.InvalidFileException) as error:
-        raise InputError(f'is no readable Excel file: {error}', path) from None
+    sheets = sheets_of(path)
     tables: list[Table] = []
     problems: dict[int, InputError] = {}        # by length of the sheet
     for number, (title, text) in enumerate(sheets.items()):
@@ -61,6 +54,27 @@ def read(path: str, every: int, wanted: Collection[str] | None,
     if not tables and problems:
         raise problems[max(problems)]
     return tables
+
+
+def sheets_of(path: str) -> dict[str, bytes]:
+    """
+    Return each sheet of a workbook as text with tabs between its cells, by title.
+
+    Raises
+    ------
+    InputError
+        It is no workbook that can be read, or openpyxl is missing.
+
+    """
+    openpyxl = needs('openpyxl', 'openpyxl', 'an Excel file')
+    try:
+        book = openpyxl.load_workbook(path, read_only=True, data_only=True)
+        sheets = {sheet.title: _as_text(sheet) for sheet in book.worksheets}
+        book.close()
+    except (zipfile.BadZipFile, KeyError, ValueError, OSError, TypeError,
+            openpyxl.utils.exceptions.InvalidFileException) as error:
+        raise InputError(f'is no readable Excel file: {error}', path) from None
+    return sheets
 
 
 def _as_text(sheet: Any) -> bytes:
