@@ -22,7 +22,7 @@ import numpy as np
 from pam_actuation.tables.day_and_time import is_called_time
 from pam_actuation.tables.lengths import length_column, LengthColumn
 from pam_actuation.tables.mapping import column_of_text, ColumnMap, TableMapping
-from pam_actuation.tables.parts import is_length_of_muscle, kind_of_pressure
+from pam_actuation.tables.parts import is_length_of_muscle, kind_of_pressure, worked_on
 from pam_actuation.tables.questions import (
     either_of, needs_gain, of_a_joint, of_output_column, Question, which_of)
 from pam_actuation.tables.signals import (
@@ -108,7 +108,7 @@ def guess(tables: Collection[Table], mapping: TableMapping,
     for name, candidates in seen.items():
         if are_of_joint([name]) != joint:       # such as the angle of a joint with one muscle
             continue
-        chosen = _chosen(name, candidates)
+        chosen = _chosen(name, _least_worked_on(tables, candidates))
         if isinstance(chosen, Question):
             found.questions.append(chosen if not seen.keys() & {one.name for one in ANGLES}
                                    else of_a_joint(chosen))
@@ -202,6 +202,15 @@ def _of_lengths(tables: Collection[Table], mapping: TableMapping, missing: Colle
             f'{column}:{answer}' for column, one in lengths.items() for answer in one.answers))]
     return [Question('contraction', column, one.question, one.answers)
             for column, one in lengths.items()]
+
+
+def _least_worked_on(tables: Collection[Table], candidates: dict[str, _Meaning]
+                     ) -> dict[str, _Meaning]:
+    """Return the columns of a signal as such; without one those called raw, then filtered."""
+    worked = {column: min(worked_on(words_in(_heading_of(table, column).name)) for table in tables
+                          if column in table.columns) for column in candidates}
+    return {column: one for column, one in candidates.items()
+            if worked[column] == min(worked.values())}
 
 
 def _chosen(name: str, candidates: dict[str, _Meaning]) -> _Meaning:

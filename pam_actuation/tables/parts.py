@@ -40,7 +40,9 @@ _FILLERS = set('the of a an de del der des die das du di da do la le el il lo le
                'in vom von an auf al am for to from pour para per fur at on'.split())
 _WANTED = {'soll', 'reference', 'ref', 'setpoint', 'set', 'target', 'desired', 'wanted',
            'command', 'cmd', 'commanded', 'control', 'ctrl'}
-_ACTUAL = {'measured', 'meas', 'actual', 'act', 'is', 'ist', 'sensor', 'cell', 'transducer'}
+_RAW, _FILTERED = {'raw'}, {'filtered', 'filt', 'filter', 'smoothed', 'smooth', 'lowpass'}
+_ACTUAL = {'measured', 'meas', 'actual', 'act', 'is', 'ist', 'sensor', 'cell', 'transducer',
+           *_RAW, *_FILTERED}
 _SUPPLY, _EXTERNAL = {'supply', 'line', 'inlet'}, {'external', 'ext', 'disturbance'}
 _REGULATOR = {'regulator', 'valve', 'ppr', 'proportional', 'prop'}
 _OF_MUSCLE = {'muscle', 'pam', 'value', 'signal', '1'}
@@ -151,6 +153,12 @@ def likely_signals(words: str, unit: str) -> list[str]:
         elif not quantities and (bare(unit) == '%' or is_output(unit, PRESSURE)):
             return ['pressure_command']
     return sorted(names[one] for one in quantities)
+
+
+def worked_on(words: str) -> int:
+    """Return 0 for a signal as such, 1 for one that is called raw, 2 for a filtered one."""
+    said = _said(words)
+    return 2 if said & _FILTERED else int(bool(said & _RAW))
 
 
 def is_length_of_muscle(words: str) -> bool:

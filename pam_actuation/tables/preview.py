@@ -244,7 +244,7 @@ def _option(table: Table, column: str, signal: str) -> str:
     if unit is None and text and needs_gain(text, quantity) and not (
             text == 'mA' and signal in _EXAMPLES):
         return f'--map {signal}="{column}:{form_of(quantity)}"'
-    if unit is None and quantity != VOLTAGE and measured_by(words_of(column)) == {VOLTAGE}:
+    if unit is None and quantity != VOLTAGE and VOLTAGE in measured_by(words_of(column)):
         return f'--map {signal}="{column}:{form_of(quantity)}"'     # such as `Voltage_0`
     if unit is None:
         if text == 'mA':

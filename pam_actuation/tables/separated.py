@@ -38,7 +38,8 @@ def rows_of_text(path: StrPath) -> tuple[list[list[str]], str]:
     Raises
     ------
     InputError
-        The file cannot be read as text, has several sheets, or a number such as 1.016 stands beside decimal commas.
+        The file cannot be read as text, has several sheets, or a number such as 1.016 stands
+        beside decimal commas.
 
     """
     refuse_pipe(path)

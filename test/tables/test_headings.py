@@ -113,7 +113,7 @@ def test_a_share_of_the_length_is_asked_for(name):
     ('Stellsignal_pct', '', 'pressure_command="Stellsignal_pct:bar_gauge:zero=ZERO:gain=GAIN"'),
     ('Sollstrom (mA)', '', 'pressure_command="Sollstrom (mA):bar_gauge:zero=ZERO:gain=GAIN"'),
     ('Drahtlänge (mm)', '', 'contraction="Drahtlänge (mm):mm"'),
-    ('p_bar [filt]', '', 'pressure="p_bar [filt]:bar_gauge"')])
+    ('p_bar [corr]', '', 'pressure="p_bar [corr]:bar_gauge"')])
 def test_what_may_be_a_signal_is_named_with_its_option(name, unit, option):
     table, found = of_heading(name, unit)
     assert not found.mapping.signals and not found.questions
@@ -175,3 +175,16 @@ def test_a_first_row_of_missing_values_is_no_header(first, tmp_path):
         f'{0.01 * k:.2f},{k % 7},{k % 9}\n' for k in range(200)))
     assert main(['import', str(path), '--out', str(tmp_path / 'bag')]) == 0
     assert {'pressure', 'contraction'} <= set(load_run(tmp_path / 'bag').topics)
+
+
+@pytest.mark.parametrize('columns, chosen', [
+    (('P_raw [kPa gauge]', 'P_filt [kPa gauge]'), 'P_raw [kPa gauge]'),
+    (('filtered pressure [kPa gauge]',), 'filtered pressure [kPa gauge]'),
+    (('p_raw [kPa gauge]', 'p [kPa gauge]', 'p_filtered [kPa gauge]'), 'p [kPa gauge]')])
+def test_a_filtered_signal_is_read_where_there_is_no_other(columns, chosen):
+    values = pd.Series(np.linspace(0.0, 400.0, 50))
+    table = Table('a.csv', {'t_s': values / 100.0, **dict.fromkeys(columns, values)})
+    found = guess([table], TableMapping())
+    assert not found.questions
+    assert {name: one.column for name, one in found.mapping.signals.items()} == {
+        'pressure': chosen}
