@@ -32,6 +32,8 @@ FEWEST_SAMPLES = 100
 FEWEST_CHANGES = 0.1            # the shortest tenth of the times between changes
 LEAST_CLIPPED, LEAST_HELD = 0.01, 10    # share of the samples at the limit, and in one stay
 MOST_REPEATED = 0.01            # of the other samples: those of a coarse sensor repeat
+LEAST_FROZEN, MOST_ALIKE = 20, 5         # samples that are equal: of a dropout, and elsewhere
+LEAST_NOISE = 2e-5              # of the range, just before it: a model without noise comes to rest
 LEAST_TURNS = 0.25              # of the bends elsewhere, that noise turns round one by one
 # Where a rig is at rest, and how far from it a sensor may begin: it is no fault to see no less.
 RESTS = {'pressure_pa': (P_ATM_PA, 5e3), 'contraction_m': (0.0, 1e-3), 'force_n': (0.0, 5.0)}
@@ -60,7 +62,9 @@ def course_remarks(name: str, stamp_ns: IntArray, column: FloatArray) -> list[st
         Values, NaN where missing.
 
     """
-    return _slip_remarks(name, stamp_ns, column) + _clip_remarks(name, column)
+    # Where a dropout ends, the signal jumps as well.
+    return (_freeze_remarks(name, stamp_ns, column) or _slip_remarks(name, stamp_ns, column)
+            ) + _clip_remarks(name, column)
 
 
 def _slip_remarks(name: str, stamp_ns: IntArray, column: FloatArray) -> list[str]:
@@ -92,6 +96,59 @@ def _clip_remarks(name: str, column: FloatArray) -> list[str]:
         for which, limit in (('largest', high), ('smallest', low))
         if not (limit == low and abs(limit - rest) <= margin)
         and (share := clipped_share(values, limit))]
+
+
+def _freeze_remarks(name: str, stamp_ns: IntArray, column: FloatArray) -> list[str]:
+    known = np.isfinite(column)
+    if name not in _SHOWN or known.sum() < FEWEST_SAMPLES:
+        return []
+    time_s = (stamp_ns[known] - stamp_ns[0]) * 1e-9
+    found = freezes(column[known])
+    if not found:
+        return []
+    factor, zero, unit = _SHOWN[name]
+    first, last = found[0]
+    whole_s = sum(float(time_s[end - 1] - time_s[begin]) for begin, end in found)
+    others = len(found) - 1
+    more = f', and {others} more time{"s"[:others > 1]}' if others else ''
+    return [f'{name} stands still at exactly {factor * (float(column[known][first]) + zero):.5g} '
+            f'{unit} from {time_s[first]:.2f} to {time_s[last - 1]:.2f} s after its first '
+            f'message{more}, {whole_s:.2g} s in all, and its noise is gone there. Did the sensor '
+            'or its line drop out, so that the last value was repeated?']
+
+
+def freezes(values: FloatArray) -> list[tuple[int, int]]:
+    """
+    Return where a sensor repeats its last value: begin and end of each stretch.
+
+    Noise moves it all the time elsewhere. At its largest and smallest value it may be clipped.
+
+    Parameters
+    ----------
+    values : ndarray
+        Finite values.
+
+    """
+    edges = np.flatnonzero(np.diff(values, prepend=np.nan, append=np.nan))
+    lengths = np.diff(edges)
+    limits, least = (values.min(), values.max()), LEAST_NOISE * float(np.ptp(values))
+    found = [(int(begin), int(begin + length)) for begin, length in zip(edges, lengths)
+             if length >= LEAST_FROZEN and values[begin] not in limits and begin >= LEAST_FROZEN
+             and _bends(values[begin - LEAST_FROZEN:begin]) > least]
+    others = lengths[lengths < LEAST_FROZEN]
+    if not found or len(others) < FEWEST_SAMPLES or others.max() > MOST_ALIKE:
+        return []
+    is_frozen = np.zeros(len(values), dtype=bool)
+    for begin, end in found:
+        is_frozen[begin:end] = True
+    bends = np.diff(values[~is_frozen], 2)
+    turns = bends[1:] * bends[:-1] < 0.0
+    return found if turns.mean() > LEAST_TURNS else []
+
+
+def _bends(values: FloatArray) -> float:
+    """Return the median size of the second differences of values."""
+    return float(np.median(np.abs(np.diff(values, 2))))
 
 
 def clipped_share(values: FloatArray, limit: float) -> float:

@@ -164,3 +164,32 @@ def test_import_and_every_verb_tell_of_a_fault(fault, tmp_path, capsys):
                  'coulomb_friction', '--out', str(tmp_path / 'gap'), '--json']) in (0, 1)
     remarks = json.loads(capsys.readouterr().out)['remarks']
     assert sum(words in one for one in remarks) == 1
+
+
+@pytest.mark.parametrize('name, column', [
+    ('pressure_pa', P_ATM_PA + 2e5 + 1e5 * np.sin(TIME_S) + 300.0 * NOISE),
+    ('contraction_m', MOVED_M)])
+def test_a_sensor_that_repeats_its_last_value_is_told(name, column):
+    assert told(name, column) == []
+    frozen = column.copy()
+    frozen[8000:14_000] = frozen[8000]
+    frozen[20_000:21_000] = frozen[20_000]
+    said, = told(name, frozen)
+    assert 'stands still at exactly' in said and 'from 8.00 to 14.00 s' in said
+    assert 'and 1 more time, 7 s in all' in said
+    # A few values are no dropout, and a coarse sensor repeats its values everywhere.
+    few = column.copy()
+    few[8000:8015] = few[8000]
+    assert not any('stands still' in one for one in told(name, few))
+    step = 0.02 * np.ptp(column)
+    assert not any('stands still' in one for one in told(name, step * np.round(frozen / step)))
+
+
+def test_a_model_without_noise_that_comes_to_rest_is_no_dropout():
+    levels = np.repeat([1e5, 3e5, 2e5, 4e5, 1.5e5, 2.5e5], len(TIME_S) // 6)
+    state, column = 1e5, []
+    for one in levels:
+        state += (one - state) * 0.05
+        column.append(state)
+    said = told('pressure_pa', P_ATM_PA + np.array(column))
+    assert not any('stands still' in one for one in said)
