@@ -26,7 +26,8 @@ from pam_sim.joint.parameters import SIDES
 
 COMMANDS = ('pressure_command', 'ppr_voltage')      # a pressure follows them
 LEAST_RISE_PA = 2e4                 # of a pressure that moves, and of one that is wanted
-LAGS_S = np.arange(0.0, 0.51, 0.05)                 # of a valve behind its command
+LAGS_S = np.arange(0.0, 0.51, 0.02)                 # of a valve behind its command
+LEAST_EARLY_S, EARLY_LEFT = 0.05, 0.25              # before it; what that leaves of the rest
 AGAINST, ALONG = -0.3, 0.7          # correlation of a pressure with a command
 FEWEST = 50                         # values
 
@@ -37,8 +38,8 @@ def crossed(signals: Signals, mapped: Mapping[str, ColumnMap]) -> list[Doubt]:
     """
     Return a doubt on each signal that seems to be another one.
 
-    That is a measured signal that equals another signal of its quantity value by value, and a
-    pressure that falls where its command rises.
+    That is a measured signal that equals another signal of its quantity value by value, a
+    pressure that falls where its command rises, and one that moves before its command.
 
     Parameters
     ----------
@@ -86,6 +87,12 @@ def _against_command(signals: Signals, mapped: Mapping[str, ColumnMap], taken: s
         own = _following(signals, pressure, f'{place}{command}')
         if own is None:
             continue
+        early_s = _early(signals, pressure, f'{place}{command}', own)
+        if early_s:
+            yield (f'{_named(pressure, mapped)}: it moves {early_s:.2g} s before '
+                   f'{_named(f"{place}{command}", mapped)}, its command; are their times of two '
+                   'clocks, or is the command written late?')
+            continue
         others = [f'{side}/{command}' for side in SIDES
                   if place and f'{side}/' != place and f'{side}/{command}' in signals]
         if others and own < -AGAINST and (_following(signals, pressure, others[0]) or 0.0) > ALONG:
@@ -96,7 +103,22 @@ def _against_command(signals: Signals, mapped: Mapping[str, ColumnMap], taken: s
                    f'{_named(f"{place}{command}", mapped)} rises; are they of two muscles?')
 
 
-def _following(signals: Signals, pressure: str, command: str) -> float | None:
+def _early(signals: Signals, pressure: str, command: str, own: float) -> float:
+    """
+    Return how long a pressure moves before its command [s], 0 where it does not.
+
+    The command that comes later tells much more of the pressure than those before.
+    """
+    found = {lag_s: _following(signals, pressure, command, np.array([-lag_s]))
+             for lag_s in LAGS_S if lag_s >= LEAST_EARLY_S}
+    early_s, best = max(((lag_s, one) for lag_s, one in found.items() if one is not None),
+                        key=lambda pair: pair[1], default=(0.0, 0.0))
+    is_early = best > ALONG and 1.0 - best**2 < EARLY_LEFT * (1.0 - max(own, 0.0)**2)
+    return float(early_s) if is_early else 0.0
+
+
+def _following(signals: Signals, pressure: str, command: str, lags_s: FloatArray = LAGS_S
+               ) -> float | None:
     """Return the largest correlation of a pressure with a command before; None where open."""
     (stamp_ns, pressure_pa), (sent_ns, sent) = signals[pressure], signals[command]
     known, said = np.isfinite(pressure_pa), np.isfinite(sent)
@@ -105,7 +127,7 @@ def _following(signals: Signals, pressure: str, command: str) -> float | None:
     if min(len(stamp_ns), len(sent_ns)) < FEWEST or np.ptp(pressure_pa) < LEAST_RISE_PA:
         return None
     found = []
-    for lag_s in LAGS_S:
+    for lag_s in lags_s:
         place = np.searchsorted(sent_ns, stamp_ns - int(1e9 * lag_s), side='right') - 1
         there = place >= 0
         held = sent[place[there]]

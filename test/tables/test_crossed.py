@@ -83,3 +83,18 @@ def test_a_measured_signal_that_is_another_column_is_told(joint, capsys):
     assert main([*joint, *maps('cmd_f', 'meas_e'), '--overwrite']) == 1
     said = capsys.readouterr().out
     assert said.count('each value is that of') == 1 and 'exchanged' not in said
+
+
+@pytest.mark.parametrize('rows, words', [
+    (20, 'pressure (column "p"): it moves 0.'), (-10, ''), (0, '')])
+def test_a_pressure_that_moves_before_its_command_is_told(
+        rows, words, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    levels = np.random.default_rng(2).uniform(0.5, 9.5, 30)
+    sent_v = np.repeat(levels, 50)
+    write('run.csv', t_s=TIME_S, u_V=np.roll(sent_v, rows), p=lagged(60.0 * sent_v))
+    main(['import', 'run.csv', '--out', 'bag', '--map', 'ppr_voltage=u_V:V', '--map',
+          'pressure=p:kPa_gauge'])
+    said = capsys.readouterr().out
+    assert ('before ppr_voltage (column "u_V"), its command' in said) == bool(words)
+    assert words in said
