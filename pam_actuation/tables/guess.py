@@ -144,7 +144,7 @@ def _meant(tables: Collection[Table], mapping: TableMapping, missing: Collection
             for name, answer in meant.items():
                 of_name = seen.setdefault(name, {})
                 of_name.setdefault(column, answer)
-                for other in _numbered_2(table, column):
+                for other in _numbered_on(table, column):
                     second = None if other in used else _readable(
                         table, other, BY_NAME[name], missing)
                     if second is not None:
@@ -160,13 +160,14 @@ def _used(table: Table, mapping: TableMapping, left_out: Collection[str]) -> set
     return {table.name_of(one) for one in (*stated, *left_out)}
 
 
-def _numbered_2(table: Table, column: str) -> list[str]:
-    """Return the columns called as one that ends in 1, but with a 2: nobody knows which is it."""
+def _numbered_on(table: Table, column: str) -> list[str]:
+    """Return the columns called as one that ends in 1, but in 2, 3 and so on."""
     words = words_of(_name_of(table, column))
     if not words.endswith('1'):
         return []
-    return [other for other in table.columns if not _signals_of(table, other)
-            and words_of(_name_of(table, other)) == f'{words[:-1]}2']
+    return [other for number in range(2, 10) for other in table.columns
+            if not _signals_of(table, other)
+            and words_of(_name_of(table, other)) == f'{words[:-1]}{number}']
 
 
 def _readable(table: Table, column: str, signal: Signal, missing: Collection[str]

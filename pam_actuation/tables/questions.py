@@ -27,6 +27,7 @@ from pam_sim.errors import InputError
 from pam_sim.joint.parameters import SIDES
 
 _NUMBERS = re.compile(r'(?::\s*(?:zero|gain|missing)\s*=[^:]*)+$')
+MUSCLES = ' Of several muscles, import each by itself.'
 _SHARES = {'%': '1/100 of that length', '1': 'that length'}
 
 
@@ -160,10 +161,12 @@ def _name_of(unit: str, quantity: str) -> str:
 
 def which_of(signal: Signal, columns: Sequence[tuple[str, tuple[str, ...]]]) -> Question:
     """Return the question which of several columns, each with its answers, is the signal."""
-    names = ' and '.join(f'"{column}"' for column, _ in columns)
+    quoted = [f'"{column}"' for column, _ in columns]
+    names = ' and '.join([', '.join(quoted[:-1]), quoted[-1]] if len(quoted) > 1 else quoted)
+    more = MUSCLES if len(columns) > 2 else ''
     return Question(signal.name, '', f'columns {names} could each be the {signal.meaning}: '
-                    'which one?', tuple(f'{column}:{unit}' for column, units in columns
-                                        for unit in units[:2]))
+                    f'which one?{more}', tuple(f'{column}:{unit}' for column, units in columns
+                                               for unit in units[:2]))
 
 
 def of_a_joint(question: Question) -> Question:

@@ -238,6 +238,8 @@ def names_of(quantity: str) -> list[str]:
 
 def _spelled(text: str, quantity: str) -> str | None:
     """Return the usual spelling of a unit; capitals matter only where they mean a prefix."""
+    if text == 'G':                                     # a name, such as that of a muscle
+        return None
     text = _OTHER_NAMES.get(text, _OTHER_NAMES.get(text.lower(), text))
     known = FACTORS[quantity]
     if text in known:

@@ -218,3 +218,16 @@ def test_a_strain_is_a_share_of_the_length(column, values, share):
 def test_a_share_that_is_stated_as_a_unit_of_a_length_is_told_its_gain(unit, way):
     with pytest.raises(InputError, match=f'COLUMN:{way}for 300 mm; allowed: m, cm'):
         column_of_text('contraction', f'strain:{unit}', 'here')
+
+
+def test_the_pressures_of_several_muscles_are_all_named(tmp_path, capsys):
+    path = tmp_path / 'arm.csv'
+    rows = np.column_stack([0.01 * np.arange(200), *(
+        200.0 + 200.0 * np.sin(0.1 * k * np.arange(200)) for k in (1, 2, 3, 4))])
+    np.savetxt(path, rows, '%.4f', ',', comments='', header='t_s,p1_kPa,p2_kPa,p3_kPa,p4_kPa')
+    assert main(['import', str(path), '--out', str(tmp_path / 'bag')]) == 2
+    said = capsys.readouterr().err
+    assert ('columns "p1_kPa", "p2_kPa", "p3_kPa" and "p4_kPa" could each be the pressure in the '
+            'muscle: which one? Of several muscles, import each by itself.' in said)
+    assert main(['import', str(path), '--out', str(tmp_path / 'bag'), '--map',
+                 'pressure=p3_kPa:kPa_gauge']) == 0

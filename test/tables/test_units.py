@@ -56,6 +56,8 @@ def test_capitals_that_are_a_prefix_count():
     assert unit_of_text('MM', 'length') is None and unit_of_text('Mm', 'length') is None
     assert unit_of_text('MS', TIME) is None and unit_of_text('Ms', TIME) is None
     assert unit_of_text('KN', 'force').name == 'kN'
+    # `cmd_G` may be of a muscle called G.
+    assert unit_of_text('G', 'force') is None and unit_of_text('g', 'force').name == 'gf'
 
 
 def test_a_pressure_says_gauge_or_absolute():
