@@ -220,8 +220,11 @@ def unknown_numbers(rig: Rig, names: Sequence[str] = ()) -> list[Number]:
         if name in parameters:
             p = parameters[name]
             value = rig.number(name)
+            # A rig refuses a length beyond the stroke of its muscle.
+            upper = min(p.upper, rig.muscle.max_strain * rig.muscle.length_m) if (
+                name == LENGTH) else p.upper
             found[name] = Number(name, '', name, p.unit, value if value > 0.0 or p.lower <= 0.0
-                                 else p.default, p.lower, p.upper, description=p.description)
+                                 else p.default, p.lower, upper, description=p.description)
             continue
         if '.' not in name or name.startswith(PREFIX):
             raise InputError(

@@ -28,7 +28,8 @@ from pam_sim.rig import Rig
 from pam_sim.valve import hsv, ppr
 
 ANOTHER_LAW = ('muscle and load leave a clear gap with the stated force law. If it was measured '
-               'on another muscle, state it as unknown: pam rig new --unknown law')
+               'on another muscle, the numbers that act in the muscle are off by more than their '
+               'intervals say. State it as unknown: pam rig new --unknown law')
 OF_A_TABLE = ('muscle and load leave a clear gap with the stated table of forces. A table has no '
               'coefficients to find: {}let pam gap look for the effect that is missing, or '
               'measure the table of this muscle')

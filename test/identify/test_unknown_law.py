@@ -169,3 +169,13 @@ def test_a_clear_gap_of_a_table_asks_for_what_can_be_unknown_of_it():
     (asked,) = remarks.of_another_law(
         rig.with_(tolerance={'force_map_gain': math.inf}), left)
     assert '--unknown' not in asked and 'pam gap' in asked
+
+
+def test_an_unknown_held_length_stays_within_the_stroke_of_the_muscle():
+    stroke_m = ISOMETRIC.muscle.max_strain * ISOMETRIC.muscle.length_m
+    number, = unknown_numbers(ISOMETRIC, ['contraction_m'])
+    assert (number.lower, number.upper) == (0.0, pytest.approx(stroke_m))
+    run = record(ISOMETRIC, keep=('pressure', 'force'), command=False, hold_s=0.4)
+    found = identify(run, ISOMETRIC, ['contraction_m'], advise=False)
+    assert inside(found['contraction_m'], 0.02)
+    assert found['contraction_m'].interval.high <= stroke_m
