@@ -17,6 +17,7 @@
 import numpy as np
 from pam_actuation.bags.load import load_run
 from pam_actuation.cli.main import main
+from pam_actuation.tables.formats import read_tables
 from pam_actuation.tables.signals import BY_NAME
 import pytest
 import spoiled
@@ -56,6 +57,16 @@ def test_right_or_said(case, tmp_path, monkeypatch, capsys):
         lost = 0.2 if 'missing' in case.remark else 0.0
         assert len(found) >= (1.0 - lost) * len(wanted) - 1
         np.testing.assert_allclose(found, wanted[places], rtol=0, atol=1e-6 * np.ptp(wanted))
+
+
+@pytest.mark.parametrize('every, kept, told', [(1, 100, True), (2, 50, True), (3, 34, False)])
+def test_a_line_without_an_end_counts_at_no_rate(every, kept, told, tmp_path):
+    """Its last number may be cut: 14.56 of which 1 is left."""
+    rows = ''.join(f'{0.01 * k:.2f},14.56\n' for k in range(101))
+    (tmp_path / 'log.csv').write_text(f't_s,p_bar\n{rows}'[:-5])
+    table, = read_tables(tmp_path / 'log.csv', every=every)
+    assert (table.numbers('p_bar') == 14.56).all() and len(table) == kept
+    assert any('may be incomplete' in one for one in table.remarks) == told
 
 
 def test_two_gigabytes_are_answered_at_once(tmp_path, monkeypatch, capsys):

@@ -91,7 +91,7 @@ def tables_of_text(path: str, opened: Opened, size: float, every: int,
             f'has about {rows * every / 1e6:.0f} million rows, more than {MOST_ROWS // 10**6} '
             f'million; keep one of several, with --every {int(rows * every / MOST_ROWS) + 1}',
             path)
-    frame, last = _frame(path, opened, layout, every, rows, progress)
+    frame, read, last = _frame(path, opened, layout, every, rows, progress)
     lines = layout.first_line + np.arange(len(frame), dtype=np.int64) * every
     check_quotes(frame, lines, path)
     if layout.is_lvm and (further := header_rows(frame[0])).any():
@@ -100,7 +100,7 @@ def tables_of_text(path: str, opened: Opened, size: float, every: int,
                              'the file', f'{path}:{lines[int(np.argmax(further))]}')
         frame, lines = frame[~further], lines[~further]
     remarks = [layout.remark] if layout.remark else []
-    if every == 1 and len(frame) > 1 and last not in '\r\n':
+    if last not in '\r\n' and len(frame) > 1 and lines[-1] == layout.first_line + read - 1:
         frame, lines = frame.iloc[:-1], lines[:-1]
         remarks.append('the last line has no end, so it may be incomplete: it was left out')
     with opened() as raw:
@@ -154,8 +154,8 @@ def _head(path: str, opened: Opened) -> bytes:
 
 
 def _frame(path: str, opened: Opened, layout: TextLayout, every: int, expected_rows: float,
-           progress: Callable[[float], object]) -> 'tuple[pd.DataFrame, str]':
-    """Return one row of ``every``, and the last character of the file."""
+           progress: Callable[[float], object]) -> 'tuple[pd.DataFrame, int, str]':
+    """Return one row of ``every``, how many were read, and the last character of the file."""
     import pandas as pd
     pieces: list[pd.DataFrame] = []
     done = 0
@@ -177,7 +177,7 @@ def _frame(path: str, opened: Opened, layout: TextLayout, every: int, expected_r
                     raise InputError(
                         f'has more than {MOST_ROWS // 10**6} million rows; keep one of several, '
                         'with --every 10', path)
-    return pd.concat(pieces, ignore_index=True), text.last
+    return pd.concat(pieces, ignore_index=True), done, text.last
 
 
 @contextlib.contextmanager
