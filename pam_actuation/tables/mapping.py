@@ -101,9 +101,9 @@ class ColumnMap:
     @property
     def numbers(self) -> tuple[str, ...]:
         """Return zero, gain and missing as ``zero=200``, those that differ from the usual."""
-        found = [f'zero={self.zero:g}'] if self.zero else []
-        found += [f'gain={self.gain:g}'] if self.gain != 1.0 else []
-        return (*found, *([f'missing={self.missing:g}'] if self.missing is not None else []))
+        found = [f'zero={self.zero:.15g}'] if self.zero else []
+        found += [f'gain={self.gain:.15g}'] if self.gain != 1.0 else []
+        return (*found, *([f'missing={self.missing:.15g}'] if self.missing is not None else []))
 
     @property
     def reading(self) -> str:

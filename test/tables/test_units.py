@@ -102,6 +102,17 @@ def test_options_are_a_mapping_that_comes_back_from_its_file(tmp_path):
     assert mapping.with_options([], rate_hz=500.0).time is None
 
 
+@pytest.mark.parametrize('numbers', [
+    'zero=1048576:gain=0.001', 'zero=0.5:gain=2.5', 'gain=-0.0123456789', 'missing=4294967295'])
+def test_an_option_that_is_told_says_what_was_stated(numbers):
+    """Counts of an encoder have more than six digits."""
+    option = f'contraction=c:mm:{numbers}'
+    one = TableMapping().with_options([option]).signals['contraction']
+    assert one.words == f'mm:{numbers}'
+    told = one.option('contraction').partition(' ')[2].replace('"', '')
+    assert TableMapping().with_options([told]).signals['contraction'] == one
+
+
 @pytest.mark.parametrize('option, said', [
     ('pressure', 'write --map NAME='), ('presure=p:bar_abs', 'did you mean `pressure`'),
     ('pressure=p', 'the unit is missing'), ('pressure=p:bar_gauge:gain=0', 'gain that is not 0'),
