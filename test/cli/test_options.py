@@ -87,7 +87,7 @@ def _kind(action):
 def test_every_number_of_every_verb_has_a_range():
     numbers = {(verb, action.option_strings[0]) for verb, action in _options()
                if _kind(action) in WRONG_NUMBERS}
-    assert numbers == set(NUMBERS)
+    assert numbers == set(NUMBERS), 'NUMBERS above has each option with its range'
     assert not [action.dest for _, action in _options() if action.type in (int, float)]
 
 

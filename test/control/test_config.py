@@ -23,11 +23,13 @@ from pam_actuation.control.laws import LAWS
 from pam_actuation.control.pid import PidController, SETTINGS as PID_SETTINGS
 from pam_actuation.control.sofc.settings import SETTINGS as SOFC_SETTINGS
 from pam_actuation.experiments import load_experiment
+from pam_actuation.resources import config_dir
 from pam_actuation.tuning.closed_loop import _rollout_of, ClosedLoop, ROLLOUTS
 from pam_actuation.tuning.problem import rebuild
 from pam_actuation.tuning.space import AXES_OF, default_axes
 from pam_sim import load_joint, load_rig
 from pam_sim.errors import InputError
+from pam_sim.located_yaml import load_yaml
 import pytest
 from straight_rig import StraightRig
 
@@ -136,18 +138,25 @@ def test_the_lowest_pressure_of_every_law_is_below_its_highest(kind, tmp_path):
     assert caught.value.where == f'{path}:4'
 
 
+def preset_of(kind):
+    """Return the preset by which a law is compiled ahead, '' without one."""
+    return next((name for name in warm_up.LAWS if load_yaml(
+        config_dir() / 'controllers' / f'{name}.yaml')['controller'] == kind), '')
+
+
 @pytest.mark.parametrize('kind', LAWS)
 def test_every_law_may_be_tuned_and_is_compiled_ahead(kind):
-    assert kind in AXES_OF
+    assert kind in AXES_OF, 'add its axes to AXES_OF of tuning/space.py'
+    assert kind in ROLLOUTS, 'add the file of its loop to ROLLOUTS of tuning/closed_loop.py'
     module = importlib.import_module(f'pam_actuation.tuning.{ROLLOUTS[kind]}')
-    assert callable(getattr(module, f'{kind}_rollout'))
-    assert any(preset.partition('_')[0] == kind for preset in warm_up.LAWS)
+    assert callable(getattr(module, f'{kind}_rollout', None)), f'write it in {module.__file__}'
+    assert preset_of(kind), 'add its preset of config/controllers to LAWS of warm_up.py'
 
 
 @pytest.mark.parametrize('kind', LAWS)
 def test_a_law_with_the_settings_it_has_is_the_same_to_the_bit(kind):
-    preset = next(one for one in warm_up.LAWS if one.partition('_')[0] == kind)
-    first = load_controller(preset, load_rig('dmsp_5_300_hanging_mass'))
+    assert preset_of(kind), 'add its preset of config/controllers to LAWS of warm_up.py'
+    first = load_controller(preset_of(kind), load_rig('dmsp_5_300_hanging_mass'))
     assert first.kind == kind
     first.step(0.0, 0.01, 0.0, 0.01, 0.0)
     second = rebuild(first, {})
