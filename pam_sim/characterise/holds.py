@@ -33,6 +33,7 @@ BIN_S = 0.1                 # pressure is averaged over such bins before its rat
 STILL_PA = 1.5e3            # change over two bins below which the pressure stands still
 SHORTEST_S = 1.0            # shorter stillness is no hold
 LONGEST_S = 1e6             # a longer recording has a wrong stamp
+SLOW_BINS = 1.1             # between readings of the pressure; with more, most bins are empty
 LONGEST_WINDOW_S = 2.0      # averaged: the last half of a hold, at most this much
 BLOCKS = 5                  # parts of the window whose means tell drift from noise
 SETTLED_STRAIN = 4e-4       # largest spread of these means in a settled hold, of L0
@@ -89,7 +90,8 @@ def find_holds(run: Run, length_m: float) -> list[Hold]:
     Raises
     ------
     InputError
-        Pressure or contraction missing, shorter than one hold, or a stamp far from the others.
+        Pressure or contraction missing, shorter than one hold, a pressure that is read too
+        seldom, or a stamp far from the others.
 
     """
     origin = int(np.min(run.require('pressure').stamp_ns))
@@ -130,13 +132,17 @@ def still_spans(time: FloatArray, pressure: FloatArray, bin_s: float = BIN_S,
     Raises
     ------
     InputError
-        The times span more than any recording; ``path`` is named.
+        The times span more than any recording, or most bins are empty; ``path`` is named.
 
     """
     span_s = float(time[-1] - time[0])
     if span_s > LONGEST_S:
         raise InputError(f'its stamps of the pressure span {span_s:.2g} s; allowed is at most '
                          f'{LONGEST_S:g} s', path)
+    step_s = float(np.median(np.diff(time)))
+    if step_s > SLOW_BINS * bin_s:
+        raise InputError(f'its pressure comes every {step_s:.3g} s; to see where it stands still, '
+                         f'a reading each {bin_s:g} s or more often is needed', path)
     index = np.floor((time - time[0]) / bin_s).astype(int)
     count = np.bincount(index)
     with np.errstate(invalid='ignore'):
@@ -150,13 +156,19 @@ def still_spans(time: FloatArray, pressure: FloatArray, bin_s: float = BIN_S,
     for begin, end in spans[1:]:
         before = joined[-1]
         # A lone disturbance does not end a hold.
-        same = abs(np.nanmean(mean[before[0]:before[1]]) - np.nanmean(mean[begin:end])) < STILL_PA
+        same = abs(_level(mean[before[0]:before[1]]) - _level(mean[begin:end])) < STILL_PA
         if begin - before[1] <= 3 and same:
             before[1] = end
         else:
             joined.append([begin, end])
     return [(time[0] + bin_s * a, time[0] + bin_s * b) for a, b in joined
             if bin_s * (b - a) >= shortest_s - 1e-9]
+
+
+def _level(mean: FloatArray) -> float:
+    """Return the mean of bins, NaN where all are empty."""
+    filled = mean[np.isfinite(mean)]
+    return float(filled.mean()) if filled.size else np.nan
 
 
 def _blocks(

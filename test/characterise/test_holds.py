@@ -67,6 +67,24 @@ def test_a_stamp_far_from_the_others_is_refused():
             holds()
 
 
+@pytest.mark.filterwarnings('error')
+@pytest.mark.parametrize('every', [5, 10, 12, 25])
+def test_a_pressure_that_is_read_too_seldom_is_refused_with_its_rate(every):
+    """Most of the times over which it is averaged would be empty."""
+    run = stepped_run(50.0)
+    for series in run.topics.values():
+        series.stamp_ns = series.stamp_ns[::every]
+        series.values = {key: value[::every] for key, value in series.values.items()}
+    for holds, longest_s in ((lambda: find_holds(run, LENGTH_M), 0.1),
+                             (lambda: held_points(run), 0.05)):
+        if 0.01 * every <= longest_s:
+            holds()
+            continue
+        with pytest.raises(InputError, match=f'made: its pressure comes every {0.01 * every:g} s; '
+                           f'.* a reading each {longest_s:g} s or more often'):
+            holds()
+
+
 @pytest.mark.parametrize('topic', ['pressure', 'contraction'])
 def test_a_recording_without_pressure_or_contraction_is_refused(topic):
     with pytest.raises(InputError, match=f'has no `{topic}`'):
