@@ -315,8 +315,8 @@ def reason(error: OSError) -> str:
 
 
 def shown(path: StrPath) -> str:
-    """Return a path as text for a message, cut where it is long."""
-    text = os.fspath(path)
+    """Return a path as text for a message, bytes that are none escaped, cut where it is long."""
+    text = os.fspath(path).encode(errors='backslashreplace').decode()
     return text if len(text) <= _SHOWN else f'{text[:_SHOWN // 2]}…{text[-_SHOWN // 3:]}'
 
 

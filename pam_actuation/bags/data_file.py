@@ -66,7 +66,7 @@ class DataFile:
                 functools.partial(disk.write_all, self._stream), library=LIBRARY,
                 index=self._open_index(path.parent))
             begin(self)
-        except OSError:
+        except BaseException:
             self.discard()
             raise
 

@@ -202,6 +202,11 @@ def _absolute(directory: StrPath) -> Path:
     path = Path(text).resolve()
     if len(os.fsencode(path.name)) > LONGEST_NAME_BYTES:
         raise InputError('the name is too long for a bag; give a shorter one', shown(text))
+    try:
+        path.name.encode()
+    except UnicodeEncodeError:          # its files could not stand in metadata.yaml
+        raise InputError('the name of a bag has bytes that are no UTF-8; give another one',
+                         shown(text)) from None
     here = Path.cwd()
     if path == here or path in here.parents:
         raise InputError(

@@ -93,7 +93,7 @@ class BagWriter:
         self._current: DataFile | None = None
         try:
             self._current = self._next_file()
-        except OSError:
+        except BaseException:
             self._place.give_up([])
             raise
 

@@ -20,7 +20,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 import gc
 import importlib
+import io
 import os
+import re
 import sys
 from typing import Any, TYPE_CHECKING
 import warnings
@@ -31,6 +33,7 @@ if TYPE_CHECKING:
     from pam_actuation.cli.options import Parser
 
 GC_THRESHOLD = 100_000, 20, 20
+_OF_NO_TEXT = re.compile(r"[^\s'\"]*[\ud800-\udfff][^\s'\"]*")      # bytes that are no UTF-8
 
 
 def build_parser(only: str | None = None) -> 'Parser':
@@ -76,6 +79,7 @@ def main(argv: list[str] | None = None) -> int:
         return _run_verb(argv)
     interrupts.leave_at_once('pam')
     interrupts.closing.wait()
+    _print_all_characters(sys.stdout)
     # Modules are no garbage: to look for some while they are imported takes a tenth of the time.
     gc.set_threshold(*GC_THRESHOLD)
     code = interrupts.EXIT_FAILED       # of an error of this program
@@ -148,9 +152,23 @@ def _parsed_and_run(argv: list[str] | None, begin: Callable[[], object]) -> int:
                 str(stop) or 'stopped', EXIT_INTERRUPTED, f'pam {args.verb}', args.json)
     except BrokenPipeError:
         raise
+    except UnicodeEncodeError as error:     # nothing was written: texts are encoded whole
+        name = _OF_NO_TEXT.search(error.object)
+        if name is None:
+            raise
+        return complain(
+            f'{name[0]!r}: the name has bytes that are no UTF-8, so no file can hold it; rename '
+            'the file or folder', EXIT_BAD_INPUT, f'pam {args.verb}', args.json)
     except OSError as error:  # the file system refuses where nobody looked before
         place = f'{shown(str(error.filename))}: ' if error.filename else ''
         return complain(f'{place}{reason(error)}', EXIT_BAD_INPUT, f'pam {args.verb}', args.json)
+
+
+def _print_all_characters(stream: Any) -> None:
+    """Let a stream escape the characters that its encoding lacks, as standard error does."""
+    if isinstance(stream, io.TextIOWrapper) and (
+            stream.errors == 'strict' or stream.encoding.lower() != 'utf-8'):
+        stream.reconfigure(errors='backslashreplace')
 
 
 @contextmanager

@@ -200,3 +200,34 @@ def test_a_reader_that_leaves_early_is_no_error(words):
                           stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         process.stdout.close()
         assert (process.stderr.read(), process.wait()) == (b'', 0)
+
+
+@pytest.mark.parametrize('encoding', ['ascii', 'latin-1'])
+def test_a_terminal_that_lacks_a_character_gets_its_number(encoding, tmp_path):
+    (tmp_path / 'a.csv').write_text('t_s,p_bar,note\n' + ''.join(
+        f'{0.01 * k:.2f},{1 + k % 7},0\n' for k in range(30)))
+    done = subprocess.run(
+        [sys.executable, '-m', 'pam_actuation.cli.main', 'import', tmp_path / 'a.csv',
+         '--preview'], cwd=ROOT, capture_output=True, check=False,
+        env=dict(os.environ, PYTHONIOENCODING=encoding))
+    assert done.returncode == 0 and not done.stderr
+    assert b'read as' in done.stdout and b'\\u2013' in done.stdout
+
+
+def test_a_name_that_is_no_text_is_refused_where_it_would_stand_in_a_file(bags, tmp_path, capsys):
+    """As of files from a disk of another system."""
+    odd = os.fsdecode(b'run_\xfc')
+    (tmp_path / odd).symlink_to(bags / 'first')
+    (tmp_path / f'{odd}.csv').write_text('t_s,p_barg\n0.0,1\n0.1,2\n0.2,3\n')
+    before = sorted(tmp_path.rglob('*'))
+    for words, told in (
+            (['report', tmp_path / odd, '--out', tmp_path / 'page.html'], 'rename the file'),
+            (['import', tmp_path / f'{odd}.csv', '--out', tmp_path / 'bag'], 'rename the file'),
+            (['simulate', bags / 'push.yaml', '--out', tmp_path / f'{odd}_2'], 'give another')):
+        said = call(capsys, *words, code=2)
+        assert 'run_\\udcfc' in said and 'bytes that are no UTF-8' in said and told in said
+        assert sorted(tmp_path.rglob('*')) == before
+    done = subprocess.run(
+        [sys.executable, '-m', 'pam_actuation.cli.main', 'info', tmp_path / odd], cwd=ROOT,
+        capture_output=True, check=False, env=dict(os.environ, PYTHONIOENCODING='utf-8:strict'))
+    assert done.returncode == 0 and b'run_\\udcfc' in done.stdout
