@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from pam_actuation.report import signals
-from pam_actuation.report.errors import by_part, Cycles
+from pam_actuation.report.errors import by_part, Cycles, Signal
 from pam_sim.annotations import FloatArray
 
 if TYPE_CHECKING:
@@ -46,8 +46,8 @@ def learned_worse(run: 'Run', cycles: FloatArray, parts: Sequence[Cycles],
     """
     Return a sentence on each part of a run in which learning made the tracking worse.
 
-    The last cycles are held against the best ones before. Nothing is said of a run with frozen
-    rules, or with a disturbance.
+    The last cycles are held against the best ones before. Nothing is said of a part at whose end
+    the rules were frozen, or of a run with a disturbance.
 
     Parameters
     ----------
@@ -63,10 +63,20 @@ def learned_worse(run: 'Run', cycles: FloatArray, parts: Sequence[Cycles],
     """
     learning = signals.series(run, 'controller_state', 'learning')
     pushed = signals.series(run, 'external_force')
-    if learning is None or learning[1][-1] != 1.0 or pushed is not None and pushed[1].any():
+    if learning is None or pushed is not None and pushed[1].any():
         return ()
-    return tuple(said for hz, of_part in by_part(cycles, parts)
-                 if (said := _sentence(of_part, f' of {hz}' if hz else '', unit)))
+    return tuple(said for part, (hz, of_part) in zip(parts, by_part(cycles, parts))
+                 if _learns_at_the_end(learning, part)
+                 and (said := _sentence(of_part, f' of {hz}' if hz else '', unit)))
+
+
+def _learns_at_the_end(learning: Signal, part: Cycles) -> bool:
+    """Return whether the rules could change for most of the last cycle of a part."""
+    # What follows the part tells nothing: without a reference no controller learns.
+    (time_s, learns), (start_s, period_s, count) = learning, part
+    left_s = start_s + count * period_s - time_s
+    last = learns[(left_s > 0.0) & (left_s <= period_s)]
+    return bool(last.size) and float(last.mean()) > 0.5
 
 
 def _sentence(cycles: FloatArray, of_part: str, unit: str) -> str:

@@ -369,6 +369,16 @@ def test_rules_that_learning_spoiled_are_told_with_what_to_do():
     assert f'first: {said}.' in body and 'Rules rolled back' in body
 
 
+def test_what_follows_the_cycles_hides_no_rules_that_learning_spoiled():
+    """A recording may go on after its experiment: without a reference no controller learns."""
+    run = learning_run(SPOILED_M)
+    state = run.topics['controller_state']
+    state.values['learning'][-3:] = 0.0
+    assert len(metrics.run_metrics(run).learned_worse) == 1
+    state.values['learning'][-run['reference'].stamp_ns.size // 4:] = 0.0       # frozen by hand
+    assert metrics.run_metrics(run).learned_worse == ()
+
+
 @pytest.mark.parametrize('amplitudes_m, more', [
     (SPOILED_M[:6], {}), (SPOILED_M, {'learning': 0.0}), (SPOILED_M[3:6:2], {}),
     (SPOILED_M, {'pushed_n': 10.0}), (0.05 * SPOILED_M, {})])
