@@ -27,7 +27,7 @@ from pam_sim.gap.data.holes import stretches
 from pam_sim.gap.data.noise import noise_of
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.resting import Rest, rest_of, ZERO
-from pam_sim.gap.data.signals import FIELD, ordered, recorded_valve, tells_of
+from pam_sim.gap.data.signals import FIELD, ordered, recorded_valve, SIGNALS, tells_of
 from pam_sim.gap.subsystems.mechanics import MechanicsProblem
 from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.gap.subsystems.valve import ValveProblem
@@ -133,7 +133,7 @@ def offers_of(runs: Sequence[Run], rig: Rig, added_kg: Sequence[float],
     """
     offers, remarks = [], []
     for index, (run, mass) in enumerate(zip(runs, added_kg)):
-        parts, text = stretches(run, LEAST_DURATION_S, rig.is_driven)
+        parts, text = stretches(_usable(run), LEAST_DURATION_S, rig.is_driven)
         if not parts:
             raise InputError(text, run.path or 'recording')
         offers += [replace(offer_of(one, rig, mass), holds_certify=spare_certify and index == 0)
@@ -165,18 +165,17 @@ def offer_of(run: Run, rig: Rig, added_kg: float = 0.0) -> Offer:
         command, and the load was never lifted. The command is that of another valve.
 
     """
-    where = run.path or 'recording'
-    if 'pressure' not in run or len(run['pressure']) < LEAST_SAMPLES:
+    where, run = run.path or 'recording', _usable(run)
+    if 'pressure' not in run:
         raise InputError(
-            f'has no `pressure` of at least {LEAST_SAMPLES} messages; every number is found '
-            'from the pressure', where)
+            f'has no `pressure` of at least {LEAST_SAMPLES} finite values, each at another time; '
+            'every number is found from the pressure', where)
     recorded = recorded_valve(run)
     if recorded and recorded != rig.valve:
         raise InputError(f'the recording is of a rig with valve {recorded}, the model has '
                          f'{rig.valve}', where)
     command = tells_of(run, rig.valve)
-    contraction, force = (
-        name in run and len(run[name]) >= LEAST_SAMPLES for name in ('contraction', 'force'))
+    contraction, force = (name in run for name in ('contraction', 'force'))
     is_still = _is_held(run, rig)
     held = rig.is_driven or (force and is_still)
     isometric_m = rig.parameters.get('contraction_m') if rig.load == 'isometric' else None
@@ -210,9 +209,24 @@ def offer_of(run: Run, rig: Rig, added_kg: float = 0.0) -> Offer:
     return Offer(where, recording, valve, mechanics, kind, added_kg, rest)
 
 
+def _usable(run: Run) -> Run:
+    """Return a run without readings that are not finite, and without topics of too few others."""
+    topics = dict(run.topics)
+    for name in SIGNALS:
+        series = topics.pop(name, None)
+        if series is None or FIELD[name] not in series.values:
+            continue
+        good = np.isfinite(series.values[FIELD[name]])
+        if np.unique(series.stamp_ns[good]).size >= LEAST_SAMPLES:
+            topics[name] = series if good.all() else replace(
+                series, stamp_ns=series.stamp_ns[good],
+                values={key: value[good] for key, value in series.values.items()})
+    return replace(run, topics=topics)
+
+
 def _is_held(run: Run, rig: Rig) -> bool:
     """Tell whether the length stays while the pressure moves."""
-    if 'contraction' not in run or not len(run['contraction']):
+    if 'contraction' not in run:
         return False
     moved = float(np.ptp(np.percentile(run['contraction']['contraction_m'], (1, 99))))
     pressed = float(np.ptp(run['pressure']['pressure_pa']))

@@ -156,6 +156,36 @@ def test_a_muscle_that_is_held_on_a_rig_with_a_mass_is_one_at_a_held_length():
                 'valve and muscle at a held length')
 
 
+def spoiled(run, topic, where):
+    """Make the readings of a topic at these places no numbers."""
+    (values,) = run.topics[topic].values.values()
+    values[where] = np.nan
+    return run
+
+
+@pytest.mark.parametrize('topic', ['pressure', 'contraction', 'force'])
+def test_a_reading_that_is_no_number_leaves_a_held_muscle_held(topic):
+    run = spoiled(record(load_rig('dmsp_5_300_isometric'), (300e3, 400e3, 500e3)), topic, 70)
+    assert offer_of(run, RIG).kind == 'valve and muscle at a held length'
+
+
+def test_a_sensor_without_readings_that_can_be_used_is_as_if_it_were_not_there():
+    few = slice(5, None)
+    with pytest.raises(InputError, match='bag: has no `pressure` of at least 20 finite values'):
+        identify(spoiled(record(RIG), 'pressure', few), RIG, ['mass_kg'])
+    assert offer_of(spoiled(record(RIG), 'contraction', few), RIG).kind == 'valve'
+    without = offer_of(spoiled(record(RIG), 'force', few), RIG)
+    assert without.kind == 'valve and muscle and load'
+    assert without.recording.signals == ('pressure', 'contraction')
+
+
+def test_a_stretch_of_readings_that_are_no_numbers_is_a_hole():
+    run = spoiled(record(RIG, hold_s=1.0), 'pressure', slice(500, 640))
+    offers, remarks = offers_of([run], RIG, [0.0])
+    assert len(offers) == 2
+    assert 'the stretches without a hole count as 2 recordings' in remarks[0]
+
+
 def test_the_held_length_may_be_unknown_and_beyond_the_stroke_is_no_length():
     rig = load_rig('dmsp_5_300_isometric').with_(parameters={'contraction_m': 0.03})
     run = record(rig, keep=('pressure', 'force'), command=False)
