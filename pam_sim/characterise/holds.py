@@ -118,7 +118,8 @@ def samples_of(run: Run, topic: str, key: str, origin_ns: int) -> tuple[FloatArr
     value = np.asarray(series.values[key], dtype=float)
     good = np.isfinite(value)
     if np.count_nonzero(good) < 2:
-        raise InputError(f'has no finite `{topic}` values', run.path)
+        raise InputError(f'has {np.count_nonzero(good)} finite `{topic}` values; at least 2 are '
+                         'needed', run.path)
     time = series.time_s(origin_ns)[good]
     order = np.argsort(time, kind='stable')
     return time[order], value[good][order]

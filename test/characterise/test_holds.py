@@ -91,6 +91,13 @@ def test_a_recording_without_pressure_or_contraction_is_refused(topic):
         find_holds(stepped_run(50.0, leave_out=(topic,)), LENGTH_M)
 
 
+def test_a_pressure_with_a_single_usable_value_is_refused_with_that_number():
+    run = stepped_run(50.0)
+    run.topics['pressure'].values['pressure_pa'][1:] = np.nan
+    with pytest.raises(InputError, match='has 1 finite `pressure` values; at least 2 are needed'):
+        find_holds(run, LENGTH_M)
+
+
 def test_a_recording_without_steps_is_refused():
     with pytest.raises(InputError, match='settled holds of different pressure'):
         fixed_load(stepped_run(50.0, levels_pa=np.array([2e5, 2e5, 2e5])), LENGTH_M)
