@@ -34,6 +34,7 @@ LEAST_CLIPPED, LEAST_HELD = 0.01, 10    # share of the samples at the limit, and
 MOST_REPEATED = 0.01            # of the other samples: those of a coarse sensor repeat
 LEAST_FROZEN, MOST_ALIKE = 20, 5         # samples that are equal: of a dropout, and elsewhere
 LEAST_NOISE = 2e-5              # of the range, just before it: a model without noise comes to rest
+QUIETEST, LEAST_EVEN = 2.0, 0.1          # per cent of the stretches; their noise, of the usual one
 LEAST_TURNS = 0.25              # of the bends elsewhere, that noise turns round one by one
 # Where a rig is at rest, and how far from it a sensor may begin: it is no fault to see no less.
 RESTS = {'pressure_pa': (P_ATM_PA, 5e3), 'contraction_m': (0.0, 1e-3), 'force_n': (0.0, 5.0)}
@@ -138,12 +139,21 @@ def freezes(values: FloatArray) -> list[tuple[int, int]]:
     others = lengths[lengths < LEAST_FROZEN]
     if not found or len(others) < FEWEST_SAMPLES or others.max() > MOST_ALIKE:
         return []
+    if len(found) > 1 and len({float(values[begin]) for begin, _ in found}) == 1:
+        return []               # a load that rests on its friction or a stop
     is_frozen = np.zeros(len(values), dtype=bool)
     for begin, end in found:
         is_frozen[begin:end] = True
     bends = np.diff(values[~is_frozen], 2)
     turns = bends[1:] * bends[:-1] < 0.0
-    return found if turns.mean() > LEAST_TURNS else []
+    return found if turns.mean() > LEAST_TURNS and _is_noisy_throughout(bends) else []
+
+
+def _is_noisy_throughout(bends: FloatArray) -> bool:
+    """Tell whether second differences have about one size: a model without noise glides, too."""
+    rows = np.abs(bends[:len(bends) // LEAST_FROZEN * LEAST_FROZEN]).reshape(-1, LEAST_FROZEN)
+    sizes = np.median(rows, axis=1)
+    return bool(np.percentile(sizes, QUIETEST) > LEAST_EVEN * np.median(sizes))
 
 
 def _bends(values: FloatArray) -> float:

@@ -193,3 +193,18 @@ def test_a_model_without_noise_that_comes_to_rest_is_no_dropout():
         column.append(state)
     said = told('pressure_pa', P_ATM_PA + np.array(column))
     assert not any('stands still' in one for one in said)
+
+
+def test_a_load_without_noise_that_sticks_and_glides_is_no_dropout():
+    """Only where it slips does the force of such a model seem noisy."""
+    slips = np.sin(TIME_S) > 0.2
+    column = 30.0 + 5.0 * np.sin(0.3 * TIME_S) + np.where(slips, 0.05 * NOISE, 0.0)
+    for begin in (1500, 8000, 20_500):          # while it slips
+        column[begin:begin + 100] = column[begin]
+    assert slips[[1490, 7990, 20_490]].all()
+    assert not any('stands still' in one for one in told('force_n', column))
+    # It rests at the weight of the load, again and again.
+    column = 30.0 + 5.0 * np.sin(0.3 * TIME_S) + 0.05 * NOISE
+    for begin in (1500, 8000, 20_500):
+        column[begin:begin + 100] = 31.381
+    assert not any('stands still' in one for one in told('force_n', column))
