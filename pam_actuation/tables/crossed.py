@@ -30,8 +30,11 @@ LAGS_S = np.arange(0.0, 0.51, 0.02)                 # of a valve behind its comm
 LEAST_EARLY_S, EARLY_LEFT = 0.05, 0.25              # before it; what that leaves of the rest
 AGAINST, ALONG = -0.3, 0.7          # correlation of a pressure with a command
 FEWEST = 50                         # values
+MOST = 50_000                       # readings of a pressure that are compared, evenly chosen
 
 Signals = Mapping[str, tuple[IntArray, FloatArray]]
+# Stamps [ns] and values of a pressure [Pa], then those of a command.
+Pair = tuple[IntArray, FloatArray, IntArray, FloatArray]
 
 
 def crossed(signals: Signals, mapped: Mapping[str, ColumnMap]) -> list[Doubt]:
@@ -84,10 +87,11 @@ def _against_command(signals: Signals, mapped: Mapping[str, ColumnMap], taken: s
         pressure = f'{place}pressure'
         if not command or 'pressure' not in names or pressure in taken:
             continue
-        own = _following(signals, pressure, f'{place}{command}')
-        if own is None:
+        pair = _pair(signals, pressure, f'{place}{command}')
+        own = _correlation(pair)
+        if pair is None or own is None:
             continue
-        early_s = _early(signals, pressure, f'{place}{command}', own)
+        early_s = _early(pair, own)
         if early_s:
             yield (f'{_named(pressure, mapped)}: it moves {early_s:.2g} s before '
                    f'{_named(f"{place}{command}", mapped)}, its command; are their times of two '
@@ -95,7 +99,8 @@ def _against_command(signals: Signals, mapped: Mapping[str, ColumnMap], taken: s
             continue
         others = [f'{side}/{command}' for side in SIDES
                   if place and f'{side}/' != place and f'{side}/{command}' in signals]
-        if others and own < -AGAINST and (_following(signals, pressure, others[0]) or 0.0) > ALONG:
+        if others and own < -AGAINST and (
+                _correlation(_pair(signals, pressure, others[0])) or 0.0) > ALONG:
             yield (f'{_named(pressure, mapped)}: it follows {_named(others[0], mapped)}, and not '
                    f'{_named(f"{place}{command}", mapped)}; are the columns exchanged?')
         elif own < AGAINST:
@@ -103,13 +108,13 @@ def _against_command(signals: Signals, mapped: Mapping[str, ColumnMap], taken: s
                    f'{_named(f"{place}{command}", mapped)} rises; are they of two muscles?')
 
 
-def _early(signals: Signals, pressure: str, command: str, own: float) -> float:
+def _early(pair: Pair, own: float) -> float:
     """
     Return how long a pressure moves before its command [s], 0 where it does not.
 
     The command that comes later tells much more of the pressure than those before.
     """
-    found = {lag_s: _following(signals, pressure, command, np.array([-lag_s]))
+    found = {lag_s: _correlation(pair, np.array([-lag_s]))
              for lag_s in LAGS_S if lag_s >= LEAST_EARLY_S}
     early_s, best = max(((lag_s, one) for lag_s, one in found.items() if one is not None),
                         key=lambda pair: pair[1], default=(0.0, 0.0))
@@ -117,15 +122,22 @@ def _early(signals: Signals, pressure: str, command: str, own: float) -> float:
     return float(early_s) if is_early else 0.0
 
 
-def _following(signals: Signals, pressure: str, command: str, lags_s: FloatArray = LAGS_S
-               ) -> float | None:
-    """Return the largest correlation of a pressure with a command before; None where open."""
-    (stamp_ns, pressure_pa), (sent_ns, sent) = signals[pressure], signals[command]
-    known, said = np.isfinite(pressure_pa), np.isfinite(sent)
-    stamp_ns, pressure_pa = stamp_ns[known], pressure_pa[known]
-    sent_ns, sent = sent_ns[said], sent[said]
+def _pair(signals: Signals, pressure: str, command: str) -> Pair | None:
+    """Return a pressure and a command without what is missing; None where they tell nothing."""
+    (stamp_ns, pressure_pa), (sent_ns, sent) = (
+        (stamps[known], values[known]) for stamps, values in (signals[pressure], signals[command])
+        for known in [np.isfinite(values)])
     if min(len(stamp_ns), len(sent_ns)) < FEWEST or np.ptp(pressure_pa) < LEAST_RISE_PA:
         return None
+    every = -(-len(stamp_ns) // MOST)
+    return stamp_ns[::every], pressure_pa[::every], sent_ns, sent
+
+
+def _correlation(pair: Pair | None, lags_s: FloatArray = LAGS_S) -> float | None:
+    """Return the largest correlation of a pressure with a command before; None where open."""
+    if pair is None:
+        return None
+    stamp_ns, pressure_pa, sent_ns, sent = pair
     found = []
     for lag_s in lags_s:
         place = np.searchsorted(sent_ns, stamp_ns - int(1e9 * lag_s), side='right') - 1
