@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from pam_actuation.control.sent_reference import wanted_at
-from pam_actuation.report.page import paragraph, Section
+from pam_actuation.report.page import Section, told_of_runs
 from pam_actuation.report.swinging import followed
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
@@ -92,9 +92,7 @@ def ahead(run: 'Run') -> str:
 
 def ahead_section(runs: 'Iterable[tuple[str, Run]]') -> Section | None:
     """Return the section on such runs by their titles, None where there is none."""
-    told = [(title, said) for title, run in runs if (said := ahead(run))]
-    return Section('ahead', 'Ahead of the reference', ''.join(
-        paragraph(f'{title}: {said}.') for title, said in told)) if told else None
+    return told_of_runs('ahead', 'Ahead of the reference', ahead, runs)
 
 
 def _lead_s(run: 'Run') -> float:

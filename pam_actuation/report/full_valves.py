@@ -19,7 +19,7 @@ from collections.abc import Iterable
 from pam_actuation.bags.facts import recorded_muscle
 from pam_actuation.bags.load_joint import MEASURED
 from pam_actuation.report.metrics import saturation_share
-from pam_actuation.report.page import paragraph, Section
+from pam_actuation.report.page import Section, told_of_runs
 from pam_actuation.rig_files.by_size import by_size
 from pam_sim.joint.parameters import SIDES
 from pam_sim.run import Run
@@ -62,6 +62,4 @@ def _of_muscle(run: Run, which: str) -> str:
 
 def full_valves_section(runs: Iterable[tuple[str, Run]]) -> Section | None:
     """Return the section on such runs by their titles, None where there is none."""
-    told = [(title, said) for title, run in runs if (said := full_valves(run))]
-    return Section('full_valves', 'Valves too small', ''.join(
-        paragraph(f'{title}: {said}.') for title, said in told)) if told else None
+    return told_of_runs('full_valves', 'Valves too small', full_valves, runs)

@@ -22,8 +22,6 @@ from typing import Any
 
 import numpy as np
 from pam_actuation.report import errors, figures, metrics, signals
-from pam_actuation.report.ahead import ahead_section
-from pam_actuation.report.full_valves import full_valves_section
 from pam_actuation.report.learning import learned_worse, times_rolled_back
 from pam_actuation.report.page import plot, render, Section, table
 from pam_actuation.report.pages import (
@@ -37,8 +35,7 @@ from pam_actuation.report.sections.overlaid import lines, read_topic, together
 from pam_actuation.report.sections.provenance import provenance
 from pam_actuation.report.sections.timing import timing
 from pam_actuation.report.steps import ANGLE, as_data, responses, settling_text, StepResponse
-from pam_actuation.report.swinging import swinging_section
-from pam_actuation.report.unlike import unlike_section
+from pam_actuation.report.tracked import tracked_sections
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.files import write_text
@@ -155,9 +152,7 @@ def joint_report(runs: Sequence[Run], out_path: str | os.PathLike[str],
     spread = over_seeds(list(zip(titles, runs, found)))
     sections = [*filter(None, [
         early_section(runs), implausible_section(list(zip(titles, runs))),
-        full_valves_section(zip(titles, runs)), swinging_section(zip(titles, runs)),
-        ahead_section(zip(titles, runs)), unlike_section(list(zip(titles, runs))),
-        _merits(named),
+        *tracked_sections(list(zip(titles, runs))), _merits(named),
         seeds_section(spread), cycle_chart([
             (title, np.degrees(one.cycle_rmse_rad), one.cycle_parts) for title, one in named],
             '°'), _overlaid(list(zip(titles, runs)))])]

@@ -14,15 +14,18 @@
 
 """The page: sections in order, written as one self-contained HTML file."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 import html
 from itertools import zip_longest
 import json
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 from pam_actuation.report.assets import CSS, SCRIPT
 from pam_sim.errors import InputError
+
+if TYPE_CHECKING:
+    from pam_sim.run import Run
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,14 @@ def text(value: object) -> str:
 def paragraph(value: str, kind: str = '') -> str:
     """Return an escaped paragraph, ``kind`` being a CSS class such as ``note``."""
     return f'<p class="{kind}">{text(value)}</p>' if kind else f'<p>{text(value)}</p>'
+
+
+def told_of_runs(key: str, title: str, look: 'Callable[[Run], str]',
+                 runs: 'Iterable[tuple[str, Run]]') -> Section | None:
+    """Return the section on runs of which a look says a sentence, None where there is none."""
+    told = [(name, said) for name, run in runs if (said := look(run))]
+    return Section(key, title, ''.join(
+        paragraph(f'{name}: {said}.') for name, said in told)) if told else None
 
 
 def plot(figure: dict[str, Any], caption: str = '') -> str:

@@ -19,9 +19,7 @@ from typing import Any, TYPE_CHECKING
 
 from pam_actuation.bags.facts import recorded_muscle
 from pam_actuation.bags.oddities import recording_remarks
-from pam_actuation.report.ahead import ahead_section
 from pam_actuation.report.errors import by_part
-from pam_actuation.report.full_valves import full_valves_section
 from pam_actuation.report.metrics import run_metrics, RunMetrics
 from pam_actuation.report.page import paragraph, render, Section, signed, table
 from pam_actuation.report.sections.cycles import cycles
@@ -32,8 +30,7 @@ from pam_actuation.report.sections.overlaid import overlaid
 from pam_actuation.report.sections.provenance import provenance
 from pam_actuation.report.sections.signals_plot import time_plots
 from pam_actuation.report.sections.timing import timing
-from pam_actuation.report.swinging import swinging_section
-from pam_actuation.report.unlike import unlike_section
+from pam_actuation.report.tracked import tracked_sections
 from pam_sim.errors import InputError
 from pam_sim.files import StrPath, write_text
 
@@ -87,8 +84,7 @@ def bag_report(runs: 'Sequence[Run]', out_path: StrPath, titles: Sequence[str] |
     named = list(zip(titles, measured))
     spread = over_seeds(list(zip(titles, runs, measured)))
     sections = [early_section(runs), implausible_section(list(zip(titles, runs))),
-                full_valves_section(zip(titles, runs)), swinging_section(zip(titles, runs)),
-                ahead_section(zip(titles, runs)), unlike_section(list(zip(titles, runs))),
+                *tracked_sections(list(zip(titles, runs))),
                 metrics(named), seeds_section(spread), cycles(named),
                 overlaid(list(zip(titles, runs)))]
     for k, (title, run) in enumerate(zip(titles, runs)):

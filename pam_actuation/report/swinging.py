@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pam_actuation.control.sent_reference import wanted_at
 from pam_actuation.report import signals
-from pam_actuation.report.page import paragraph, Section
+from pam_actuation.report.page import Section, told_of_runs
 from pam_sim.annotations import FloatArray
 
 if TYPE_CHECKING:
@@ -163,6 +163,4 @@ def _sentence(found: Swinging, what: str) -> str:
 
 def swinging_section(runs: 'Iterable[tuple[str, Run]]') -> Section | None:
     """Return the section on such runs by their titles, None where there is none."""
-    told = [(title, said) for title, run in runs if (said := swinging(run))]
-    return Section('swinging', 'Swinging', ''.join(
-        paragraph(f'{title}: {said}.') for title, said in told)) if told else None
+    return told_of_runs('swinging', 'Swinging', swinging, runs)

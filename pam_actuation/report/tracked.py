@@ -12,17 +12,21 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a run that was just recorded tells of valves and controller, beside its numbers."""
+"""What runs tell of valves and controller, beside their numbers."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from pam_actuation.bags.load_joint import load_recording
-from pam_actuation.report.ahead import ahead
-from pam_actuation.report.full_valves import full_valves
-from pam_actuation.report.swinging import swinging
+from pam_actuation.report.ahead import ahead, ahead_section
+from pam_actuation.report.full_valves import full_valves, full_valves_section
+from pam_actuation.report.page import Section
+from pam_actuation.report.swinging import swinging, swinging_section
+from pam_actuation.report.unlike import unlike_section
 
 if TYPE_CHECKING:
     from pam_actuation.experiments.experiment import Experiment
+    from pam_sim.run import Run
 
 
 def tracked_remarks(bag: str, experiment: 'Experiment') -> list[str]:
@@ -31,3 +35,9 @@ def tracked_remarks(bag: str, experiment: 'Experiment') -> list[str]:
         return []
     run = load_recording(bag)
     return [said for look in (full_valves, swinging, ahead) if (said := look(run))]
+
+
+def tracked_sections(named: 'Sequence[tuple[str, Run]]') -> list[Section | None]:
+    """Return the sections of a page on the same, by title, and on runs that do not compare."""
+    return [full_valves_section(named), swinging_section(named), ahead_section(named),
+            unlike_section(named)]
