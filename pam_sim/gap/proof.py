@@ -20,6 +20,7 @@ Two wrong effects may explain one motion almost as well as the right ones. Anoth
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.speeds import moves_at_one_speed
@@ -85,7 +86,7 @@ class Prover:
     seed: int
     progress: Callable[[float], object]
 
-    @property
+    @cached_property
     def one_speed(self) -> bool:
         """Return whether the searched recordings move at one speed."""
         return moves_at_one_speed(self.recordings, self.context.criteria)
@@ -126,11 +127,10 @@ class Prover:
             final = within_ranges(context, estimator.polish(outcome.final))
         progress(0.88)
         # A proof at another speed tells creep from hysteresis, one at the same speed does not.
-        one_speed = self.one_speed
-        same_speed = one_speed and moves_at_one_speed(
+        same_speed = self.one_speed and moves_at_one_speed(
             [*self.recordings, self.held_out], context.criteria)
         named = outcome.named
-        if one_speed and not same_speed:
+        if self.one_speed and not same_speed:
             named = as_sets(context, named, final)
         named, validation, harms, remarks = confirmed(named, Validation(
             self.held_out, self.whole, estimator, base, final, self.seed))

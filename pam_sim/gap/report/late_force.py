@@ -24,7 +24,9 @@ import numpy as np
 from pam_sim.annotations import BoolArray, FloatArray
 from pam_sim.gap.criteria import Criteria
 from pam_sim.gap.subsystems.known import of_run, SKEW_MAX_S
+from pam_sim.gap.subsystems.problem import SubsystemProblem
 from pam_sim.gap.verify.own_runs import OwnRuns
+from pam_sim.rig import Rig
 
 MOST_S, STEP_S = 0.1, 5e-4   # of what is tried, early and late
 MOST_CAMERA_S = 0.25
@@ -60,8 +62,7 @@ def late_force(runs: OwnRuns, criteria: Criteria) -> str:
             * gaps['contraction'].noise_floor) or (
             gaps['force'].rmse_refit <= criteria.floor_error * gaps['force'].noise_floor):
         return ''
-    problem, rig, known = next(
-        one for one in runs.at(runs.validation.base) if one[0].subsystem == 'muscle')
+    problem, rig, known = _muscle_of(runs)
     skew = np.array([k.name == of_run('force_skew', 0) for k in problem.known])
     chosen = runs.chosen(problem, 'force')
     error = problem.errors(rig, np.where(skew, 0.0, known))[chosen] * problem.floor['force']
@@ -69,8 +70,7 @@ def late_force(runs: OwnRuns, criteria: Criteria) -> str:
     late_s, share = shift_of(time_s, measured + error, measured, problem.floor['force'])
     if abs(late_s) <= SKEW_MAX_S or share <= criteria.greater_part:
         return ''
-    return SENTENCE.format(
-        1e3 * abs(late_s), 'late' if late_s > 0.0 else 'early', 100.0 * share)
+    return _said(SENTENCE, late_s, share)
 
 
 def late_contraction(runs: OwnRuns, criteria: Criteria) -> str:
@@ -95,8 +95,7 @@ def late_contraction(runs: OwnRuns, criteria: Criteria) -> str:
     gap = runs.gaps.get('muscle', {}).get('contraction')
     if gap is None or gap.rmse_refit <= criteria.floor_error * gap.noise_floor:
         return ''
-    problem, rig, known = next(
-        one for one in runs.at(runs.validation.base) if one[0].subsystem == 'muscle')
+    problem, rig, known = _muscle_of(runs)
     chosen, floor = runs.chosen(problem, 'contraction'), problem.floor['contraction']
     # The motion between stretches that are judged is needed to shift it.
     own = (problem.signal == problem.signals.index('contraction')) & (problem.run == 0)
@@ -108,8 +107,16 @@ def late_contraction(runs: OwnRuns, criteria: Criteria) -> str:
         key=lambda found: found[1])
     if abs(late_s) <= 2.0 * SKEW_MAX_S or share <= criteria.named_share:
         return ''
-    return OF_MOTION.format(
-        1e3 * abs(late_s), 'late' if late_s > 0.0 else 'early', 100.0 * share)
+    return _said(OF_MOTION, late_s, share)
+
+
+def _muscle_of(runs: OwnRuns) -> tuple[SubsystemProblem, Rig, FloatArray]:
+    """Return the problem of muscle and load with the calibrated rig and its numbers."""
+    return next(one for one in runs.at(runs.validation.base) if one[0].subsystem == 'muscle')
+
+
+def _said(sentence: str, late_s: float, share: float) -> str:
+    return sentence.format(1e3 * abs(late_s), 'late' if late_s > 0.0 else 'early', 100.0 * share)
 
 
 def shift_of(time_s: FloatArray, simulated: FloatArray, measured: FloatArray,
