@@ -36,11 +36,11 @@ from rclpy.exceptions import InvalidParameterValueException
 from rclpy.node import Node
 
 QOS = 'qos_overrides.'
-# Of these ROS declares the parameters itself, late or never.
 QUALITIES = {            # by the last word of the name of such a parameter
     'history': ('keep_last', 'keep_all', 'system_default'),
     'reliability': ('reliable', 'best_effort', 'best_available', 'system_default')}
 MOST_DEPTH = 1_000_000
+# Of these ROS declares the parameters itself, late or never.
 TOPICS_OF_ROS = ('/clock', '/parameter_events', '/rosout')
 COMMON_PARAMETERS = (         # of every node
     node_parameter('autostart', True, 'Configure and activate without being told to.'),
