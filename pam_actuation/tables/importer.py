@@ -174,9 +174,14 @@ def recording_of(tables: Sequence[Table], mapping: TableMapping, *, size: Size,
                          for text in (*table.remarks, *clock.remarks)]
         result.found += _other_units(table, mapping, held)
         for name, column in held.items():
-            values = mapping.signals[name].to_si(table.numbers(column, missing)[clock.rows])
+            own = mapping.signals[name]
+            values = own.to_si(table.numbers(column, missing)[clock.rows])
+            stamp_ns = clock.stamp_ns - round(1e9 * own.late_s)
+            if stamp_ns[0] < 0:
+                raise InputError(f'late_s = {own.late_s:g} moves {name} before 0 of its clock; '
+                                 f'allowed is at most {1e-9 * clock.stamp_ns[0]:g} s', own.where)
             pieces.setdefault(name, []).append((*_said(
-                clock.stamp_ns, values, is_exported(column, BY_NAME[name])), table.source))
+                stamp_ns, values, is_exported(column, BY_NAME[name])), table.source))
     for name, one in mapping.signals.items():
         if name in pieces:
             result.signals[name] = _joined(name, pieces[name])
@@ -244,6 +249,10 @@ def _check(result: Recording, size: Size, accept: bool) -> None:
         partner = _partner_of(name)
         if partner and partner not in result.signals:
             raise InputError(f'{name} is mapped, {partner} is not; {_has_both(name)}', '--map')
+        if partner and (late_s := result.mapping.signals[partner].late_s) != (
+                own_s := result.mapping.signals[name].late_s):
+            raise InputError(f'{name} has late_s = {own_s:g}, {partner} {late_s:g}; '
+                             f'{_has_both(name)}, so write the same for both', '--map')
     for name, (_, values) in result.signals.items():
         if BY_NAME[name].topic.endswith('contraction') and (
                 held_m := held_at_m(values, size)) is not None:

@@ -30,8 +30,9 @@ from pam_sim.keys import Key, names_of
 from pam_sim.located_yaml import dump_yaml, load_yaml, Located
 
 LEAST_RATE_HZ, MOST_RATE_HZ = 0.1, 1e6
-SYNTAX = 'COLUMN:UNIT[:zero=Z][:gain=G][:missing=N]'
-_NUMBER = re.compile(r'\s*(zero|gain|missing)\s*=')
+MOST_LATE_S = 10.0
+SYNTAX = 'COLUMN:UNIT[:zero=Z][:gain=G][:missing=N][:late_s=S]'
+_NUMBER = re.compile(r'\s*(zero|gain|missing|late_s)\s*=')
 COLUMN_KEYS = (
     Key('column', str, 'name of the column, or its number such as `#3`', required=True),
     Key('unit', str, 'unit of the column, such as `bar_gauge`', required=True),
@@ -39,6 +40,8 @@ COLUMN_KEYS = (
     Key('gain', float, 'units for each step of the column; -1 turns the sign round', 1.0),
     Key('missing', float, 'number that stands for a missing value, such as 0 of a broken wire',
         otherwise='none'),
+    Key('late_s', float, 'how much later than its time stamp says the column tells a value; its '
+        'stamps are moved back by it', 0.0, unit='s', lower=-MOST_LATE_S, upper=MOST_LATE_S),
     Key('optional', bool, 'whether a table without the column is read all the same', False))
 TIME_KEYS = (COLUMN_KEYS[0], Key(
     'unit', str, '`s`, `ms`, `us`, `ns`, `min`, `h`, or `date`', otherwise='from the name'))
@@ -64,6 +67,8 @@ class ColumnMap:
         Such as 0.5 and 2.5 for a sensor of 0.5 to 4.5 V that means 0 to 10 bar.
     missing : float, optional
         Number in the column that stands for a missing value.
+    late_s : float
+        How late it tells a value [s]; its stamps are moved back by it.
     optional : bool
         Whether the column may be missing.
     where : str
@@ -76,6 +81,7 @@ class ColumnMap:
     zero: float = 0.0
     gain: float = 1.0
     missing: float | None = None
+    late_s: float = 0.0
     optional: bool = False
     where: str = field(default='', compare=False)
 
@@ -96,14 +102,16 @@ class ColumnMap:
             entry['gain'] = self.gain
         if self.missing is not None:
             entry['missing'] = self.missing
+        if self.late_s:
+            entry['late_s'] = self.late_s
         return entry | ({'optional': True} if self.optional else {})
 
     @property
     def numbers(self) -> tuple[str, ...]:
-        """Return zero, gain and missing as ``zero=200``, those that differ from the usual."""
-        found = [f'zero={self.zero:.15g}'] if self.zero else []
-        found += [f'gain={self.gain:.15g}'] if self.gain != 1.0 else []
-        return (*found, *([f'missing={self.missing:.15g}'] if self.missing is not None else []))
+        """Return zero, gain and others as ``zero=200``, those that differ from the usual."""
+        usual = {'zero': 0.0, 'gain': 1.0, 'missing': None, 'late_s': 0.0}
+        return tuple(f'{name}={own:.15g}' for name, one in usual.items()
+                     if (own := getattr(self, name)) != one)
 
     @property
     def reading(self) -> str:
@@ -238,11 +246,11 @@ def load_mapping(path: StrPath) -> TableMapping:
     for name, entry in signals_key.read(tree).items():
         quantity = signal_of(name, tree['signals'].where(name)).quantity
         entry = tree['signals'].require(name, dict).check_keys(names_of(COLUMN_KEYS))
-        _, unit, zero, gain, missing, optional = COLUMN_KEYS
+        _, unit, zero, gain, missing, late_s, optional = COLUMN_KEYS
         signals[name] = _checked(ColumnMap(
             _column(entry), checked_unit(unit.read(entry), quantity, entry.where('unit')),
-            zero.read(entry), gain.read(entry), missing.read(entry), optional.read(entry),
-            entry.where()))
+            zero.read(entry), gain.read(entry), missing.read(entry), late_s.read(entry),
+            optional.read(entry), entry.where()))
     return TableMapping(signals, time, rate_hz)
 
 
@@ -257,6 +265,9 @@ def _checked(one: ColumnMap) -> ColumnMap:
         raise InputError(
             f'zero = {one.zero:g} and gain = {one.gain:g}{more}; allowed are finite numbers, and '
             'a gain that is not 0', one.where)
+    if not abs(one.late_s) <= MOST_LATE_S:
+        raise InputError(f'late_s = {one.late_s:g}; allowed are -{MOST_LATE_S:g} to '
+                         f'{MOST_LATE_S:g} s', one.where)
     return one
 
 

@@ -32,11 +32,12 @@ MOST_S, STEP_S = 0.1, 5e-4   # of what is tried, early and late
 MOST_CAMERA_S = 0.25
 SENTENCE = ('The load moves as in the model, but its force is about {:.0f} ms {}: that explains '
             '{:.0f} % of the squared gap in force. Look at the filter of the load cell and at its '
-            'time stamps.')
+            'time stamps. `pam import` takes a known delay off a column with `late_s`.')
 
 OF_MOTION = ('The load moves as in the model, but its contraction is about {:.0f} ms {}: that '
              'explains {:.0f} % of the squared gap in contraction. Look at the delay of its '
-             'sensor, such as a camera, and at its time stamps.')
+             'sensor, such as a camera, and at its time stamps. `pam import` takes a known delay '
+             'off a column with `late_s`.')
 
 
 def late_force(runs: OwnRuns, criteria: Criteria) -> str:
