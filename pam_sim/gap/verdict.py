@@ -204,7 +204,7 @@ def _is_left(result: GapResult, validation: Validation, least: float) -> bool:
     Return whether calibration leaves a gap that matters and that is no noise.
 
     It matters by the floor as it was found. Half of that must be left by a floor that is too low,
-    and by numbers at the end of their interval.
+    and by a drift as far as is rare, with numbers at the end of their interval.
     """
     criteria, noise = validation.estimator.criteria, validation.noise
 
@@ -212,17 +212,17 @@ def _is_left(result: GapResult, validation: Validation, least: float) -> bool:
         beyond = _beyond(result.signals[name].rmse_refit, math.hypot(floor, NORMAL_95 * spread))
         return beyond / max(noise[name], 1e-12)
 
-    def surely(name: str, spread: float = 0.0) -> float:
-        return left(name, criteria.floor_error * validation.highest_floor[name], spread)
+    def surely(name: str, floors: Mapping[str, float], spread: float = 0.0) -> bool:
+        return left(name, criteria.floor_error * floors[name], spread) > (
+            criteria.greater_part * least)
 
-    sure = criteria.greater_part * least
     large = [name for name, s in result.signals.items()
-             if left(name, s.noise_floor) > least and surely(name) > sure]
+             if left(name, s.noise_floor) > least and surely(name, validation.highest_floor)]
     # What the searched data show clearly is no doubt about numbers, however wide their priors.
     if not large or is_clear(validation):
         return bool(large)
     spread = spread_of_numbers(validation)
-    return any(surely(name, spread.get(name, 0.0)) > sure for name in large)
+    return any(surely(name, validation.rare_floor, spread.get(name, 0.0)) for name in large)
 
 
 def given_suffices(result: GapResult, validation: Validation, materiality: float) -> bool:

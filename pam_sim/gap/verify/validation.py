@@ -19,8 +19,9 @@ The given model, the same with its numbers calibrated, and the final one run on 
 recorded valve signal alone, or, where nobody recorded it, on the measured pressure.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 import math
 
 import numpy as np
@@ -40,6 +41,7 @@ from pam_sim.gap.verify.materiality import moved
 from pam_sim.gap.verify.model import free_run_of, late_by, numbers_of
 
 INPUT_DRAWS = 8
+RARE_DRAWS = 40              # one in so many is rarer than what probably differs (`likely_sd`)
 MEDIAN_SD = 1.25             # of a median of normal values over that of their mean
 
 
@@ -109,7 +111,7 @@ class Validation:
         self.noise = {s: float(np.hypot(seen[s].sd, self._slow[s])) for s in seen}
         self.drift = self._drift()
         # A valve that adds up its errors drifts: one run may be off by far more than the mean.
-        self.floor, self.highest_floor = self._floors()
+        self.floor, self.highest_floor = self._floors(self.drift)
 
     def of(self, final: Fit, base: Fit | None = None, estimator: Estimator | None = None
            ) -> 'Validation':
@@ -241,6 +243,11 @@ class Validation:
                 found.append(s)
         return found
 
+    @cached_property
+    def rare_floor(self) -> dict[str, float]:
+        """The noise floors with the furthest drift of ``RARE_DRAWS``, by signal."""
+        return self._floors(self._drift(RARE_DRAWS))[1]
+
     def left(self) -> float:
         """Return what the final model leaves beyond the floor (rms), as of ``fall``."""
         return math.sqrt(sum(
@@ -259,13 +266,13 @@ class Validation:
         error = (simulated[signal] - self.recording.measured[signal])[self.part[signal]]
         return float(np.sqrt(np.mean(error ** 2)))
 
-    def _drift(self) -> list[dict[str, FloatArray]]:
+    def _drift(self, draws: int = INPUT_DRAWS) -> list[dict[str, FloatArray]]:
         """Return by signal, for some draws, how far errors of the input move the final run."""
         random, r = np.random.default_rng(self.seed), self.recording
         found: list[dict[str, FloatArray]] = []
         start_sd = start_error_sd(r)
         noise = self._pressure_noise() if r.pressure_given else None
-        for _ in range(INPUT_DRAWS):
+        for _ in range(draws):
             if noise is not None:
                 drift_pa = DRIFT_SD * noise.sd * random.standard_normal()
                 moved = self.run(self.final, pressure_noise_pa=drift_pa + noise.draw(
@@ -285,9 +292,9 @@ class Validation:
         return own if own.slow_sd > 0.0 else replace(
             own, slow_sd=slow.slow_sd, memory_s=slow.memory_s)
 
-    def _floors(self) -> list[dict[str, float]]:
+    def _floors(self, drift: Sequence[Mapping[str, FloatArray]]) -> list[dict[str, float]]:
         r = self.recording
-        squares = {s: [float(np.mean(d[s] ** 2)) for d in self.drift] for s in r.signals}
+        squares = {s: [float(np.mean(d[s] ** 2)) for d in drift] for s in r.signals}
         return [{s: sensor_floor(r.time_s[s], r.measured[s], s,
                                  float(np.sqrt(of(squares[s]) + self._slow[s] ** 2)))
                  for s in r.signals} for of in (np.mean, np.max)]
