@@ -36,6 +36,7 @@ from pam_sim.gap.verify.own_runs import OwnRuns
 from pam_sim.gap.verify.spread import spread_of_numbers
 from pam_sim.gap.verify.uncertainty import effect_numbers, half_width, NUMERICS, off_by
 from pam_sim.gap.verify.validation import Validation
+from pam_sim.gap.verify.witness import witness_notice
 
 
 def decide(result: GapResult, outcome: Outcome, validation: Validation, materiality: float
@@ -192,6 +193,8 @@ def _noticed(validation: Validation, materiality: float, runs: OwnRuns | None) -
         if one is not None and one.is_gap(criteria)]
     if runs is None:
         return found
+    seen = witness_notice(runs, least, criteria)
+    found += [seen] if seen is not None and seen.is_gap(criteria) else []
     floor = validation.floor_with(stamp_sd_s(recording))
     may_matter = any(gap.rmse_refit > math.hypot(floor[s], least * validation.noise[s])
                      for s, gap in validation.signals().items())

@@ -193,6 +193,9 @@ def _noticed(result: GapResult) -> str:
     for one in result.noticed:
         if one.signal == 'supply_pressure':
             parts.append(' The recorded supply pressure moves, that of the model does not.')
+        elif one.witness:
+            parts.append(f' What it misses of the {one.signal} shows in the {one.witness} as '
+                         'well, so it is no noise.')
         elif one.deviations > 0.0:
             parts.append(' Over short spans the pressure errs as noise and stamps do not: its '
                          f'errors follow time or pressure by {one.deviations:.0f} deviations.')

@@ -69,6 +69,8 @@ class Notice:
         By how many standard deviations the errors of a flow follow something; 0 of the others.
     span_s : float
         Of the means.
+    witness : str
+        Another signal that shows the same errors, '' where none was asked.
 
     """
 
@@ -78,6 +80,7 @@ class Notice:
     expected: float
     deviations: float = 0.0
     span_s: float = SLOW_S
+    witness: str = ''
 
     def is_gap(self, criteria: Criteria) -> bool:
         """Return whether noise cannot have made this."""
