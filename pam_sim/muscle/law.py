@@ -321,7 +321,8 @@ class MuscleLaw:
         Return the gauge pressure [Pa] that gives a tension; arrays broadcast.
 
         Bisection, by rule 2; 0 where no pressure is needed, inf where
-        ``upper_pa`` does not suffice. Points outside the range are not flagged.
+        ``upper_pa`` does not suffice, NaN where one is given. Points outside the range are not
+        flagged.
 
         Parameters
         ----------
@@ -335,6 +336,8 @@ class MuscleLaw:
         """
         force, contraction = np.broadcast_arrays(
             np.asarray(force_n, float), np.asarray(strain, float))
+        unknown = np.isnan(force) | np.isnan(contraction)
+        contraction = np.where(unknown, 0.0, contraction)
         low, high = np.zeros(force.shape), np.full(force.shape, float(upper_pa))
         holds_alone = self.formula_n(low, contraction) >= force
         self._judged(high, contraction, 'allow')        # all between is as sound
@@ -343,4 +346,5 @@ class MuscleLaw:
             short = self._tension_n(middle, contraction) < force
             low, high = np.where(short, middle, low), np.where(short, high, middle)
         found = np.where(self._tension_n(high, contraction) < force, np.inf, 0.5 * (low + high))
-        return np.where(holds_alone, 0.0, found)[()]
+        found = np.where(holds_alone, 0.0, found)
+        return np.where(unknown, np.nan, found)[()]

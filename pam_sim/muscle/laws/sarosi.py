@@ -152,7 +152,7 @@ class Sarosi(MuscleLaw):
         pressure = self.pressure_gauge_pa(force_n, strain)
         a1, _, a3, a4, a5, _ = self.values.values()
         gain = a1 * np.exp(a3 * np.asarray(strain, float)) + a4 * np.asarray(strain, float) + a5
-        held = (gain > 0.0) & (pressure <= upper_pa)
+        held = ~((gain <= 0.0) | (pressure > upper_pa))         # what is NaN stays so
         return np.where(held, np.maximum(pressure, 0.0), np.inf)[()]
 
 
