@@ -14,6 +14,7 @@
 
 """Declarations in files of effects, laws and settings hold what their fields are for."""
 
+from collections.abc import Mapping
 import dataclasses
 import functools
 import numbers
@@ -71,6 +72,20 @@ def check_whole(value: Any, lowest: int, name: str) -> None:
     """Raise InputError for what is no whole number from ``lowest`` on, placed at a name."""
     if not isinstance(value, numbers.Integral) or int(value) < lowest:
         raise InputError(f'is {shown(value)}; a whole number, {lowest} or more, is needed', name)
+
+
+def check_mapping(value: Any, name: str, form: str = "{'NAME': NUMBER}") -> None:
+    """Raise InputError for what is no mapping with texts as keys, placed at a name."""
+    if not (isinstance(value, Mapping) and all(isinstance(key, str) for key in value)):
+        raise InputError(f'is {shown(value)}; write `{form}`', name)
+
+
+def number_of(value: Any, name: str) -> float:
+    """Return a number; refuse what is none, by its name."""
+    try:
+        return float(value + 0.0)
+    except (TypeError, ValueError):
+        raise InputError(f'`{name}` is {shown(value)}; a number is needed') from None
 
 
 def shown(value: object) -> str:

@@ -22,11 +22,12 @@ from typing import Any, TYPE_CHECKING
 
 import numpy as np
 from pam_sim.annotations import FloatArray
-from pam_sim.declared import check_whole
+from pam_sim.declared import check_whole, number_of, shown
 from pam_sim.errors import InputError
 from pam_sim.records import cells, fields, zeros
 from pam_sim.rollout import kernel
 from pam_sim.rollout.layout import INPUT, OUTPUT, PARAMETERS, STATE
+from pam_sim.rollout.packing import HIGHEST_PA, LOWEST_PA
 from pam_sim.rollout.simulate import contraction_range_m, told_by_own_file
 from pam_sim.shared_memory import SharedMemory
 
@@ -58,9 +59,10 @@ class Plant(SharedMemory):
     """
 
     def __init__(self, rig: Rig, seed: int = 0, dt_s: float = 0.001, **initial: Any) -> None:
+        check_whole(seed, 0, 'seed')
         self.rig = rig
         self.seed = int(seed)
-        self.dt_s = float(dt_s)
+        self.dt_s = number_of(dt_s, 'dt_s')
         self._initial = initial
         self._inp, self._out = zeros(INPUT), zeros(OUTPUT)
         self._given, self._now = cells(self._inp, INPUT), cells(self._out, OUTPUT)
@@ -117,8 +119,8 @@ class Plant(SharedMemory):
         ------
         InputError
             The number of signals does not fit the valve, a contraction is none of the muscle or
-            of a load that moves freely, ``steps`` is no whole number from 1 on, or a number is
-            not finite, given or computed.
+            of a load that moves freely, ``steps`` is no whole number from 1 on, or what is
+            given or computed is no finite number.
 
         """
         self._take(signal, external_force_n, contraction_m, steps)
@@ -154,13 +156,18 @@ class Plant(SharedMemory):
             check_whole(steps, 1, 'steps')
         if contraction_m is not None:
             self._check_contraction(contraction_m)
-        values = tuple(signal) if hasattr(signal, '__iter__') else (signal,)
+        values = tuple(signal) if hasattr(signal, '__iter__') and getattr(
+            signal, 'shape', None) != () else (signal,)
         if len(values) != len(self._signal):
             raise InputError(f'valve `{self.rig.valve}` takes {len(self._signal)} numbers, got '
                              f'{len(values)}', 'valve signal')
-        for place, value in zip(self._signal, values):
-            place[...] = value
-        self._given.external_force_n[...] = external_force_n
+        try:
+            for place, value in zip(self._signal, values):
+                place[...] = value
+            self._given.external_force_n[...] = external_force_n
+        except (TypeError, ValueError):
+            raise InputError(f'has {shown(signal)} and {shown(external_force_n)}; numbers are '
+                             'needed', 'valve signal and force') from None
         if contraction_m is not None:
             self._given.contraction_m[...] = contraction_m
         if not all_finite(self._inp):
@@ -169,7 +176,7 @@ class Plant(SharedMemory):
     def _check_contraction(self, contraction_m: float) -> None:
         """Refuse what is no contraction of this muscle, as ``Rig.simulate`` does."""
         low, high = contraction_range_m(self.rig)
-        if not low <= contraction_m <= high:
+        if not low <= number_of(contraction_m, 'contraction_m') <= high:
             raise InputError(f'is {contraction_m:g}; allowed {low:g} to {high:g} m',
                              'contraction_m')
 
@@ -213,11 +220,22 @@ class Plant(SharedMemory):
 
     @property
     def supply_pa(self) -> float:
-        """Supply pressure, absolute, Pa; may be set, from the next step on."""
+        """
+        Supply pressure, absolute, Pa; may be set, from the next step on.
+
+        Raises
+        ------
+        InputError
+            Set to what is no number, or to no pressure of a supply.
+
+        """
         return self._now.supply_pa.item()
 
     @supply_pa.setter
     def supply_pa(self, supply_pa: float) -> None:
+        if not LOWEST_PA <= number_of(supply_pa, 'supply_pa') <= HIGHEST_PA:
+            raise InputError(f'is {supply_pa:g}; allowed {LOWEST_PA:g} to {HIGHEST_PA:g} Pa '
+                             'absolute', 'supply_pa')
         fields(self.par, PARAMETERS).supply_pa = supply_pa
 
     @property

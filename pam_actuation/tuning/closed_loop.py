@@ -43,6 +43,7 @@ from pam_sim.errors import InputError
 from pam_sim.records import fields, size_of, zeros
 from pam_sim.rollout import layout
 from pam_sim.rollout.kernel import refuse_terms
+from pam_sim.rollout.packing import LOWEST_PA
 from pam_sim.short_repr import short_repr
 
 if TYPE_CHECKING:
@@ -178,7 +179,7 @@ class MuscleLoop:
         if external_force_n is None and experiment.disturbance:
             external_force_n = experiment.external_force_n
         for name, course, lowest in (('external_force_n', external_force_n, -math.inf),
-                                     ('supply_pa', supply_pa, 0.0)):
+                                     ('supply_pa', supply_pa, LOWEST_PA)):
             if course is not None:
                 disturbances[name] = sampled(
                     course, [k * (1.0 / rate_hz) for k in range(self.ticks)], name, lowest)

@@ -20,7 +20,7 @@ import math
 from typing import Any, TYPE_CHECKING
 
 from pam_sim.annotations import FloatArray
-from pam_sim.declared import check_whole
+from pam_sim.declared import check_whole, number_of, shown
 from pam_sim.errors import InputError
 from pam_sim.joint import kernel, layout
 from pam_sim.joint.packing import pack_joint
@@ -79,8 +79,9 @@ class JointPlant(SharedMemory):
 
     def __init__(self, joint: 'JointRig', seed: int = 0, dt_s: float = 0.001,
                  **initial: Any) -> None:
+        check_whole(seed, 0, 'seed')
         self.joint = joint
-        self.dt_s = float(dt_s)
+        self.dt_s = number_of(dt_s, 'dt_s')
         self._initial = initial
         self._inp, self._out = zeros(layout.INPUT), zeros(layout.OUTPUT)
         self._now = cells(self._out, layout.OUTPUT)
@@ -135,20 +136,28 @@ class JointPlant(SharedMemory):
         ------
         InputError
             The number of signals does not fit the valve, ``steps`` is no whole number from 1 on,
-            or a number is not finite, given or computed.
+            or what is given or computed is no finite number.
 
         """
         check_whole(steps, 1, 'steps')
         sent = []
         for side, signal in (('flexor', flexor_signal), ('extensor', extensor_signal)):
-            values = tuple(signal) if isinstance(signal, Iterable) else (signal,)
+            values: tuple[Any, ...] = (signal,)
+            if isinstance(signal, Iterable) and getattr(signal, 'shape', None) != ():
+                values = tuple(signal)
             rig = getattr(self.joint, side)
             wanted = len(rig.signal_names)
             if len(values) != wanted:
                 raise InputError(f'valve `{rig.valve}` takes {wanted} numbers, got {len(values)}',
                                  f'{side}_signal')
             sent.append(values)
-        if not all(map(math.isfinite, (*itertools.chain(*sent), external_torque_n_m))):
+        numbers = (*itertools.chain(*sent), external_torque_n_m)
+        try:
+            finite = all(map(math.isfinite, numbers))
+        except (TypeError, ValueError):
+            raise InputError(f'has {shown(numbers)}; numbers are needed',
+                             'valve signal or external torque') from None
+        if not finite:
             raise InputError('is not finite', 'valve signal or external torque')
         for places, values in zip(self._signals, sent):
             for place, value in zip(places, values):

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pam_sim.annotations import FloatArray
 from pam_sim.compiled import interpreted
-from pam_sim.declared import shown
+from pam_sim.declared import number_of, shown
 from pam_sim.effects.effect import Numbers
 from pam_sim.effects.registry import all_effects, own_files
 from pam_sim.errors import InputError
@@ -45,6 +45,8 @@ if TYPE_CHECKING:
 _LAW_CODES, _LOAD_CODES = law_codes(), load_codes()
 _RT_J_PER_KG = GAS_CONSTANT_AIR * TEMPERATURE_K
 _DENSITY_FACTOR = math.sqrt(T_REFERENCE_K / TEMPERATURE_K)
+# What may be in a muscle or before its valve, absolute.
+LOWEST_PA, HIGHEST_PA = 0.5 * P_ATM_PA, 2e6
 _DAMPING = 'N s/m'          # unit of the numbers of effects that damp the motion
 
 
@@ -92,15 +94,15 @@ def _pack_effects(rig: 'Rig', numbers: Numbers, state: FloatArray, par: FloatArr
 def _numbers(rig: 'Rig', dt_s: float, pressure: float, contraction: float | None,
              signal: ArrayLike | None) -> Numbers:
     value = rig.parameters
-    dt_s, pressure = _number(dt_s, 'dt_s'), _number(pressure, 'initial_pressure_pa')
+    dt_s, pressure = number_of(dt_s, 'dt_s'), number_of(pressure, 'initial_pressure_pa')
     for name, number, lower, upper, unit in (
             ('dt_s', dt_s, 1e-6, 0.02, 's'),
-            ('initial_pressure_pa', pressure, 0.5 * P_ATM_PA, 2e6, 'Pa absolute')):
+            ('initial_pressure_pa', pressure, LOWEST_PA, HIGHEST_PA, 'Pa absolute')):
         if not lower <= number <= upper:
             raise InputError(f'`{name}` is {number:g}; allowed {lower:g} to {upper:g} {unit}')
     if contraction is None:
         contraction = value.get('contraction_m', 0.0)
-    contraction = _number(contraction, 'initial_contraction_m')
+    contraction = number_of(contraction, 'initial_contraction_m')
     top = rig.muscle.stroke_m
     moves = LOADS[rig.load].MOVES_FREELY
     if not (0.0 <= contraction <= top if moves else math.isfinite(contraction)):
@@ -126,14 +128,6 @@ def _numbers(rig: 'Rig', dt_s: float, pressure: float, contraction: float | None
         rig.fidelity if rig.valve == 'hsv' else 'averaged',
         {**value, 'p_atm': P_ATM_PA}, tuple(map(float, signal)),
         float(pressure), float(contraction), rig.force_at_start_n(contraction), rig.muscle)
-
-
-def _number(value: Any, name: str) -> float:
-    """Return a number; refuse what is none."""
-    try:
-        return float(value + 0.0)
-    except (TypeError, ValueError):
-        raise InputError(f'`{name}` is {shown(value)}; a number is needed') from None
 
 
 def damping_of_effects(rig: 'Rig') -> float:

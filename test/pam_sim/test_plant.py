@@ -15,7 +15,7 @@
 """The live plant equals the rollout; sensors add what they should."""
 
 import numpy as np
-from pam_sim import load_rig
+from pam_sim import load_joint, load_rig
 from pam_sim.errors import InputError
 from pam_sim.sensors import SensorChain
 import pytest
@@ -65,6 +65,40 @@ def test_plant_refuses_what_does_not_fit():
                 advance((0.1, 0.0), steps=steps)
     with pytest.raises(InputError, match='contraction_m: load `hanging_mass` moves freely'):
         plant.step((0.1, 0.0), contraction_m=0.01)
+
+
+@pytest.mark.parametrize('given_inputs, words', [
+    (('x',), "valve signal and force: has 'x' and 0.0; numbers are needed"),
+    (([[1.0]],), 'valve signal and force: has'),
+    ((3.0, 'x'), "valve signal and force: has 3.0 and 'x'"),
+])
+def test_a_plant_refuses_what_is_no_number_in_one_sentence(given_inputs, words):
+    plant = load_rig('dmsp_5_300_hanging_mass').plant()
+    with pytest.raises(InputError) as caught:
+        plant.step(*given_inputs)
+    assert str(caught.value).startswith(words)
+    plant.step(np.array(3.0))               # an array without dimensions is a number
+    assert np.isfinite(plant.outputs).all()
+    for wrong, told in (({'seed': 'x'}, "seed: is 'x'"), ({'dt_s': 'x'}, "`dt_s` is 'x'")):
+        for of in (load_rig('dmsp_5_300_driven'), load_joint('joint_dmsp_5_300')):
+            with pytest.raises(InputError, match=told):
+                of.plant(**wrong)
+    with pytest.raises(InputError, match='contraction_m` is .x.; a number is needed'):
+        load_rig('dmsp_5_300_driven').plant().step(3.0, contraction_m='x')
+    with pytest.raises(InputError, match='numbers are needed'):
+        load_joint('joint_dmsp_5_300').plant().step(3.0, 'x')
+
+
+@pytest.mark.parametrize('wrong', [np.nan, -1.0, 8.0, 801.0, 1e9])
+def test_a_supply_pressure_is_absolute_and_in_pascals(wrong):
+    plant = load_rig('dmsp_5_300_hanging_mass', valve='hsv').plant()
+    with pytest.raises(InputError, match=r'supply_pa: is .*; allowed 50662.5 to 2e\+06 Pa absol'):
+        plant.supply_pa = wrong
+    with pytest.raises(InputError, match="`supply_pa` is 'x'; a number is needed"):
+        plant.supply_pa = 'x'
+    plant.supply_pa = 3e5
+    plant.step((1.0, 0.0), steps=500)
+    assert plant.supply_pa == 3e5 and 2.9e5 < plant.pressure_pa <= 3e5
 
 
 def test_a_held_muscle_is_moved_within_what_it_can_contract():
