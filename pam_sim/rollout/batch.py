@@ -31,7 +31,7 @@ from typing import Any, TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 from pam_sim.annotations import FloatArray
-from pam_sim.declared import check_whole, shown
+from pam_sim.declared import check_whole, number_of, shown
 from pam_sim.errors import InputError
 from pam_sim.records import size_of
 from pam_sim.response import COLUMNS, Response
@@ -84,7 +84,7 @@ class Record:
 Spread = Callable[[Callable[[Any, Any], Any], Any, list[Any]], list[Any]]
 TASK_RUNS = 8       # runs of a task that leaves this process
 # For all runs the same signals, or a sequence of signals for each.
-AllMeasured = Sequence[Measured] | Sequence[Sequence[Measured]]
+AllMeasured = Measured | Sequence[Measured] | Sequence[Sequence[Measured]]
 
 
 def simulate_batch(rigs: 'Rig | list[Rig] | tuple[Rig, ...]',
@@ -126,7 +126,9 @@ def simulate_batch(rigs: 'Rig | list[Rig] | tuple[Rig, ...]',
 
     """
     keep = (keep,) if isinstance(keep, str) else keep
-    names = tuple(COLUMNS) if keep is None else tuple(keep)
+    if keep is not None and not (isinstance(keep, Iterable) and (keep := tuple(keep))):
+        raise InputError(f'is {shown(keep)}; names of signals are needed', 'keep')
+    names = tuple(COLUMNS) if keep is None else keep
     for name in names:
         if name not in COLUMNS:
             raise InputError(f'`{name}` is no signal; allowed: {", ".join(COLUMNS)}', 'keep')
@@ -174,7 +176,7 @@ def sample_batch(rigs: 'Rig | list[Rig]', records: Record | list[Record],
     ----------
     rigs, records, workers
         As of :func:`simulate_batch`.
-    measured : sequence of Measured, or sequence of such sequences
+    measured : Measured, sequence of Measured, or sequence of such sequences
         What every run is compared with, or one sequence per run.
 
     Returns
@@ -185,7 +187,8 @@ def sample_batch(rigs: 'Rig | list[Rig]', records: Record | list[Record],
     Raises
     ------
     InputError
-        As of :func:`simulate_batch`; an instant outside the record.
+        As of :func:`simulate_batch`; an instant outside the record; ``measured`` of another
+        form.
 
     """
     pairs = _pairs(rigs, records)
@@ -261,22 +264,32 @@ def _pairs(
 
 def _placed(measured: AllMeasured, pairs: 'list[tuple[Rig, Record]]') -> list[list[Placed]]:
     """Return per run the measured signals with their places between the steps."""
+    if isinstance(measured, Measured):
+        measured = [measured]
+    if not isinstance(measured, Sequence):
+        raise InputError(f'is {shown(measured)}; give a sequence of Measured', 'measured')
     if not measured:
         raise InputError('is empty; at least one signal is needed', 'measured')
     same = [one for one in measured if isinstance(one, Measured)]
     each = [one for one in measured if not isinstance(one, Measured)]
+    for one in each:
+        if same or not (isinstance(one, Sequence)
+                        and all(isinstance(signal, Measured) for signal in one)):
+            raise InputError(f'has {shown(one)}; give Measured for all runs, or a sequence of '
+                             'them for each', 'measured')
     of_runs: Sequence[Sequence[Measured]] = [same] * len(pairs) if same else each
     if len(of_runs) != len(pairs):
         raise InputError(f'has {len(of_runs)} entries for {len(pairs)} runs', 'measured')
     known: dict[tuple[int, int, float], list[Placed]] = {}
     placed = []
     for index, ((_, record), signals) in enumerate(zip(pairs, of_runs)):
-        key = (id(signals), len(np.atleast_1d(np.asarray(record.valve_signal))), record.dt_s)
-        if key not in known:
-            try:
+        try:
+            key = (id(signals), len(np.atleast_1d(np.asarray(record.valve_signal))),
+                   number_of(record.dt_s, 'dt_s'))
+            if key not in known:
                 known[key] = [Placed(one, *key[1:]) for one in signals]
-            except InputError as error:
-                raise _of_run(index, error) from None
+        except InputError as error:
+            raise _of_run(index, error) from None
         placed.append(known[key])
     return placed
 

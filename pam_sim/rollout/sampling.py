@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.compiled import allocating_entry_point
+from pam_sim.declared import shown
 from pam_sim.errors import InputError
 from pam_sim.response import COLUMNS
 from pam_sim.short_repr import short_repr
@@ -72,16 +73,18 @@ class Placed:
 
     def __init__(self, measured: Measured, steps: int, dt_s: float) -> None:
         name = measured.signal
-        if name not in COLUMNS:
+        if name not in tuple(COLUMNS):
             raise InputError(f'`{name}` is no signal; allowed: {", ".join(COLUMNS)}', 'measured')
         self._column = COLUMNS[name]
-        time_s = np.atleast_1d(np.asarray(measured.time_s, dtype=float))
-        self._value = np.ascontiguousarray(measured.value, dtype=float)
+        time_s = np.atleast_1d(_array(measured.time_s, 'time_s', name))
+        self._value = np.ascontiguousarray(_array(measured.value, 'value', name))
         if time_s.ndim != 1 or self._value.shape != time_s.shape:
             raise InputError(f'`time_s` has shape {time_s.shape} and `value` '
                              f'{self._value.shape}; equal ones are needed', name)
         try:
-            weight = np.broadcast_to(np.asarray(measured.weight, dtype=float), time_s.shape)
+            weight = np.broadcast_to(_array(measured.weight, 'weight', name), time_s.shape)
+        except InputError:
+            raise
         except ValueError:
             raise InputError(f'`weight` has shape {np.shape(measured.weight)}; one number or '
                              f'{time_s.shape} expected', name) from None
@@ -106,6 +109,14 @@ class Placed:
         """Return the sum of (weight (simulated - measured))^2."""
         return residual_sum(outputs, self._column, self._row, self._share, self._value,
                             self._weight)
+
+
+def _array(values: ArrayLike, what: str, signal: str) -> FloatArray:
+    """Return an array of floats; refuse what is none."""
+    try:
+        return np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f'`{what}` is no array of numbers: {shown(values)}', signal) from None
 
 
 @allocating_entry_point

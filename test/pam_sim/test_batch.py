@@ -127,6 +127,8 @@ def test_every_run_may_have_measurements_of_its_own():
     ours, theirs = measured_signals(), measured_signals()[:1]
     found = sample_batch(rigs()[0], ppr_records()[:2], [ours, theirs])
     assert [len(one) for one in found] == [2, 1]
+    alone = sample_batch(rigs()[0], ppr_records()[0], theirs[0])        # one for all runs
+    assert np.array_equal(alone[0][0], sample_batch(rigs()[0], ppr_records()[0], theirs)[0][0])
 
 
 def test_a_mistake_names_its_run_whatever_the_workers():
@@ -173,6 +175,18 @@ def test_rigs_may_come_one_by_one_and_one_signal_by_its_name():
      'not finite'),
     (lambda: residual_sums(rigs(), ppr_records(), [Measured('force_n', [0.1], [1.0], [1, 2])]),
      '`weight` has shape'),
+    (lambda: residual_sums(rigs(), ppr_records(), [*measured_signals(), measured_signals()]),
+     'measured: has .*; give Measured for all runs, or a sequence of them for each'),
+    (lambda: residual_sums(rigs(), ppr_records(), [3]), 'measured: has 3; give Measured for all'),
+    (lambda: residual_sums(rigs(), ppr_records(), 3), 'measured: is 3; give a sequence'),
+    (lambda: residual_sums(rigs(), ppr_records(), [Measured('force_n', 'x', [0.0])]),
+     "run 0: force_n: `time_s` is no array of numbers: 'x'"),
+    (lambda: residual_sums(rigs(), ppr_records(), [Measured('force_n', [0.1], [0.0], 'x')]),
+     "run 0: force_n: `weight` is no array of numbers: 'x'"),
+    (lambda: residual_sums(rigs(), Record([3.0], dt_s='x'), measured_signals()),
+     "run 0: `dt_s` is 'x'; a number is needed"),
+    (lambda: simulate_batch(rigs(), ppr_records(), keep=()), r'keep: is \(\); names of signals'),
+    (lambda: simulate_batch(rigs(), ppr_records(), keep=3), 'keep: is 3; names of signals'),
 ])
 def test_mistakes_are_refused_by_name(make, words):
     with pytest.raises(InputError, match=words):
