@@ -26,6 +26,7 @@ import os
 import re
 from typing import Any, Self
 
+from pam_sim.declared import shown
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.files import refuse_pipe, StrPath
 from pam_sim.units import allowed_range
@@ -276,6 +277,13 @@ def _plain(value: Any) -> Any:
     return value
 
 
+def path_text(path: StrPath) -> str:
+    """Return a path as text; raise InputError for what is no path."""
+    if not isinstance(path, (str, os.PathLike)):
+        raise InputError(f'{shown(path)} is no name, path or YAML text')
+    return os.fspath(path)
+
+
 def load_yaml(path_or_text: StrPath, name: str | None = None) -> Located:
     """
     Read a YAML mapping with the place of every value.
@@ -302,7 +310,7 @@ def load_yaml(path_or_text: StrPath, name: str | None = None) -> Located:
             '\n' in path_or_text or ': ' in path_or_text) and not os.path.exists(path_or_text):
         raw, name = path_or_text.encode('utf-8', 'surrogatepass'), name or '<text>'
     else:
-        path = os.fspath(path_or_text)
+        path = path_text(path_or_text)
         name = name or path
         raw = _read(path, name)
     if len(raw) > MAX_BYTES:

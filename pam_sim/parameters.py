@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import math
 from typing import Any, SupportsFloat
 
-from pam_sim.declared import check_fields, shown
+from pam_sim.declared import check_fields, check_mapping, shown
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.units import allowed_range
 
@@ -103,6 +103,9 @@ class Parameter:
             number = float(value)
         except OverflowError:           # a whole number beyond all floats
             number = math.inf
+        except (TypeError, ValueError):     # an array of several numbers
+            raise InputError(f'`{self.name}` must be a number, not {shown(value)}; '
+                             f'allowed {self.allowed}', where) from None
         if not math.isfinite(number) or not self.lower <= number <= self.upper:
             raise InputError(f'`{self.name}` is {number:g}; allowed {self.allowed}', where)
         return number
@@ -129,11 +132,13 @@ def check_given(
     Raises
     ------
     InputError
-        Unknown name, wrong type or out of bounds.
+        No mapping, unknown name, wrong type or out of bounds.
 
     """
     known = {parameter.name: parameter for parameter in parameters}
     place = getattr(values, 'where', where)
+    if not isinstance(values, Mapping):
+        check_mapping(values, where if isinstance(where, str) and where else f'{what}s')
     result = {}
     for name, value in values.items():
         if name not in known:

@@ -21,12 +21,13 @@ from typing import Any, overload, TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 from pam_sim.annotations import FloatArray, Number
+from pam_sim.declared import check_mapping, shown
 from pam_sim.effects.setting import EffectSetting, settings_of
 from pam_sim.errors import InputError
 from pam_sim.load import LOADS
 from pam_sim.load.registry import has_force, load_force_n
-from pam_sim.muscle.coefficients import coefficients, own_value, PREFIX, with_coefficients
-from pam_sim.muscle.muscle import get_muscle, LawChoice, Muscle
+from pam_sim.muscle.coefficients import coefficients, own_value, PREFIX, with_numbers
+from pam_sim.muscle.muscle import get_muscle, LawChoice, Muscle, muscle_of
 from pam_sim.parameters import check_given, check_parameters, Parameter
 from pam_sim.rig_parameters import rig_parameters
 from pam_sim.rig_text import rig_to_yaml
@@ -87,10 +88,12 @@ class Rig:
                                       (self.fidelity, hsv.FIDELITIES, 'fidelity')):
             if value not in choices:
                 raise InputError(f'`{value}` is not known; allowed: {", ".join(choices)}', where)
-        if isinstance(self.muscle, str):
-            object.__setattr__(self, 'muscle', get_muscle(self.muscle))
+        if not isinstance(self.name, str):
+            raise InputError(f'is {shown(self.name)}; a text is needed', 'name')
+        object.__setattr__(self, 'muscle', muscle_of(self.muscle))
         _ = self.muscle.least_volume_m3         # refused here where the law has no volume
         known = rig_parameters(self.load)
+        check_mapping(self.parameters, 'parameters')
         _check_contraction(self.parameters, self.muscle)
         checked: dict[str, object] = {
             'parameters': check_parameters(known, self.parameters),
@@ -200,22 +203,26 @@ class Rig:
         Raises
         ------
         InputError
-            Unknown name or value out of bounds.
+            Unknown name, value out of bounds, or something of another kind.
 
         """
+        for given, where in ((parameters, 'parameters'), (sensors, 'sensors'),
+                             (tolerance, 'tolerance')):
+            if given is not None:
+                check_mapping(given, where)
         if all(other is None for other in (sensors, muscle, law, tolerance, volume)) and all(
                 other is None or other == own for other, own in (
                     (valve, self.valve), (fidelity, self.fidelity), (load, self.load),
                     (name, self.name))):
             return self._with_numbers(parameters or {}, effects)
         new_load = load or self.load
-        chosen = get_muscle(muscle) if isinstance(muscle, str) else muscle or self.muscle
+        chosen = self.muscle if muscle is None else muscle_of(muscle)
         if law is not None:
             chosen = chosen.with_law(law)
         if volume is not None:
             chosen = chosen.with_volume(volume)
-        given, chosen = _apart(parameters or {}, chosen)
-        known = {p.name for p in rig_parameters(new_load)} if new_load in LOADS else set()
+        numbers, chosen = with_numbers(chosen, parameters or {})
+        known = {p.name for p in rig_parameters(new_load)} if new_load in tuple(LOADS) else set()
         kept = {key: value for key, value in self.parameters.items() if key in known}
         if chosen.law.name == self.muscle.law.name:
             known_too = known | {key for key in self.tolerance if key.startswith(PREFIX)}
@@ -225,7 +232,7 @@ class Rig:
         tolerated.update(tolerance or {})
         return replace(
             self, name=name or self.name, load=new_load, valve=valve or self.valve,
-            fidelity=fidelity or self.fidelity, parameters={**kept, **given},
+            fidelity=fidelity or self.fidelity, parameters={**kept, **numbers},
             effects=self.effects if effects is None else settings_of(effects, self.effects),
             tolerance=tolerated, sensors={**self.sensors, **(sensors or {})}, muscle=chosen)
 
@@ -236,7 +243,7 @@ class Rig:
 
         A fit asks for one before every simulation, so only what changes is checked.
         """
-        given, muscle = _apart(parameters, self.muscle)
+        given, muscle = with_numbers(self.muscle, parameters)
         numbers = {**self.parameters, **check_given(rig_parameters(self.load), given)}
         _check_contraction(numbers, muscle)
         settings = list(self.effects) if effects is None else settings_of(effects, self.effects)
@@ -262,7 +269,7 @@ class Rig:
         Return the absolute pressure [Pa] at which the muscle holds a contraction.
 
         The force map with its gain, no effects; never below atmospheric pressure, inf
-        where no pressure suffices.
+        where no pressure suffices, NaN where a number given is NaN.
 
         Parameters
         ----------
@@ -473,15 +480,6 @@ class Rig:
         """
         return self.parameters['V_dead'] + self.muscle.volume_m3(
             contraction_m, pressure_pa - P_ATM_PA)
-
-
-def _apart(parameters: Mapping[str, float], muscle: Muscle) -> tuple[dict[str, float], Muscle]:
-    """Return the numbers of a rig, and its muscle with those of the force law."""
-    given = {key: value for key, value in parameters.items() if not key.startswith(PREFIX)}
-    of_law = {key: value for key, value in parameters.items() if key not in given}
-    if of_law:
-        muscle = replace(muscle, law=with_coefficients(muscle.law, of_law))
-    return given, muscle
 
 
 def _check_contraction(numbers: Mapping[str, float], muscle: Muscle) -> None:

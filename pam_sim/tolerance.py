@@ -25,7 +25,7 @@ import math
 import re
 from typing import Any
 
-from pam_sim.declared import shown
+from pam_sim.declared import check_mapping, shown
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.keys import Key, names_of
 from pam_sim.located_yaml import Located
@@ -186,6 +186,7 @@ def tolerances(known: tuple[Parameter, ...], given: Mapping[str, Any],
         Unknown name, or as of ``check_tolerance``.
 
     """
+    check_mapping(given, 'tolerance')
     names = [p.name for p in (*known, *exact)]
     for name in given:
         if name not in names:

@@ -49,7 +49,7 @@ from pam_actuation.drivers.asked import asked_in
 from pam_sim.errors import InputError
 from pam_sim.joint.rig import JointRig
 from pam_sim.keys import Key, names_of
-from pam_sim.located_yaml import load_yaml, Located
+from pam_sim.located_yaml import load_yaml, Located, path_text
 from pam_sim.valve import VALVES
 
 if TYPE_CHECKING:
@@ -112,7 +112,7 @@ def load_controller(name_or_path_or_text: str | os.PathLike[str],
         line), rules that do not fit, a controller made for another rig.
 
     """
-    text = os.fspath(name_or_path_or_text)
+    text = path_text(name_or_path_or_text)
     folder, presets = '.', list[str]()
     if '\n' in text:
         tree = load_yaml(text, name='controller text')

@@ -18,14 +18,15 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TYPE_CHECKING
 
-from pam_sim.declared import shown
+from pam_sim.declared import check_mapping, shown
 from pam_sim.effects.registry import get_effect
-from pam_sim.errors import InputError
+from pam_sim.errors import did_you_mean, InputError
 
 if TYPE_CHECKING:
     from pam_sim.rig import Rig
 
 FORM = "write `[{'name': NAME, 'parameters': {NUMBER: VALUE}}]`"
+_KEYS = 'name', 'parameters', 'source'
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,7 @@ class EffectSetting:
         Raises
         ------
         InputError
-            Unknown effect or parameter, value out of bounds, or nothing of this kind.
+            Unknown effect, key or parameter, value out of bounds, or nothing of this kind.
 
         """
         if isinstance(item, str):
@@ -63,7 +64,13 @@ class EffectSetting:
         if not isinstance(item, EffectSetting):
             if not isinstance(item, Mapping) or not isinstance(item.get('name'), str):
                 raise InputError(f'has {shown(item)}; {FORM}', 'effects')
-            item = cls(item['name'], item.get('parameters') or {}, dict(item.get('source') or {}))
+            for key in item:
+                if key not in _KEYS:
+                    raise InputError(f'has the unknown key `{key}`{did_you_mean(key, _KEYS)}; '
+                                     f'allowed: {", ".join(_KEYS)}', f'effect {item["name"]}')
+            item = cls(item['name'], item.get('parameters') or {}, item.get('source') or {})
+        check_mapping(item.source, f'source of effect {item.name}', "{'bag': PATH}")
+        check_mapping(item.parameters, f'parameters of effect {item.name}')
         return cls(item.name, get_effect(item.name).values(item.parameters), dict(item.source))
 
 
@@ -78,7 +85,7 @@ def settings_of(items: Iterable[EffectSetting | Mapping[str, Any] | str],
         As of ``EffectSetting.of``, no list, or an effect is listed twice.
 
     """
-    if isinstance(items, (str, Mapping)):
+    if isinstance(items, (str, Mapping)) or not isinstance(items, Iterable):
         raise InputError(f'is {shown(items)}; a list is needed: {FORM}', 'effects')
     kept = {id(setting): setting for setting in checked}
     settings = [kept.get(id(item)) or EffectSetting.of(item) for item in items]

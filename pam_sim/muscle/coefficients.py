@@ -26,9 +26,10 @@ from functools import lru_cache
 
 import numpy as np
 from pam_sim.annotations import FloatArray
+from pam_sim.declared import number_of
 from pam_sim.errors import InputError
 from pam_sim.muscle.law import MuscleLaw
-from pam_sim.muscle.muscle import LawChoice
+from pam_sim.muscle.muscle import LawChoice, Muscle
 from pam_sim.parameters import Parameter
 
 ALL = 'law'                  # all coefficients of the static force
@@ -96,10 +97,28 @@ def with_coefficients(choice: LawChoice, values: Mapping[str, float]) -> LawChoi
         The values together make no muscle, or one is out of bounds.
 
     """
-    given = {name.removeprefix(PREFIX): float(value) for name, value in values.items()}
+    given = {name.removeprefix(PREFIX): number_of(value, name) for name, value in values.items()}
     found = replace(choice, parameters={**choice.parameters, **given})
     _ = found.law               # checked here, and made once
     return found
+
+
+def with_numbers(muscle: Muscle,
+                 numbers: Mapping[str, float]) -> tuple[dict[str, float], Muscle]:
+    """
+    Return the numbers of a rig, and its muscle with those named ``law.NAME``.
+
+    Raises
+    ------
+    InputError
+        As of ``with_coefficients``.
+
+    """
+    of_rig = {key: value for key, value in numbers.items() if not key.startswith(PREFIX)}
+    of_law = {key: value for key, value in numbers.items() if key not in of_rig}
+    if of_law:
+        muscle = replace(muscle, law=with_coefficients(muscle.law, of_law))
+    return of_rig, muscle
 
 
 def own_value(choice: LawChoice, name: str) -> float:

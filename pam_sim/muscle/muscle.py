@@ -29,6 +29,7 @@ from typing import Any, TYPE_CHECKING
 
 import numpy as np
 from pam_sim.annotations import Number
+from pam_sim.declared import shown
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.keys import Key, names_of
 from pam_sim.located_yaml import Located
@@ -230,7 +231,7 @@ class Muscle:
             Unknown name, or as of ``least_volume_m3``.
 
         """
-        if volume not in VOLUMES:
+        if volume not in tuple(VOLUMES):
             raise InputError(f'volume `{volume}` is not known{did_you_mean(volume, VOLUMES)}; '
                              f'allowed: {", ".join(VOLUMES)}', where)
         chosen = replace(self, volume=volume)
@@ -274,6 +275,24 @@ def get_muscle(name: str) -> Muscle:
             f'muscle `{name}` is not known{did_you_mean(name, muscle_names())}; allowed: '
             f'{", ".join(muscle_names())}')
     return read_muscle(_SIZES.read(name), name)
+
+
+def muscle_of(given: Muscle | str) -> Muscle:
+    """
+    Return a muscle, also by its name.
+
+    Raises
+    ------
+    InputError
+        Unknown name, or neither a muscle nor a name.
+
+    """
+    if isinstance(given, str):
+        return get_muscle(given)
+    if not isinstance(given, Muscle):
+        raise InputError(f'is {shown(given)}; give a Muscle, or a name of '
+                         f'{", ".join(muscle_names())}', 'muscle')
+    return given
 
 
 def read_muscle(data: Located, name: str = 'muscle') -> Muscle:
@@ -367,9 +386,12 @@ def checked_law(choice: LawChoice, where: str = '', bore_m: float | None = None)
     Raises
     ------
     InputError
-        Unknown law, set or parameter.
+        Unknown law, set or parameter, or no LawChoice.
 
     """
+    if not isinstance(choice, LawChoice):
+        raise InputError(f'is {shown(choice)}; give a LawChoice or the name of a law',
+                         where or 'law')
     if choice.table is not None:
         law = make_law(choice.name, choice.table, where=where)
     else:

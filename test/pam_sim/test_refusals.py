@@ -16,7 +16,7 @@
 
 from hypothesis import given, HealthCheck, settings, strategies as st
 import numpy as np
-from pam_sim import load_rig
+from pam_sim import load_joint, load_rig, Rig
 from pam_sim.effects.registry import effects
 from pam_sim.errors import InputError
 from pam_sim.records import columns, fields, size_of
@@ -78,11 +78,53 @@ def test_other_inputs_are_refused_by_name_and_range(given_inputs, words):
     ({'name': 'hysteresis'}, "effects: is {'name': 'hysteresis'}; a list is needed"),
     ([{'hysteresis': {}}], "effects: has {'hysteresis': {}}; write `[{'name': NAME"),
     ([7], 'effects: has 7; write'),
+    (7, 'effects: is 7; a list is needed'),
+    ([{'name': 'creep', 'params': {'tau_1_s': 2.0}}],
+     'effect creep: has the unknown key `params` (did you mean `parameters`?); allowed: name, '),
+    ([{'name': 'creep', 'parameters': [2.0]}], 'parameters of effect creep: is [2.0]; write'),
+    ([{'name': 'creep', 'source': 'me'}], "source of effect creep: is 'me'; write"),
 ])
 def test_effects_of_another_form_are_refused_with_the_form(effects, words):
     with pytest.raises(InputError) as caught:
         load_rig(RIG).with_(effects=effects)
     assert str(caught.value).startswith(words)
+
+
+@pytest.mark.parametrize('given_things, words', [
+    ({'parameters': [('mass_kg', 3.0)]}, "parameters: is [('mass_kg', 3.0)]; write `{'NAME': "),
+    ({'parameters': {3: 4.0}}, 'parameters: is {3: 4.0}; write'),
+    ({'parameters': {'mass_kg': np.array([3.0, 4.0])}},
+     '`mass_kg` must be a number, not array([3., 4.]); allowed 0.1 to 500 kg'),
+    ({'parameters': {'law.a3': 'x'}}, "`law.a3` is 'x'; a number is needed"),
+    ({'sensors': ['force_noise_n']}, "sensors: is ['force_noise_n']; write"),
+    ({'tolerance': 0.1}, 'tolerance: is 0.1; write'),
+    ({'muscle': 5}, 'muscle: is 5; give a Muscle, or a name of dmsp_10_250, '),
+    ({'law': ['sarosi']}, "law: is ['sarosi']; give a LawChoice or the name of a law"),
+    ({'volume': ['law']}, "volume `['law']` is not known"),
+    ({'load': ['driven']}, "load: `['driven']` is not known; allowed: hanging_mass"),
+    ({'name': 5}, 'name: is 5; a text is needed'),
+])
+def test_a_change_of_a_rig_of_another_kind_is_refused_in_one_sentence(given_things, words):
+    with pytest.raises(InputError) as caught:
+        load_rig(RIG).with_(**given_things)
+    assert str(caught.value).startswith(words)
+
+
+def test_what_is_no_rig_file_is_refused_in_one_sentence():
+    for wrong in (None, 3, ['dmsp_5_300_realistic']):
+        for load in (load_rig, load_joint):
+            with pytest.raises(InputError, match='is no name, path or YAML text'):
+                load(wrong)
+    with pytest.raises(InputError, match="parameters: is 3; write"):
+        Rig('mine', 'hanging_mass', parameters=3)
+
+
+def test_a_number_that_is_not_known_gives_a_pressure_that_is_not_known():
+    for law in ('sarosi', 'tondu_lopez'):           # by formula, and by bisection
+        rig = load_rig(RIG).with_(law=law)
+        held_pa = rig.static_pressure_pa(np.array([0.005, np.nan]))
+        assert held_pa[0] == rig.static_pressure_pa(0.005) and np.isnan(held_pa[1])
+        assert np.isnan(rig.static_pressure_pa(0.005, np.nan))
 
 
 @pytest.mark.parametrize('path', [[0.0, np.nan, 0.0], [0.0, 0.01, 0.4], [-0.1, 0.0, 0.0]])
