@@ -15,7 +15,7 @@
 """Turn a rig into the arrays of the kernel."""
 
 import math
-from typing import Any, TYPE_CHECKING
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike

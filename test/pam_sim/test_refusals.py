@@ -115,7 +115,7 @@ def test_what_is_no_rig_file_is_refused_in_one_sentence():
         for load in (load_rig, load_joint):
             with pytest.raises(InputError, match='is no name, path or YAML text'):
                 load(wrong)
-    with pytest.raises(InputError, match="parameters: is 3; write"):
+    with pytest.raises(InputError, match='parameters: is 3; write'):
         Rig('mine', 'hanging_mass', parameters=3)
 
 
