@@ -24,6 +24,7 @@ from pam_actuation.control.inputs import INPUT, write_inputs
 from pam_actuation.control.settings import limits_within
 from pam_actuation.control.static_inverse import inverse_to_mapping
 from pam_sim.annotations import FloatArray
+from pam_sim.declared import check_mapping
 from pam_sim.errors import InputError
 from pam_sim.records import zeros
 from pam_sim.shared_memory import SharedMemory
@@ -195,6 +196,7 @@ class CompiledController(SharedMemory):
             Settings that make no controller, or a law without this method.
 
         """
+        check_mapping(settings, 'settings')
         return hand_on(self, self._fresh({**self.settings, **settings}, rules))
 
     def _fresh(self, settings: Mapping[str, object], rules: 'RuleBase | None') -> Self:

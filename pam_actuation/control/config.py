@@ -113,6 +113,8 @@ def load_controller(name_or_path_or_text: str | os.PathLike[str],
 
     """
     text = path_text(name_or_path_or_text)
+    if isinstance(rig, (str, os.PathLike)):
+        raise InputError(f'is {rig!r}; give what `load_rig` or `load_joint` returns of it', 'rig')
     folder, presets = '.', list[str]()
     if '\n' in text:
         tree = load_yaml(text, name='controller text')
@@ -131,7 +133,7 @@ def load_controller(name_or_path_or_text: str | os.PathLike[str],
     if rules_file is not None:
         if controller.rules is None:
             raise InputError(f'a {controller.kind} controller has no rules', str(rules_file))
-        controller.take_rules(load_rules(rules_file, controller.rules))
+        controller.take_rules(load_rules(path_text(rules_file), controller.rules))
     return controller
 
 

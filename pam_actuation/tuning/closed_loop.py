@@ -28,9 +28,11 @@ from typing import Any, TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
+from pam_actuation.control.modes.tracked import CONTRACTION
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.messages import VALVE_NAMES
 from pam_actuation.tuning.cost import tracking_cost
+from pam_actuation.tuning.loop_checks import check_controller, check_parts
 from pam_actuation.tuning.loop_parts import DISTURBANCE, Driver
 from pam_actuation.tuning.loop_setup import (
     Course, DriverLaw, first_periodic_tick, fresh_rise, latency_steps,
@@ -40,6 +42,7 @@ from pam_actuation.tuning.tracking_errors import Cycles, TrackingErrors
 from pam_sim.annotations import FloatArray
 from pam_sim.declared import check_whole
 from pam_sim.errors import InputError
+from pam_sim.load import LOADS
 from pam_sim.records import fields, size_of, zeros
 from pam_sim.rollout import layout
 from pam_sim.rollout.kernel import refuse_terms
@@ -140,8 +143,9 @@ class MuscleLoop:
     Raises
     ------
     InputError
-        The experiment is not in contraction, the rate does not fit the physics step, or a seed,
-        latency, preview, force or supply pressure is not what is allowed.
+        The experiment is not in contraction, the load does not move freely, the rate does not fit
+        the physics step, or a seed, latency, preview, force or supply pressure is not what is
+        allowed.
 
     """
 
@@ -154,10 +158,8 @@ class MuscleLoop:
         self._arguments = (
             rig, experiment, seed, rate_hz, latency_s, external_force_n, driver, supply_pa,
             preview_s, slow_start)
-        if experiment.domain != self.DOMAIN:
-            raise InputError(
-                f'experiment {experiment.name} is in {experiment.domain}; this loop tracks '
-                f'{self.DOMAIN}')
+        from pam_sim.rig import Rig
+        check_parts(rig, Rig, experiment, self.DOMAIN)
         steps = steps_per_tick(rate_hz)
         check_whole(seed, 0, 'seed')
         self.rig = rig
@@ -226,6 +228,13 @@ class ClosedLoop(MuscleLoop):
 
     DOMAIN = 'contraction'
 
+    def __init__(self, rig: 'Rig', *arguments: Any, **named: Any) -> None:
+        super().__init__(rig, *arguments, **named)
+        if not LOADS[rig.load].MOVES_FREELY:
+            raise InputError(
+                f'load `{rig.load}` of {rig.name} does not move by itself; a contraction can be '
+                'tracked on a load that moves freely', 'rig')
+
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle what it is made of: a cluster gets kilobytes, not the arrays."""
         return ClosedLoop, self._arguments
@@ -249,7 +258,8 @@ class ClosedLoop(MuscleLoop):
         Raises
         ------
         InputError
-            The controller runs at another rate.
+            The controller runs at another rate, tracks something else, or is made for the other
+            valve.
 
         """
         log = self.run_raw(controller, learn)
@@ -260,12 +270,9 @@ class ClosedLoop(MuscleLoop):
             np.column_stack([log[name] for name in ('signal_0', 'signal_1')[:1 + self.hsv]]),
             self.experiment.cycles, controller)
 
-    def check_rate(self, controller: 'CompiledController') -> None:
-        """Raise InputError for a controller that runs at another rate."""
-        if controller.rate_hz != self.rate_hz:
-            raise InputError(
-                f'the controller runs at {controller.rate_hz:g} Hz, this loop at '
-                f'{self.rate_hz:g} Hz')
+    def check(self, controller: 'CompiledController') -> None:
+        """Raise InputError for a controller that cannot run here, see ``run``."""
+        check_controller(controller, CONTRACTION, self.rig.valve, self.rate_hz)
 
     def tracked(self, controller: 'CompiledController'
                 ) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -281,7 +288,7 @@ class ClosedLoop(MuscleLoop):
     def run_raw(self, controller: 'CompiledController',
                 learn: Learns = True) -> npt.NDArray[np.void]:
         """Return a ``LOG`` of ``rollouts`` for every tick, shape (ticks,)."""
-        self.check_rate(controller)
+        self.check(controller)
         from pam_actuation.tuning.rollouts import LOG       # brings the compiler with it
         controller.pause()
         log = np.empty(self.ticks * size_of(LOG))

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What tuning minimises: tracking error, in mm or degrees, late ones more than early ones."""
+"""What tuning minimises: tracking error, in mm, degrees or N, late ones more than early ones."""
 
 import numpy as np
 from pam_sim.annotations import FloatArray
@@ -20,7 +20,7 @@ from pam_sim.annotations import FloatArray
 LATE_SHARE = 0.3          # of the experiment, counted from its end
 _EARLY_WEIGHT = 0.25
 _WORST_WEIGHT = 0.1
-LOST = 1e3                # cost of a run that is not finite, mm or degrees
+LOST = 1e3                # cost of a run that is not finite, mm, degrees or N
 
 
 def tracking_cost(error: FloatArray, start_tick: int = 0) -> float:
@@ -33,7 +33,7 @@ def tracking_cost(error: FloatArray, start_tick: int = 0) -> float:
     Parameters
     ----------
     error : numpy.ndarray
-        Reference minus contraction [mm] or angle [degrees] at every tick.
+        Reference minus contraction [mm], angle [degrees] or force [N] at every tick.
     start_tick : int
         First tick that counts: the start from rest is the same for all controllers.
 

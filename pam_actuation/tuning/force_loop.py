@@ -23,17 +23,19 @@ from typing import Any, TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 from pam_actuation.control.modes.force import FORCE_INPUT
-from pam_actuation.control.modes.tracked import FORCE, Tracked, tracked_by
+from pam_actuation.control.modes.tracked import FORCE
 from pam_actuation.tuning.closed_loop import MuscleLoop
+from pam_actuation.tuning.cost import tracking_cost
+from pam_actuation.tuning.loop_checks import check_parts, check_wrapped
 from pam_actuation.tuning.loop_setup import Course, fresh_rise, learning_mask, Learns
 from pam_actuation.tuning.mode_result import ModeResult
+from pam_sim.declared import shown
 from pam_sim.errors import InputError
 from pam_sim.load import LOADS
 from pam_sim.records import size_of, zeros
 
 if TYPE_CHECKING:
     from pam_actuation.control.modes.force import ForceController
-    from pam_actuation.control.modes.wrapped import WrappedLaw
     from pam_actuation.experiments.experiment import Experiment
     from pam_sim.rig import Rig
 
@@ -67,6 +69,8 @@ class ForceLoop(MuscleLoop):
 
     def __init__(self, rig: 'Rig', experiment: 'Experiment',
                  contraction_m: Course | float | None = None, **others: Any) -> None:
+        from pam_sim.rig import Rig
+        check_parts(rig, Rig, experiment, self.DOMAIN)
         if LOADS[rig.load].MOVES_FREELY:
             raise InputError(
                 f'load `{rig.load}` of {rig.name} moves freely; a force can be tracked on a load '
@@ -82,9 +86,14 @@ class ForceLoop(MuscleLoop):
         if callable(contraction_m) and rig.load != 'driven':
             raise InputError(f'load `{rig.load}` of {rig.name} does not move', 'contraction_m')
         times_s = np.arange(self.ticks + 1) / self.rate_hz
-        self._way_m = np.array([
-            contraction_m(t) if callable(contraction_m) else contraction_m for t in times_s],
-            dtype=float)
+        way = [contraction_m(t) if callable(contraction_m) else contraction_m for t in times_s]
+        try:
+            self._way_m = np.array(way, dtype=float)
+        except (TypeError, ValueError):
+            self._way_m = np.empty(0)
+        if self._way_m.shape != times_s.shape:
+            raise InputError(f'is {shown(way[0])} at 0 s; a number is needed, or a function of '
+                             'the time [s] that returns one', 'contraction_m')
         stroke_m = rig.muscle.stroke_m
         if not ((self._way_m >= 0.0) & (self._way_m <= stroke_m)).all():
             raise InputError(f'leaves 0 to {stroke_m:g} m, the stroke of {rig.muscle.name}',
@@ -95,6 +104,11 @@ class ForceLoop(MuscleLoop):
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle what it is made of."""
         return _made_of, self._made_of
+
+    def cost(self, controller: 'ForceController') -> float:
+        """Return the cost [N] of tracking the experiment; the rules change in place."""
+        force_n = self.run_raw(controller)['force_n']
+        return tracking_cost(self._reference.values - force_n, self.start_tick)
 
     def run(self, controller: 'ForceController', learn: Learns = True) -> ModeResult:
         """
@@ -115,7 +129,8 @@ class ForceLoop(MuscleLoop):
         Raises
         ------
         InputError
-            The controller is in another mode, of another kind, or runs at another rate.
+            The controller is in another mode, of another kind, made for the other valve, or runs
+            at another rate.
 
         """
         log = self.run_raw(controller, learn)
@@ -127,7 +142,7 @@ class ForceLoop(MuscleLoop):
 
     def run_raw(self, controller: 'ForceController', learn: Learns = True) -> npt.NDArray[np.void]:
         """Return a ``FORCE_LOG`` of ``force_rollouts`` for every tick, shape (ticks,)."""
-        check_controller(controller, FORCE, self.rate_hz)
+        check_wrapped(controller, FORCE, self.rig.valve, self.rate_hz)
         from pam_actuation.tuning import force_rollouts      # brings the compiler with it
         controller.pause()
         log = np.empty(self.ticks * size_of(force_rollouts.FORCE_LOG))
@@ -145,15 +160,3 @@ class ForceLoop(MuscleLoop):
 def _made_of(rig: 'Rig', experiment: 'Experiment', contraction_m: Course | float | None,
              others: dict[str, Any]) -> 'ForceLoop':
     return ForceLoop(rig, experiment, contraction_m, **others)
-
-
-def check_controller(controller: 'WrappedLaw', tracked: Tracked, rate_hz: float) -> None:
-    """Raise InputError unless a controller has a mode, a self-organizing law and a rate."""
-    if tracked_by(controller) != tracked:
-        raise InputError(
-            f'the controller tracks {tracked_by(controller).mode}, this loop {tracked.mode}')
-    if controller.kind != 'sofc':
-        raise InputError(f'this loop runs sofc controllers, not {controller.kind}')
-    if controller.rate_hz != rate_hz:
-        raise InputError(
-            f'the controller runs at {controller.rate_hz:g} Hz, this loop at {rate_hz:g} Hz')

@@ -114,7 +114,7 @@ class ForeignLoop(ClosedLoop):
     def run_raw(self, controller: 'CompiledController',
                 learn: Learns = True) -> npt.NDArray[np.void]:
         """Return a ``LOG`` of ``rollouts`` for every tick, shape (ticks,)."""
-        self.check_rate(controller)
+        self.check(controller)
         from pam_actuation.tuning.rollouts import LOG
         plant = self._plant()
         check_plant(plant)

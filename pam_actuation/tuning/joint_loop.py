@@ -28,7 +28,7 @@ from pam_actuation.control.modes.joint import COMMANDS, JOINT_INPUT
 from pam_actuation.control.modes.tracked import JOINT
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.tuning.cost import tracking_cost
-from pam_actuation.tuning.force_loop import check_controller
+from pam_actuation.tuning.loop_checks import check_not_negative, check_parts, check_wrapped
 from pam_actuation.tuning.loop_parts import Driver, JOINT_READINGS, READINGS
 from pam_actuation.tuning.loop_setup import (
     Course, DriverLaw, first_periodic_tick, fresh_rise, latency_steps,
@@ -81,7 +81,7 @@ class JointLoop:
     ------
     InputError
         The experiment is in something else, leaves the range of the joint, the rate does
-        not fit, or a seed, latency, preview or torque is not what is allowed.
+        not fit, or a seed, latency, preview, noise, step or torque is not what is allowed.
 
     """
 
@@ -91,10 +91,10 @@ class JointLoop:
                  angle_noise_rad: float = ANGLE_NOISE_RAD, angle_step_rad: float = ANGLE_STEP_RAD,
                  drivers: 'Sequence[DriverConfig] | None' = None,
                  preview_s: float = math.inf, slow_start: bool = False) -> None:
-        if experiment.domain != JOINT.topic:
-            raise InputError(
-                f'experiment {experiment.name} is in {experiment.domain}; this loop tracks '
-                f'{JOINT.topic}')
+        from pam_sim.joint.rig import JointRig
+        check_parts(joint, JointRig, experiment, JOINT.topic)
+        check_not_negative(angle_noise_rad, 'angle_noise_rad', 'rad')
+        check_not_negative(angle_step_rad, 'angle_step_rad', 'rad')
         experiment.check_reachable(joint)
         steps = steps_per_tick(rate_hz)
         check_whole(seed, 0, 'seed')
@@ -186,7 +186,8 @@ class JointLoop:
         Raises
         ------
         InputError
-            The controller is in another mode, of another kind, or runs at another rate.
+            The controller is in another mode, of another kind, made for the other valve, or runs
+            at another rate.
 
         """
         log = self.run_raw(controller, learn)
@@ -198,7 +199,7 @@ class JointLoop:
 
     def run_raw(self, controller: 'JointController', learn: Learns = True) -> npt.NDArray[np.void]:
         """Return a ``JOINT_LOG`` of ``joint_rollouts`` for every tick, shape (ticks,)."""
-        check_controller(controller, JOINT, self.rate_hz)
+        check_wrapped(controller, JOINT, self.joint.valve, self.rate_hz)
         from pam_actuation.tuning import joint_rollouts      # brings the compiler with it
         controller.pause()
         # Copies: several threads may track the experiment at the same time.

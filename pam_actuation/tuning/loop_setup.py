@@ -27,7 +27,7 @@ from pam_actuation.drivers.hsv_config import check_pulses
 from pam_actuation.slow_rise import LONGEST_STEP_S
 from pam_actuation.tuning.loop_parts import Driver, READINGS, RISE
 from pam_sim.annotations import FloatArray
-from pam_sim.declared import shown
+from pam_sim.declared import number_of, shown
 from pam_sim.errors import InputError
 from pam_sim.records import fields, zeros
 from pam_sim.units import P_ATM_PA
@@ -60,6 +60,7 @@ def steps_per_tick(rate_hz: float) -> int:
         It is no whole number.
 
     """
+    rate_hz = number_of(rate_hz, 'rate_hz')
     steps = round(1.0 / (rate_hz * PHYSICS_S)) if rate_hz > 0.0 else 0
     if steps < 1 or abs(steps * PHYSICS_S * rate_hz - 1.0) > 1e-9:
         second = round(1.0 / PHYSICS_S)
@@ -90,7 +91,7 @@ def latency_steps(latency_s: float | None, steps: int) -> int:
     period_s = steps * PHYSICS_S
     if latency_s is None:
         latency_s = min(LATENCY_S, period_s - PHYSICS_S)
-    elif not 0.0 <= latency_s < period_s:
+    elif not 0.0 <= number_of(latency_s, 'latency_s') < period_s:
         raise InputError(
             f'is {latency_s:g} s; allowed is 0 to less than the period of the controller, '
             f'{period_s:g} s', 'latency_s')
@@ -161,8 +162,11 @@ def learning_mask(controller: 'CompiledController | WrappedLaw', learn: Learns, 
     """
     Return 1.0 at every tick in which the rules may change, else 0.0.
 
-    ``learn``: bool, or callable of the time [s].
+    ``learn``: bool, or callable of the time [s]; InputError for what is neither.
     """
+    if not callable(learn) and not isinstance(learn, (bool, int, np.bool_)):
+        raise InputError(f'is {shown(learn)}; give True, False, or a function of the time [s]',
+                         'learn')
     may = controller.freeze_learning is False
     if callable(learn):
         return np.array([float(may and learn(k / rate_hz)) for k in range(ticks)])

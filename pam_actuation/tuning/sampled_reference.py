@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pam_actuation.tuning.loop_parts import WANTED
 from pam_sim.annotations import FloatArray
+from pam_sim.declared import number_of
 from pam_sim.errors import InputError
 from pam_sim.records import size_of
 
@@ -56,7 +57,7 @@ class SampledReference:
 
     def __init__(self, experiment: 'Experiment', rate_hz: float,
                  preview_s: float = math.inf) -> None:
-        if not preview_s >= 0.0:
+        if not number_of(preview_s, 'preview_s') >= 0.0:
             raise InputError(f'is {preview_s:g} s; allowed is 0 or more', 'preview_s')
         self.ticks = int(round(experiment.duration_s * rate_hz))
         self._rate_hz = rate_hz

@@ -173,11 +173,43 @@ def test_what_cannot_be_run_is_refused(loop):
         ClosedLoop(loop.rig, loop.experiment, rate_hz=170.0)
     with pytest.raises(InputError, match='contraction'):
         ClosedLoop(loop.rig, load_experiment('pressure_identification'))
+    with pytest.raises(InputError, match='load `isometric` of .* does not move by itself'):
+        ClosedLoop(loop.rig.with_(load='isometric'), loop.experiment)
+    with pytest.raises(InputError, match=r"rig: is 'mine'; give what `load_rig\(NAME\)` returns"):
+        ClosedLoop('mine', loop.experiment)
+    with pytest.raises(InputError, match="experiment: is 'sine'; give what `load_experiment"):
+        ClosedLoop(loop.rig, 'sine')
+
+
+def test_only_a_controller_of_the_valve_and_the_quantity_runs(loop):
+    valve = loop.rig.valve
+    other = loop.rig.with_(valve={'ppr': 'hsv', 'hsv': 'ppr'}[valve])
+    made_for = load_controller(f'sofc_{other.valve}', other)
+    with pytest.raises(InputError, match=f'was loaded for valve {other.valve}, the rig of this '
+                                         f'loop has {valve}'):
+        loop.run(made_for)
+    accepted = load_controller(made_for.to_yaml(), loop.rig, accept_other_rig=True)
+    assert ClosedLoop(loop.rig, load_experiment(STEPS)).cost(accepted) > 0.0
+    held = loop.rig.with_(load='isometric')
+    with pytest.raises(InputError, match='the controller tracks force, this loop contraction'):
+        loop.cost(load_controller(f'sofc_force_{valve}', held))
+    for nothing in (None, 'pid'):
+        with pytest.raises(InputError, match='controller: is .*; give what `load_controller'):
+            loop.run(nothing)
+    with pytest.raises(InputError, match='learn: is None; give True, False, or a function'):
+        loop.run(load_controller(f'sofc_{valve}', loop.rig), learn=None)
+    with pytest.raises(InputError, match='rig: is .mine.; give what `load_rig`'):
+        load_controller(f'sofc_{valve}', 'mine')
+    with pytest.raises(InputError, match=r'settings: is \[1\]; write'):
+        controller_of(loop).with_settings([1])
 
 
 @pytest.mark.parametrize('wrong, told', [
     ({'latency_s': 0.01}, r'latency_s: is 0.01 s; allowed is 0 to less than .* 0.005 s'),
     ({'latency_s': -0.001}, 'latency_s: is -0.001 s'),
+    ({'latency_s': 'x'}, "`latency_s` is 'x'; a number is needed"),
+    ({'preview_s': 'x'}, "`preview_s` is 'x'; a number is needed"),
+    ({'rate_hz': 'x'}, "`rate_hz` is 'x'; a number is needed"),
     ({'latency_s': np.nan}, 'latency_s: is nan s'),
     ({'preview_s': -0.1}, 'preview_s: is -0.1 s; allowed is 0 or more'),
     ({'preview_s': np.nan}, 'preview_s: is nan s'),

@@ -177,6 +177,17 @@ def test_frozen_rules_stay_as_they_are():
     assert controller.rules.digest() == before
 
 
+def test_the_cost_of_a_force_is_in_newtons():
+    rig, sine = isometric('ppr'), load_experiment(SHORT.format(
+        domain='force', values='to_n: 40.0'))
+    loop = ForceLoop(rig, sine)
+    result = loop.run(load_controller('sofc_force_ppr', rig))
+    late = result.error[-int(0.3 * loop.ticks):]
+    assert loop.cost(load_controller('sofc_force_ppr', rig)) == pytest.approx(
+        np.sqrt(np.mean(late ** 2)) + 0.25 * np.sqrt(np.mean(result.error ** 2))
+        + 0.1 * np.abs(late).max(), rel=1e-12)
+
+
 def test_what_cannot_be_tracked_is_refused():
     rig = isometric('ppr')
     sine = load_experiment('force_sine')
@@ -197,6 +208,19 @@ def test_what_cannot_be_tracked_is_refused():
         ForceLoop(rig, sine).run(load_controller('sofc_joint_ppr', joint))
     with pytest.raises(InputError, match='not pid'):
         ForceLoop(rig, sine).run(load_controller('controller: pid\nmode: force\n', rig))
+    for name, loop in (('sofc_force_hsv', ForceLoop(rig, sine)),
+                       ('sofc_joint_hsv', JointLoop(joint, load_experiment('joint_sine')))):
+        on = (rig if 'force' in name else joint).with_(valve='hsv')
+        with pytest.raises(InputError, match='was loaded for valve hsv, the rig of this loop has'):
+            loop.run(load_controller(name, on))
+    for wrong in ('x', np.zeros(2), lambda t: 'x'):
+        with pytest.raises(InputError, match='contraction_m: is .* at 0 s; a number is needed'):
+            ForceLoop(rig.with_(load='driven'), sine, contraction_m=wrong)
+    for wrong in ({'angle_noise_rad': np.nan}, {'angle_step_rad': -1.0}):
+        with pytest.raises(InputError, match='rad; allowed is 0 or more'):
+            JointLoop(joint, load_experiment('joint_sine'), **wrong)
+    with pytest.raises(InputError, match='joint: is Rig.*; give what `load_joint'):
+        JointLoop(rig, load_experiment('joint_sine'))
     with pytest.raises(InputError, match='rad'):
         JointLoop(joint.with_(parameters={'upper_stop_rad': 0.2}), load_experiment('joint_sine'))
 

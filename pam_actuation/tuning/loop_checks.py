@@ -1,0 +1,107 @@
+# Copyright 2026 pam_actuation developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a closed loop refuses: rigs, experiments and controllers that do not go together."""
+
+from typing import Any
+
+from pam_actuation.control.compiled_controller import CompiledController
+from pam_actuation.control.modes.tracked import Tracked, tracked_by
+from pam_actuation.control.modes.wrapped import WrappedLaw
+from pam_sim.declared import number_of, shown
+from pam_sim.errors import InputError
+
+_LOADERS = {'Rig': ('rig', 'load_rig'), 'JointRig': ('joint', 'load_joint')}
+
+
+def check_parts(rig: Any, kind: type, experiment: Any, domain: str) -> None:
+    """
+    Refuse a rig or an experiment of another kind.
+
+    Parameters
+    ----------
+    rig : Rig or JointRig
+        What is simulated.
+    kind : type
+        Which of both it must be.
+    experiment : Experiment
+        What is tracked.
+    domain : str
+        The one that it must have.
+
+    Raises
+    ------
+    InputError
+        One of them is something else, such as a name.
+
+    """
+    from pam_actuation.experiments.experiment import Experiment
+    for given, wanted, name, load in (
+            (rig, kind, *_LOADERS[kind.__name__]),
+            (experiment, Experiment, 'experiment', 'load_experiment')):
+        if not isinstance(given, wanted):
+            raise InputError(f'is {shown(given)}; give what `{load}(NAME)` returns', name)
+    if experiment.domain != domain:
+        raise InputError(f'experiment {experiment.name} is in {experiment.domain}; this loop '
+                         f'tracks {domain}')
+
+
+def check_controller(controller: Any, tracked: Tracked, valve: str, rate_hz: float) -> None:
+    """
+    Refuse a controller that tracks something else, is made for the other valve, or another rate.
+
+    Parameters
+    ----------
+    controller : Controller
+        As ``load_controller`` returns it.
+    tracked : Tracked
+        What the loop tracks.
+    valve : str
+        That of the loop: ``ppr`` or ``hsv``.
+    rate_hz : float
+        That of the loop.
+
+    Raises
+    ------
+    InputError
+        It does not fit, or is no controller.
+
+    """
+    if not isinstance(controller, (CompiledController, WrappedLaw)):
+        raise InputError(f'is {shown(controller)}; give what '
+                         '`load_controller(NAME, rig)` returns', 'controller')
+    if tracked_by(controller) != tracked:
+        raise InputError(
+            f'the controller tracks {tracked_by(controller).mode}, this loop {tracked.mode}')
+    made_for = (controller.made_for or {}).get('valve', valve)
+    if made_for != valve and not controller.other_rig:
+        raise InputError(
+            f'the controller was loaded for valve {made_for}, the rig of this loop has {valve}; '
+            'load one with `load_controller(NAME, rig)` and that rig')
+    if controller.rate_hz != rate_hz:
+        raise InputError(
+            f'the controller runs at {controller.rate_hz:g} Hz, this loop at {rate_hz:g} Hz')
+
+
+def check_wrapped(controller: Any, tracked: Tracked, valve: str, rate_hz: float) -> None:
+    """Refuse what ``check_controller`` does, and a law that no loop of a mode has."""
+    check_controller(controller, tracked, valve, rate_hz)
+    if controller.kind != 'sofc':
+        raise InputError(f'this loop runs sofc controllers, not {controller.kind}')
+
+
+def check_not_negative(value: float, name: str, unit: str) -> None:
+    """Refuse what is no finite number from 0 on, by its name and unit."""
+    if not 0.0 <= number_of(value, name) < float('inf'):
+        raise InputError(f'is {value:g} {unit}; allowed is 0 or more', name)
