@@ -238,9 +238,14 @@ def _of_no_use(args: SimpleNamespace | argparse.Namespace, experiment: 'Experime
             return []
         return [f'experiment "{experiment.name}" runs without a controller, so '
                 f'{" and ".join(given)} {"change" if len(given) > 1 else "changes"} nothing']
-    if '--freeze' in given and controller is not None and not controller.learns:
-        return [f'a {controller.kind} controller does not learn, so --freeze changes nothing']
-    return []
+    return [] if controller is None else frozen_remarks(args, controller)
+
+
+def frozen_remarks(args: SimpleNamespace | argparse.Namespace, controller: Any) -> list[str]:
+    """Return a sentence where ``--freeze`` is given for a controller that does not learn."""
+    if not getattr(args, 'freeze', False) or controller.learns:
+        return []
+    return [f'a {controller.kind} controller does not learn, so --freeze changes nothing']
 
 
 def say_remarks(args: SimpleNamespace | argparse.Namespace, remarks: 'Iterable[str]') -> None:

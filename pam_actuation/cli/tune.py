@@ -21,8 +21,8 @@ from typing import TYPE_CHECKING
 
 from pam_actuation.cli.common import (
     add_controller_options, add_overwrite_option, add_seed_option, add_topic_option,
-    check_outputs, default_controller, emit, EXIT_DONE, EXIT_FINDING, note_implausible, progress,
-    say_remarks)
+    check_outputs, default_controller, emit, EXIT_DONE, EXIT_FINDING, frozen_remarks,
+    note_implausible, progress, say_remarks)
 from pam_actuation.cli.options import count, number, out_path, Parser, source
 
 if TYPE_CHECKING:
@@ -118,7 +118,7 @@ def run(args: argparse.Namespace) -> int | None:
     experiments, check = _experiments(args, runs, rig)
     preview_s, told = _preview(args, runs)
     controller, ranges = with_own_range(controller, rig, [*experiments, *check])
-    said = [*unknown_remarks(rig), *ranges, *told]
+    said = [*unknown_remarks(rig), *ranges, *told, *frozen_remarks(args, controller)]
     say_remarks(args, said)
     rigs = [rig, *random_rigs(rig, args.randomise, args.seed)]
     others = [rig, *random_rigs(rig, args.randomise, args.seed + HELD_OUT_SEED)]

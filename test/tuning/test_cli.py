@@ -102,3 +102,11 @@ def test_a_joint_is_tuned_on_the_experiments_that_it_can_do():
     # A limb as heavy as a leg that turns about 0 degrees.
     limb = bench.with_(parameters={'inertia_kg_m2': leg.parameters['inertia_kg_m2']})
     assert _of_joint(limb) == _of_joint(bench)
+
+
+def test_freezing_what_does_not_learn_is_told(tmp_path, capsys):
+    main(['tune', '--model', 'dmsp_5_300_realistic', '--controller', 'pid', '--freeze',
+          '--experiment', 'step_10mm', '--rollouts', '40', '--json',
+          '--out', str(tmp_path / 'tuned.yaml')])
+    told = json.loads(capsys.readouterr().out)
+    assert told['remarks'] == ['a pid controller does not learn, so --freeze changes nothing']
