@@ -277,10 +277,10 @@ def _plain(value: Any) -> Any:
     return value
 
 
-def path_text(path: StrPath) -> str:
-    """Return a path as text; raise InputError for what is no path."""
+def path_text(path: StrPath, what: str = 'name, path or YAML text') -> str:
+    """Return a path as text; raise InputError for what is none, with words for ``what`` is."""
     if not isinstance(path, (str, os.PathLike)):
-        raise InputError(f'{shown(path)} is no name, path or YAML text')
+        raise InputError(f'{shown(path)} is no {what}')
     return os.fspath(path)
 
 

@@ -20,6 +20,7 @@ from typing import Any, Self, TYPE_CHECKING
 
 import numpy as np
 from pam_sim.annotations import BoolArray, FloatArray, IntArray
+from pam_sim.declared import number_of
 from pam_sim.errors import did_you_mean, InputError
 from pam_sim.short_repr import short_repr
 from pam_sim.silence import most_held_ns
@@ -269,12 +270,14 @@ class Run:
         Raises
         ------
         InputError
-            A wanted topic is missing, the topics have no common time span, or
-            the grid would have no or too many points.
+            A wanted topic is missing, the topics have no common time span, the
+            grid would have no or too many points, or a step or gap is no number above 0.
 
         """
-        if not 0.0 < dt_s < np.inf:
+        if not 0.0 < number_of(dt_s, 'dt_s') < np.inf:
             raise InputError(f'a grid step of {dt_s} s; give one above 0', 'dt_s')
+        if max_gap_s is not None and not number_of(max_gap_s, 'max_gap_s') > 0.0:
+            raise InputError(f'is {max_gap_s} s; give one above 0', 'max_gap_s')
         names = ([n for n in self.topics if n in self] if topics is None
                  else [topics] if isinstance(topics, str) else list(topics))
         series = {name: self.require(name) for name in names}
@@ -331,8 +334,9 @@ class Run:
 
     def _chosen(self, topics: Collection[str] | None) -> dict[str, Series]:
         names = [topics] if isinstance(topics, str) else topics
-        series = {name: self.require(name)
-                  for name in names or [name for name in self.topics if name in self]}
+        if names is None:
+            names = [name for name in self.topics if name in self]
+        series = {name: self.require(name) for name in names}
         if not series:
             raise InputError('has no messages', self.path or 'run')
         return series
@@ -364,7 +368,7 @@ class Run:
         import pandas as pd     # takes a second to load
         series = self._chosen(topics)
         if rate_hz is not None:
-            if not LEAST_RATE_HZ <= rate_hz <= MOST_RATE_HZ:
+            if not LEAST_RATE_HZ <= number_of(rate_hz, 'rate_hz') <= MOST_RATE_HZ:
                 raise InputError(
                     f'{rate_hz:g} Hz; allowed is {LEAST_RATE_HZ:g} to {MOST_RATE_HZ:g} Hz', 'rate')
             last = series[self.ends_of_table(topics)[1]]

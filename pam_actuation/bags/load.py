@@ -41,6 +41,7 @@ from pam_actuation.topics.table import BY_NAME, KEPT, OF_A_RUN, short_name, TOLD
 from pam_sim.annotations import BoolArray, FloatArray, IntArray
 from pam_sim.errors import InputError
 from pam_sim.files import StrPath
+from pam_sim.located_yaml import path_text
 from pam_sim.run import MEASURED_TOPICS, Run, Series
 from pam_sim.units import unit_of
 
@@ -143,6 +144,7 @@ def load_run(path: StrPath, namespace: str | None = None, recover: bool = False,
         topic of another type.
 
     """
+    path_text(path, 'path of a bag')
     namespace, names = renamed.full_names(path, topics, namespace, recover)
     bag = read_bag(path, recover=recover, names=names, wanted=lambda *topic: (
         is_read(*topic) or is_marker(*topic)))

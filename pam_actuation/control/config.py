@@ -133,7 +133,8 @@ def load_controller(name_or_path_or_text: str | os.PathLike[str],
     if rules_file is not None:
         if controller.rules is None:
             raise InputError(f'a {controller.kind} controller has no rules', str(rules_file))
-        controller.take_rules(load_rules(path_text(rules_file), controller.rules))
+        controller.take_rules(load_rules(path_text(rules_file, 'path of a rule file'),
+                                         controller.rules))
     return controller
 
 

@@ -18,6 +18,7 @@ import math
 from typing import TYPE_CHECKING
 
 from pam_sim.annotations import FloatArray
+from pam_sim.declared import number_of
 from pam_sim.errors import InputError
 from pam_sim.joint import layout
 from pam_sim.joint.statics import static_angle
@@ -82,7 +83,7 @@ def pack_joint(
     for name, number, least, most, unit in (
             ('initial_angle_rad', initial_angle_rad, lower, upper, 'rad'),
             ('initial_velocity_rad_per_s', initial_velocity_rad_per_s, -100.0, 100.0, 'rad/s')):
-        if not least <= number <= most:
+        if not least <= number_of(number, name) <= most:
             raise InputError(f'`{name}` is {number:g}; allowed {least:g} to {most:g} {unit}')
     substeps = _substeps(joint, dt_s)
     state = zeros(layout.STATE)

@@ -15,10 +15,11 @@
 """The joint: flexor, extensor and limb as one object that can be simulated."""
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 from pam_sim.annotations import Number
+from pam_sim.declared import check_mapping, shown
 from pam_sim.effects.registry import get_effect
 from pam_sim.errors import InputError
 from pam_sim.joint.parameters import NAME, PARAMETERS, SIDES
@@ -61,6 +62,8 @@ class JointRig:
 
     def __post_init__(self) -> None:
         """Check the muscles and fill in nominal numbers."""
+        if not isinstance(self.name, str):
+            raise InputError(f'is {shown(self.name)}; a text is needed', 'name')
         for side in SIDES:
             self._check_side(side)
         object.__setattr__(self, 'parameters', check_parameters(PARAMETERS, self.parameters))
@@ -78,6 +81,7 @@ class JointRig:
 
     def _check_side(self, side: str) -> None:
         rig = getattr(self, side)
+        _check_rig(rig, side)
         if rig.load != 'driven':
             raise InputError(f'has load `{rig.load}`; a muscle of a joint has load `driven`', side)
         for setting in rig.effects:
@@ -135,6 +139,11 @@ class JointRig:
             As of the class.
 
         """
+        if parameters is not None:
+            check_mapping(parameters, 'parameters')
+        for side, given in zip(SIDES, (flexor, extensor)):
+            if given is not None:
+                _check_rig(given, side)
         sides = {side: (given or getattr(self, side)).with_(valve=valve, fidelity=fidelity)
                  for side, given in zip(SIDES, (flexor, extensor))}
         return replace(self, name=name or self.name, **sides,
@@ -231,3 +240,10 @@ class JointRig:
     def to_yaml(self) -> str:
         """Return a model file that :func:`pam_sim.joint.load_joint` turns into an equal joint."""
         return joint_to_yaml(self)
+
+
+def _check_rig(given: Any, side: str) -> None:
+    """Refuse what is no rig of a single muscle."""
+    from pam_sim.rig import Rig
+    if not isinstance(given, Rig):
+        raise InputError(f'is {shown(given)}; give a Rig with load `driven`', side)

@@ -333,6 +333,8 @@ def test_places_without_a_bag(tmp_path):
         load_run(tmp_path / 'nowhere')
     with pytest.raises(InputError, match='no bag in this directory'):
         load_run(tmp_path)
+    with pytest.raises(InputError, match='None is no path of a bag'):
+        load_run(None)
     text = tmp_path / 'notes.txt'
     text.write_text('notes')
     with pytest.raises(InputError, match='not a bag'):

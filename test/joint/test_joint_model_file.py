@@ -123,6 +123,20 @@ def test_mistakes_in_a_call():
             call()
 
 
+@pytest.mark.parametrize('given, words', [
+    ({'parameters': [1.0]}, 'parameters: is [1.0]; write'),
+    ({'flexor': 'dmsp_5_300_driven'}, "flexor: is 'dmsp_5_300_driven'; give a Rig with load"),
+    ({'name': 3}, 'name: is 3; a text is needed'),
+])
+def test_a_change_of_a_joint_of_another_kind_is_refused_in_one_sentence(given, words):
+    joint = load_joint('joint_dmsp_5_300')
+    with pytest.raises(InputError) as caught:
+        joint.with_(**given)
+    assert str(caught.value).startswith(words)
+    with pytest.raises(InputError, match="`initial_angle_rad` is 'x'; a number is needed"):
+        joint.plant(initial_angle_rad='x')
+
+
 def test_the_page_and_the_presets_say_every_number():
     page = (Path(__file__).parents[2] / 'docs/reference/joint.md').read_text(encoding='utf-8')
     assert [p.name for p in PARAMETERS if f'`{p.name}`' not in page] == []

@@ -84,6 +84,9 @@ def test_of_repeated_stamps_a_held_signal_takes_the_last():
 @pytest.mark.parametrize('wanted, said', [
     ({'dt_s': 0.0}, 'dt_s: a grid step of 0.0 s'), ({'dt_s': float('nan')}, 'grid step of nan'),
     ({'dt_s': float('inf')}, 'grid step of inf'),
+    ({'dt_s': 'x'}, "`dt_s` is 'x'; a number is needed"),
+    ({'max_gap_s': -0.1}, 'max_gap_s: is -0.1 s; give one above 0'),
+    ({'max_gap_s': float('nan')}, 'max_gap_s: is nan s'),
     ({'dt_s': 1e-9}, 'a grid of 490000001 points'),
     ({'start_ns': 0, 'end_ns': 2**62}, 'at most 100000000')])
 def test_impossible_grids_are_refused(wanted, said):
@@ -123,6 +126,12 @@ def test_one_topic_may_be_given_by_its_name():
     assert list(run.on_grid(topics='pressure').values) == ['pressure']
     for frame in (run.to_dataframe(topics='pressure'), run.to_dataframe(100.0, 'pressure')):
         assert list(frame) == ['stamp_ns', 'time_s', 'pressure.pressure_pa']
+
+
+def test_no_topics_are_not_all_topics():
+    for table in (make_run().to_dataframe, make_run().on_grid):
+        with pytest.raises(InputError, match='has no messages'):
+            table(topics=[])
 
 
 def test_stamps_in_seconds_and_fields_of_another_length_are_refused():
