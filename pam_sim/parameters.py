@@ -138,7 +138,8 @@ def check_given(
     known = {parameter.name: parameter for parameter in parameters}
     place = getattr(values, 'where', where)
     if not isinstance(values, Mapping):
-        check_mapping(values, where if isinstance(where, str) and where else f'{what}s')
+        one, of, rest = what.partition(' of ')
+        check_mapping(values, where if isinstance(where, str) and where else f'{one}s{of}{rest}')
     result = {}
     for name, value in values.items():
         if name not in known:

@@ -27,9 +27,9 @@ from pam_sim.errors import InputError
 from pam_sim.records import cells, fields, zeros
 from pam_sim.rollout import kernel
 from pam_sim.rollout.layout import INPUT, OUTPUT, PARAMETERS, STATE
-from pam_sim.rollout.packing import HIGHEST_PA, LOWEST_PA
 from pam_sim.rollout.simulate import contraction_range_m, told_by_own_file
 from pam_sim.shared_memory import SharedMemory
+from pam_sim.units import HIGHEST_PA, LOWEST_PA
 
 if TYPE_CHECKING:
     from pam_sim.rig import Rig

@@ -33,7 +33,7 @@ from pam_sim.rig_parameters import rig_parameters
 from pam_sim.rig_text import rig_to_yaml
 from pam_sim.sensors import SENSOR_PARAMETERS
 from pam_sim.tolerance import prior_sd, Tolerance, tolerances, UNKNOWN
-from pam_sim.units import GRAVITY_M_PER_S2, P_ATM_PA
+from pam_sim.units import GRAVITY_M_PER_S2, LOWEST_PA, P_ATM_PA
 from pam_sim.valve import hsv, ppr, VALVES
 
 if TYPE_CHECKING:
@@ -305,14 +305,18 @@ class Rig:
         """
         Return the contraction [m] at rest, 0 to the stroke, at an absolute pressure [Pa].
 
-        The force map with its gain, no effects; scalars or arrays.
+        The force map with its gain, no effects; scalars or arrays. NaN where a load is NaN.
 
         Raises
         ------
         InputError
-            No ``load_n`` for a load without weight.
+            No ``load_n`` for a load without weight; a pressure that is NaN, or too low to be
+            absolute and in Pa.
 
         """
+        if not np.all(np.asarray(pressure_pa, float) >= LOWEST_PA):
+            raise InputError(f'is {shown(pressure_pa)}; a pressure is absolute and in Pa, '
+                             f'{LOWEST_PA:g} or more', 'pressure_pa')
         if load_n is None:
             if self.parameters.get('spring_n_per_m', 0.0) > 0.0 or has_force(LOADS[self.load]):
                 return self._rest_against_load_m(pressure_pa)

@@ -20,6 +20,7 @@ if TYPE_CHECKING:      # shell completion reads units without numpy
     from pam_sim.annotations import Number
 
 P_ATM_PA = 101_325.0          # atmospheric pressure; gauge = absolute - P_ATM_PA
+LOWEST_PA, HIGHEST_PA = 0.5 * P_ATM_PA, 2e6     # absolute; of a muscle and its supply
 EMPTY_PA = 10e3               # gauge; a muscle below is empty and holds no load up
 NS_PER_S = 1_000_000_000     # stamps count nanoseconds
 GRAVITY_M_PER_S2 = 9.80665

@@ -46,8 +46,8 @@ from pam_sim.load import LOADS
 from pam_sim.records import fields, size_of, zeros
 from pam_sim.rollout import layout
 from pam_sim.rollout.kernel import refuse_terms
-from pam_sim.rollout.packing import LOWEST_PA
 from pam_sim.short_repr import short_repr
+from pam_sim.units import LOWEST_PA
 
 if TYPE_CHECKING:
     from pam_actuation.control.compiled_controller import CompiledController

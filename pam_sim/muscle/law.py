@@ -303,7 +303,7 @@ class MuscleLaw:
         Return the contraction at which the tension has fallen to a load; arrays broadcast.
 
         Bisection on the formula, from rest to full contraction; 0 where the
-        load is not lifted. Points outside the range are not flagged here.
+        load is not lifted, NaN where it is NaN. Points outside the range are not flagged here.
         """
         pressure, load = np.broadcast_arrays(
             np.asarray(pressure_gauge_pa, float), np.asarray(load_n, float))
@@ -313,7 +313,8 @@ class MuscleLaw:
             middle = np.asarray(0.5 * (low + high))
             pulls = self._tension_n(pressure, middle) > load
             low, high = np.where(pulls, middle, low), np.where(pulls, high, middle)
-        return np.where(lifted, 0.5 * (low + high), 0.0)[()]
+        found = np.where(lifted, 0.5 * (low + high), 0.0)
+        return np.where(np.isnan(load), np.nan, found)[()]
 
     def holding_pressure_pa(self, force_n: ArrayLike, strain: ArrayLike,
                             upper_pa: float = 2e6) -> FloatArray:

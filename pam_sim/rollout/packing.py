@@ -34,7 +34,8 @@ from pam_sim.rollout.places import (
     BEYOND, BEYOND_PLACE, FLAGS, law_codes, LAW_PLACE, load_codes, LOAD_PLACE, PLACES,
     STATE_SIZE)
 from pam_sim.units import (
-    GAS_CONSTANT_AIR, GRAVITY_M_PER_S2, P_ATM_PA, RHO_REFERENCE, T_REFERENCE_K, TEMPERATURE_K)
+    GAS_CONSTANT_AIR, GRAVITY_M_PER_S2, HIGHEST_PA, LOWEST_PA, P_ATM_PA, RHO_REFERENCE,
+    T_REFERENCE_K, TEMPERATURE_K)
 from pam_sim.valve import hsv, ppr
 from pam_sim.valve.flow import flow_function, RATIO_LINEAR
 from pam_sim.volume import law as law_volume
@@ -45,8 +46,6 @@ if TYPE_CHECKING:
 _LAW_CODES, _LOAD_CODES = law_codes(), load_codes()
 _RT_J_PER_KG = GAS_CONSTANT_AIR * TEMPERATURE_K
 _DENSITY_FACTOR = math.sqrt(T_REFERENCE_K / TEMPERATURE_K)
-# What may be in a muscle or before its valve, absolute.
-LOWEST_PA, HIGHEST_PA = 0.5 * P_ATM_PA, 2e6
 _DAMPING = 'N s/m'          # unit of the numbers of effects that damp the motion
 
 

@@ -19,6 +19,7 @@ import numpy as np
 from pam_sim import load_joint, load_rig, Rig
 from pam_sim.effects.registry import effects
 from pam_sim.errors import InputError
+from pam_sim.muscle.registry import make_law
 from pam_sim.records import columns, fields, size_of
 from pam_sim.rollout import kernel
 from pam_sim.rollout.layout import INPUT, OUTPUT, STATE
@@ -115,6 +116,8 @@ def test_what_is_no_rig_file_is_refused_in_one_sentence():
         for load in (load_rig, load_joint):
             with pytest.raises(InputError, match='is no name, path or YAML text'):
                 load(wrong)
+    with pytest.raises(InputError, match='parameters of `sarosi`: is 3; write'):
+        make_law('sarosi', 3)
     with pytest.raises(InputError, match='parameters: is 3; write'):
         Rig('mine', 'hanging_mass', parameters=3)
 
@@ -125,6 +128,16 @@ def test_a_number_that_is_not_known_gives_a_pressure_that_is_not_known():
         held_pa = rig.static_pressure_pa(np.array([0.005, np.nan]))
         assert held_pa[0] == rig.static_pressure_pa(0.005) and np.isnan(held_pa[1])
         assert np.isnan(rig.static_pressure_pa(0.005, np.nan))
+        assert np.isnan(rig.static_contraction_m(4e5, np.nan))
+
+
+@pytest.mark.parametrize('wrong', [np.nan, -1e5, 450.0, [5e5, 4.5]])
+@pytest.mark.parametrize('spring_n_per_m', [0.0, 100.0])
+def test_a_pressure_at_rest_is_absolute_and_in_pascals(wrong, spring_n_per_m):
+    rig = load_rig(RIG).with_(parameters={'spring_n_per_m': spring_n_per_m})
+    with pytest.raises(InputError, match=r'pressure_pa: is .*; a pressure is absolute and in Pa'):
+        rig.static_contraction_m(wrong)
+    assert rig.static_contraction_m(60e3) == 0.0
 
 
 @pytest.mark.parametrize('path', [[0.0, np.nan, 0.0], [0.0, 0.01, 0.4], [-0.1, 0.0, 0.0]])
