@@ -204,7 +204,7 @@ def _mistakes(folder, bags):
         'text as mcap': (['info', text], ['text.mcap']),
         'text replayed': (['replay', text], ['text.mcap']),
         'truncated bag': (['replay', cut], ['cut.mcap', 'recover']),
-        'truncated report': (['report', cut, *out], ['cut.mcap']),
+        'truncated report': (['report', cut, '--out', folder / 'out.html'], ['cut.mcap']),
         'no bag': (['info', folder / 'missing'], ['missing']),
         'gap of a text': (['gap', text, '--model', 'dmsp_5_300_hanging_mass', *out],
                           ['text.mcap']),
