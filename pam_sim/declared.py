@@ -80,6 +80,12 @@ def check_mapping(value: Any, name: str, form: str = "{'NAME': NUMBER}") -> None
         raise InputError(f'is {shown(value)}; write `{form}`', name)
 
 
+def check_kind(value: Any, kind: Any, name: str, call: str) -> None:
+    """Raise InputError for what is no object of a kind, with the ``call`` that returns one."""
+    if not isinstance(value, kind):
+        raise InputError(f'is {shown(value)}; give what `{call}` returns', name)
+
+
 def number_of(value: Any, name: str) -> float:
     """Return a number; refuse what is none, by its name."""
     try:

@@ -87,6 +87,30 @@ def other_valve(preset: str, valve: str, known: Collection[str]) -> str:
             f'`{right}` is the one made for it')
 
 
+def check_valve(controller: Any, valve: str) -> None:
+    """
+    Refuse a controller that was loaded for the other valve, unless the other rig was accepted.
+
+    Parameters
+    ----------
+    controller : Controller
+        One without facts fits any rig.
+    valve : str
+        Of the rig that it shall run on: ``ppr`` or ``hsv``.
+
+    Raises
+    ------
+    InputError
+        The sentence says how to load one that fits.
+
+    """
+    made_for = (getattr(controller, 'made_for', None) or {}).get('valve', valve)
+    if made_for != valve and not controller.other_rig:
+        raise InputError(
+            f'the controller was loaded for valve {made_for}, the rig has {valve}; load one with '
+            '`load_controller(NAME, rig)` and that rig', 'controller')
+
+
 def facts_of(rig: 'JointRig | Rig') -> dict[str, Any]:
     """Return what a controller of a rig or joint is made for, as plain data; {} if unknown."""
     one = rig.flexor if isinstance(rig, JointRig) else rig

@@ -23,6 +23,7 @@ seed, all stamps from the virtual clock.
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import partial
+import math
 import os
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
@@ -33,6 +34,7 @@ from pam_actuation.bags.message_writer import MessageWriter
 from pam_actuation.bags.metadata import experiment_metadata
 from pam_actuation.bags.writer import BagWriter
 from pam_actuation.control.loop import ControllerLoop
+from pam_actuation.control.made_for import check_valve
 from pam_actuation.drivers.for_rig import driver_loops
 from pam_actuation.drivers.loop import DriverLoop
 from pam_actuation.drivers.recorded import driver_facts, nearly_in
@@ -44,6 +46,7 @@ from pam_actuation.loops.wiring import (
 from pam_actuation.messages import HARDWARE_ID, LEVEL_OK, START_NS, Status
 from pam_actuation.namespaces import JOINT, MUSCLE
 from pam_actuation.plant_loop import PlantLoop
+from pam_sim.declared import check_kind, check_whole, number_of
 from pam_sim.errors import InputError
 from pam_sim.files import cannot_write
 
@@ -185,14 +188,21 @@ def simulate_experiment(
     ------
     InputError
         The experiment asks for what the rig cannot do or the controller does not track, or has
-        no reference to tell ahead; the bag directory exists or cannot be written. Nothing is
-        left behind then.
+        no reference to tell ahead; the controller was loaded for the other valve; a seed, time or
+        loop that cannot be; the bag directory exists or cannot be written. Nothing is left
+        behind then.
     KeyboardInterrupt
         Ctrl-C or SIGTERM; the bag holds what was simulated and says that it stopped early.
 
     """
+    _check_given(experiment, rig, controller, seed, preview_s)
     experiment.check_reachable(rig)
     check_tracked(experiment, controller)
+    unknown = [one for one in ticks or {} if one not in _loop_names(rig)]
+    if unknown:
+        raise InputError(f'has `{unknown[0]}`; allowed: {", ".join(_loop_names(rig))}', 'ticks')
+    if transport_ns < 0:
+        raise InputError(f'is {transport_ns} ns; allowed is 0 or more', 'transport_ns')
     if preview_s is not None and not experiment.asks_for_motion:
         raise InputError(
             f'{experiment.name} is in {experiment.domain} and has no reference to tell ahead',
@@ -232,6 +242,33 @@ def simulate_experiment(
             f'{ending.planned_s:.1f} s')
     return {'bag': os.fspath(out), 'duration_s': experiment.duration_s,
             'counts': writer.counts, 'findings': loops.watch.faults}
+
+
+def _check_given(experiment: Any, rig: Any, controller: Any, seed: Any, preview_s: Any) -> None:
+    """Refuse names in place of what they stand for, and parts that do not go together."""
+    from pam_actuation.experiments.experiment import Experiment
+    from pam_sim.joint.rig import JointRig
+    from pam_sim.rig import Rig
+    check_kind(experiment, Experiment, 'experiment', 'load_experiment(NAME)')
+    check_kind(rig, (Rig, JointRig), 'rig', 'load_rig(NAME)')
+    check_whole(seed, 0, 'seed')
+    if preview_s is not None and not 0.0 <= number_of(preview_s, 'preview_s') < math.inf:
+        raise InputError(f'is {preview_s:g} s; allowed is 0 or more', 'preview_s')
+    if isinstance(controller, (str, os.PathLike)):
+        raise InputError(f'is {controller!r}; give what `load_controller(NAME, rig)` returns',
+                         'controller')
+    if controller is None or not experiment.asks_for_motion:
+        return
+    check_valve(controller, rig.valve)
+    if experiment.domain == 'contraction' and isinstance(rig, Rig) and rig.is_driven:
+        raise InputError(
+            f'asks for a contraction; the load `{rig.load}` of {rig.name} does not move by '
+            'itself', f'experiment "{experiment.name}"')
+
+
+def _loop_names(rig: 'Rig | JointRig') -> tuple[str, ...]:
+    """Return the names of the loops of a rig, as in ``ticks``."""
+    return ('plant', 'reference', 'controller', *(f'{place}driver' for place in rig.muscles))
 
 
 def _names(rig: 'Rig | JointRig', namespace: str | None) -> tuple[str, str]:

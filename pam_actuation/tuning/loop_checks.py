@@ -17,12 +17,13 @@
 from typing import Any
 
 from pam_actuation.control.compiled_controller import CompiledController
+from pam_actuation.control.made_for import check_valve
 from pam_actuation.control.modes.tracked import Tracked, tracked_by
 from pam_actuation.control.modes.wrapped import WrappedLaw
-from pam_sim.declared import number_of, shown
+from pam_sim.declared import check_kind, number_of
 from pam_sim.errors import InputError
 
-_LOADERS = {'Rig': ('rig', 'load_rig'), 'JointRig': ('joint', 'load_joint')}
+_CALLS = {'Rig': ('rig', 'load_rig(NAME)'), 'JointRig': ('joint', 'load_joint(NAME)')}
 
 
 def check_parts(rig: Any, kind: type, experiment: Any, domain: str) -> None:
@@ -47,11 +48,8 @@ def check_parts(rig: Any, kind: type, experiment: Any, domain: str) -> None:
 
     """
     from pam_actuation.experiments.experiment import Experiment
-    for given, wanted, name, load in (
-            (rig, kind, *_LOADERS[kind.__name__]),
-            (experiment, Experiment, 'experiment', 'load_experiment')):
-        if not isinstance(given, wanted):
-            raise InputError(f'is {shown(given)}; give what `{load}(NAME)` returns', name)
+    check_kind(rig, kind, *_CALLS[kind.__name__])
+    check_kind(experiment, Experiment, 'experiment', 'load_experiment(NAME)')
     if experiment.domain != domain:
         raise InputError(f'experiment {experiment.name} is in {experiment.domain}; this loop '
                          f'tracks {domain}')
@@ -78,17 +76,12 @@ def check_controller(controller: Any, tracked: Tracked, valve: str, rate_hz: flo
         It does not fit, or is no controller.
 
     """
-    if not isinstance(controller, (CompiledController, WrappedLaw)):
-        raise InputError(f'is {shown(controller)}; give what '
-                         '`load_controller(NAME, rig)` returns', 'controller')
+    check_kind(controller, (CompiledController, WrappedLaw), 'controller',
+               'load_controller(NAME, rig)')
     if tracked_by(controller) != tracked:
         raise InputError(
             f'the controller tracks {tracked_by(controller).mode}, this loop {tracked.mode}')
-    made_for = (controller.made_for or {}).get('valve', valve)
-    if made_for != valve and not controller.other_rig:
-        raise InputError(
-            f'the controller was loaded for valve {made_for}, the rig of this loop has {valve}; '
-            'load one with `load_controller(NAME, rig)` and that rig')
+    check_valve(controller, valve)
     if controller.rate_hz != rate_hz:
         raise InputError(
             f'the controller runs at {controller.rate_hz:g} Hz, this loop at {rate_hz:g} Hz')

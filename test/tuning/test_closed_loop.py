@@ -185,8 +185,8 @@ def test_only_a_controller_of_the_valve_and_the_quantity_runs(loop):
     valve = loop.rig.valve
     other = loop.rig.with_(valve={'ppr': 'hsv', 'hsv': 'ppr'}[valve])
     made_for = load_controller(f'sofc_{other.valve}', other)
-    with pytest.raises(InputError, match=f'was loaded for valve {other.valve}, the rig of this '
-                                         f'loop has {valve}'):
+    told = f'was loaded for valve {other.valve}, the rig has {valve}'
+    with pytest.raises(InputError, match=told):
         loop.run(made_for)
     accepted = load_controller(made_for.to_yaml(), loop.rig, accept_other_rig=True)
     assert ClosedLoop(loop.rig, load_experiment(STEPS)).cost(accepted) > 0.0

@@ -211,7 +211,7 @@ def test_what_cannot_be_tracked_is_refused():
     for name, loop in (('sofc_force_hsv', ForceLoop(rig, sine)),
                        ('sofc_joint_hsv', JointLoop(joint, load_experiment('joint_sine')))):
         on = (rig if 'force' in name else joint).with_(valve='hsv')
-        with pytest.raises(InputError, match='was loaded for valve hsv, the rig of this loop has'):
+        with pytest.raises(InputError, match='was loaded for valve hsv, the rig has ppr'):
             loop.run(load_controller(name, on))
     for wrong in ('x', np.zeros(2), lambda t: 'x'):
         with pytest.raises(InputError, match='contraction_m: is .* at 0 s; a number is needed'):
