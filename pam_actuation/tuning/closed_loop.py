@@ -32,7 +32,7 @@ from pam_actuation.control.modes.tracked import CONTRACTION
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.messages import VALVE_NAMES
 from pam_actuation.tuning.cost import tracking_cost
-from pam_actuation.tuning.loop_checks import check_controller, check_parts
+from pam_actuation.tuning.loop_checks import check_controller, check_free, check_parts
 from pam_actuation.tuning.loop_parts import DISTURBANCE, Driver
 from pam_actuation.tuning.loop_setup import (
     Course, DriverLaw, first_periodic_tick, fresh_rise, latency_steps,
@@ -42,7 +42,6 @@ from pam_actuation.tuning.tracking_errors import Cycles, TrackingErrors
 from pam_sim.annotations import FloatArray
 from pam_sim.declared import check_whole
 from pam_sim.errors import InputError
-from pam_sim.load import LOADS
 from pam_sim.records import fields, size_of, zeros
 from pam_sim.rollout import layout
 from pam_sim.rollout.kernel import refuse_terms
@@ -230,10 +229,7 @@ class ClosedLoop(MuscleLoop):
 
     def __init__(self, rig: 'Rig', *arguments: Any, **named: Any) -> None:
         super().__init__(rig, *arguments, **named)
-        if not LOADS[rig.load].MOVES_FREELY:
-            raise InputError(
-                f'load `{rig.load}` of {rig.name} does not move by itself; a contraction can be '
-                'tracked on a load that moves freely', 'rig')
+        check_free(rig)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle what it is made of: a cluster gets kilobytes, not the arrays."""

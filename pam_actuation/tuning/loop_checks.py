@@ -14,7 +14,8 @@
 
 """What a closed loop refuses: rigs, experiments and controllers that do not go together."""
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, TYPE_CHECKING
 
 from pam_actuation.control.compiled_controller import CompiledController
 from pam_actuation.control.made_for import check_valve
@@ -23,6 +24,10 @@ from pam_actuation.control.modes.wrapped import WrappedLaw
 from pam_sim.declared import check_kind, number_of
 from pam_sim.errors import InputError
 
+if TYPE_CHECKING:
+    from pam_sim.rig import Rig
+
+_CONTROLLER = 'controller', 'load_controller(NAME, rig)'
 _CALLS = {'Rig': ('rig', 'load_rig(NAME)'), 'JointRig': ('joint', 'load_joint(NAME)')}
 
 
@@ -55,6 +60,45 @@ def check_parts(rig: Any, kind: type, experiment: Any, domain: str) -> None:
                          f'tracks {domain}')
 
 
+def check_tracking(rigs: Sequence[Any], experiments: Sequence[Any], controller: Any) -> None:
+    """
+    Refuse rigs, experiments and a controller that cannot be searched together.
+
+    Parameters
+    ----------
+    rigs : sequence of Rig or JointRig
+        What is simulated.
+    experiments : sequence of Experiment
+        What is tracked on them.
+    controller : Controller
+        What is to be tuned on them.
+
+    Raises
+    ------
+    InputError
+        One of them is something else, such as a name, or a load does not move by itself.
+
+    """
+    from pam_actuation.experiments.experiment import Experiment
+    from pam_sim.joint.rig import JointRig
+    from pam_sim.rig import Rig
+    for rig in rigs:
+        check_kind(rig, (Rig, JointRig), *_CALLS['Rig'])
+        if isinstance(rig, Rig):
+            check_free(rig)
+    for experiment in experiments:
+        check_kind(experiment, Experiment, 'experiment', 'load_experiment(NAME)')
+    check_kind(controller, (CompiledController, WrappedLaw), *_CONTROLLER)
+
+
+def check_free(rig: 'Rig') -> None:
+    """Raise InputError for a load that does not move by itself."""
+    if rig.is_driven:
+        raise InputError(
+            f'load `{rig.load}` of {rig.name} does not move by itself; a contraction can be '
+            'tracked on a load that moves freely', 'rig')
+
+
 def check_controller(controller: Any, tracked: Tracked, valve: str, rate_hz: float) -> None:
     """
     Refuse a controller that tracks something else, is made for the other valve, or another rate.
@@ -76,8 +120,7 @@ def check_controller(controller: Any, tracked: Tracked, valve: str, rate_hz: flo
         It does not fit, or is no controller.
 
     """
-    check_kind(controller, (CompiledController, WrappedLaw), 'controller',
-               'load_controller(NAME, rig)')
+    check_kind(controller, (CompiledController, WrappedLaw), *_CONTROLLER)
     if tracked_by(controller) != tracked:
         raise InputError(
             f'the controller tracks {tracked_by(controller).mode}, this loop {tracked.mode}')

@@ -40,6 +40,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 from pam_sim.annotations import FloatArray
+from pam_sim.declared import check_kind, check_whole
 from pam_sim.effects.registry import get_effect
 from pam_sim.effects.setting import EffectSetting, equivalent, forms_of
 from pam_sim.joint.parameters import PARAMETERS
@@ -80,7 +81,15 @@ def random_rigs(rig: AnyRig, count: int, seed: int = 0) -> list[AnyRig]:
     -------
     list of Rig or of JointRig
 
+    Raises
+    ------
+    InputError
+        No rig, or a count or seed that is no whole number from 0 on.
+
     """
+    check_kind(rig, (Rig, JointRig), 'rig', 'load_rig(NAME)')
+    check_whole(count, 0, 'count')
+    check_whole(seed, 0, 'seed')
     random = np.random.default_rng(seed)
     if isinstance(rig, JointRig):
         return [_drawn_joint(rig, random.uniform(size=2 * _DRAWS + 1)) for _ in range(count)]

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pam_actuation.control.modes.tracked import JOINT, tracked_by
 from pam_sim.annotations import FloatArray
+from pam_sim.declared import check_kind
 from pam_sim.errors import InputError
 
 if TYPE_CHECKING:
@@ -168,6 +169,7 @@ def check_axes(axes: tuple[Axis, ...], settings: dict[str, float]) -> None:
     if not axes:
         raise InputError('nothing to tune: give one axis or more', 'axes')
     for k, axis in enumerate(axes):
+        check_kind(axis, Axis, 'axes', 'space.Axis(NAME, LOWER, UPPER)')
         if axis.name in [one.name for one in axes[:k]]:
             raise InputError(f'cannot tune {axis.name} twice; give it one axis', 'axes')
         if axis.name == 'rate_hz':

@@ -33,6 +33,7 @@ from pam_actuation.control.made_for import facts_of
 from pam_actuation.control.modes.tracked import JOINT, tracked_by
 from pam_actuation.tuning.cost import LOST
 from pam_actuation.tuning.initial_rules import initial_rules
+from pam_actuation.tuning.loop_checks import check_tracking
 from pam_actuation.tuning.loops_of_rigs import loops_of
 from pam_actuation.tuning.problem import cost_on, costs_of, Problem, rebuild
 from pam_actuation.tuning.search import BUDGET_USED, default_members, minimise, SMALLEST
@@ -229,13 +230,11 @@ def _as_list(thing: Any) -> list[Any]:
     return list(thing) if isinstance(thing, (list, tuple)) else [thing]
 
 
-def _check_counts(budget: int, patience: int, population: int | None, jobs: int) -> None:
+def _check_counts(budget: int, patience: int, population: int | None) -> None:
     """Refuse counts that no search can have."""
     for name, number, lowest in (('budget', budget, 1), ('patience', patience, 0),
                                  ('population', population or SMALLEST, SMALLEST)):
         check_whole(number, lowest, name)
-    if jobs == 0:
-        raise InputError('is 0; allowed are 1 or more, and -1 for one a core', 'jobs')
 
 
 def tune(rig: 'Rig | JointRig | Sequence[Rig | JointRig]', controller: 'Law',
@@ -295,6 +294,7 @@ def tune(rig: 'Rig | JointRig | Sequence[Rig | JointRig]', controller: 'Law',
 
     """
     began = time.perf_counter()
+    check_tracking(_as_list(rig), _as_list(experiment) + _as_list(held_out or []), controller)
     axes = tuple(axes) if axes is not None else default_axes(controller)
     check_axes(axes, controller.settings)
     rigs: list[Rig | JointRig] = _as_list(rig)
@@ -302,7 +302,8 @@ def tune(rig: 'Rig | JointRig | Sequence[Rig | JointRig]', controller: 'Law',
     for name, given in (('rig', rigs), ('experiment', experiments)):
         if not given:
             raise InputError('at least one is needed', name)
-    _check_counts(budget, patience, population, jobs)
+    _check_counts(budget, patience, population)
+    Workers(jobs, cluster)          # refuses what cannot be, before loops are made
     train, left_out = loops_of(rigs, experiments, seed, controller, rigs[0], preview_s)
     tested = list(held_out_rigs or rigs)
     test, _ = loops_of(tested, _as_list(held_out or experiments),

@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterable, Iterator
 import contextlib
 import functools
 import math
+import numbers
 import os
 import time
 from typing import Any, Protocol, Self, TypeVar
@@ -60,6 +61,12 @@ class Pool(Protocol):
         """Let go of it."""
 
 
+def _check_jobs(jobs: Any) -> None:
+    """Refuse what is no number of threads or processes."""
+    if not isinstance(jobs, numbers.Integral) or int(jobs) < 1 and int(jobs) != -1:
+        raise InputError(f'is {jobs!r}; allowed are 1 or more, and -1 for one a core', 'jobs')
+
+
 class Workers:
     """
     A place to run tasks, used in a ``with`` block.
@@ -78,12 +85,14 @@ class Workers:
     Raises
     ------
     InputError
-        An address of neither kind, the library is not installed, or nobody answers.
+        A number of jobs that cannot be, an address of neither kind, the library is not
+        installed, or nobody answers.
 
     """
 
     def __init__(self, jobs: int = 1, cluster: str | None = None, processes: bool = False,
                  modules: tuple[str, ...] = ()) -> None:
+        _check_jobs(jobs)
         self.jobs, self.cluster, self.processes, self.modules = jobs, cluster, processes, modules
         self._parallel: joblib.Parallel | None = None
         self._pool: Pool | None = None
@@ -136,11 +145,15 @@ class Workers:
         ------
         WorkerLost, ClusterLost
             See ``errors``.
+        InputError
+            It is used outside of its block.
 
         """
         if self._pool is not None:
             return self._pool.gather(function, self._pool.share(shared), list(items))
-        assert self._parallel is not None, 'used within a with block'
+        if self._parallel is None:
+            raise InputError('is used before its block; write `with Workers(...) as workers:`',
+                             'workers')
         call = joblib.delayed(functools.partial(function, shared))
         done: list[Result] = self._parallel(call(item) for item in items)
         return done

@@ -20,6 +20,7 @@ from pam_actuation.tuning.random_rigs import (
     VALVE_FACTOR)
 from pam_sim import load_rig
 from pam_sim.effects.setting import forms_of
+from pam_sim.errors import InputError
 from pam_sim.joint import load_joint
 from pam_sim.units import P_ATM_PA
 import pytest
@@ -56,6 +57,15 @@ def test_same_seed_same_rigs_and_the_first_ones_do_not_depend_on_the_count():
     assert [rig.to_yaml() for rig in few] == [rig.to_yaml() for rig in many[:3]]
     assert few[0].to_yaml() != random_rigs(nominal, 1, seed=6)[0].to_yaml()
     assert nominal.to_yaml() == load_rig('dmsp_5_300_realistic').to_yaml()
+
+
+@pytest.mark.parametrize('wrong, says', [
+    (('mine', 2), "rig: is 'mine'; give what"), ((None, -1), 'count: is -1; a whole number'),
+    ((None, 2.5), 'count: is 2.5'), ((None, 2, -1), 'seed: is -1; a whole number')])
+def test_what_cannot_be_drawn_is_refused(wrong, says):
+    rig, *numbers = wrong
+    with pytest.raises(InputError, match=says):
+        random_rigs(rig or load_rig('dmsp_5_300_realistic'), *numbers)
 
 
 def test_a_rig_without_dead_time_or_friction_gets_the_first_and_no_friction():

@@ -172,7 +172,14 @@ def test_axes_are_clipped_scaled_and_checked(rig):
     ({'patience': -1}, 'patience: is -1; a whole number, 0 or more'),
     ({'population': 2}, 'population: is 2; a whole number, 5 or more'),
     ({'jobs': 0}, 'jobs: is 0; allowed are 1 or more'), ({'seed': -1}, 'seed: is -1'),
+    ({'jobs': 'x'}, "jobs: is 'x'; allowed are 1 or more"),
     ({'rig': []}, 'rig: at least one is needed'),
+    ({'rig': 'mine'}, "rig: is 'mine'; give what `load_rig"),
+    ({'rig': load_rig('dmsp_5_300_isometric')}, 'load `isometric` of .* does not move by itself'),
+    ({'controller': 'pid'}, "controller: is 'pid'; give what `load_controller"),
+    ({'experiment': 'sine'}, "experiment: is 'sine'; give what `load_experiment"),
+    ({'held_out': 'sine'}, "experiment: is 'sine'; give what `load_experiment"),
+    ({'axes': ('lead_s',)}, "axes: is 'lead_s'; give what `space.Axis"),
     ({'experiment': []}, 'experiment: at least one is needed')])
 def test_counts_and_empty_lists_are_refused_by_name(rig, wrong, says):
     with pytest.raises(InputError, match=says):

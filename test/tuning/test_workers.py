@@ -85,6 +85,14 @@ def test_a_missing_library_is_named(monkeypatch, address, library, says):
         Workers(cluster=address).__enter__()
 
 
+def test_workers_that_cannot_be_are_refused():
+    for jobs in (0, -3, 1.5, 'x'):
+        with pytest.raises(InputError, match='jobs: is .*; allowed are 1 or more, and -1'):
+            Workers(jobs)
+    with pytest.raises(InputError, match='is used before its block; write `with Workers'):
+        Workers().map(lambda shared, item: item, None, [1])
+
+
 def test_results_keep_the_order_of_the_items():
     class Square:
 
