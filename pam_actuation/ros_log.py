@@ -14,28 +14,21 @@
 
 """Where ROS writes its log files if the environment names no home folder."""
 
-from collections.abc import MutableMapping
 import os
 import pwd
 import tempfile
 
 
-def name_log_folder(environment: MutableMapping[str, str] = os.environ) -> None:
+def name_log_folder() -> None:
     """
     Set ``ROS_LOG_DIR`` where ROS would find no folder, as in a service of systemd.
 
     It is the usual one in the home folder that the system knows of the user, else in that for
     temporary files.
-
-    Parameters
-    ----------
-    environment : dict of str
-        The variables, changed in place; default: those of this process.
-
     """
-    if not any(environment.get(name) for name in ('HOME', 'ROS_HOME', 'ROS_LOG_DIR')):
+    if not any(os.environ.get(name) for name in ('HOME', 'ROS_HOME', 'ROS_LOG_DIR')):
         try:
             home = pwd.getpwuid(os.getuid()).pw_dir
         except KeyError:
             home = tempfile.gettempdir()
-        environment['ROS_LOG_DIR'] = os.path.join(home, '.ros', 'log')
+        os.environ['ROS_LOG_DIR'] = os.path.join(home, '.ros', 'log')

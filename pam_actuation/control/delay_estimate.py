@@ -363,8 +363,8 @@ class DelayEstimator:
         self._state[:] = 0.0
 
 
-def estimate_path(command_pa: FloatArray, pressure_pa: FloatArray, rate_hz: float,
-                  where: str = 'recording') -> PathEstimate:
+def estimate_path(command_pa: FloatArray, pressure_pa: FloatArray, rate_hz: float
+                  ) -> PathEstimate:
     """
     Return dead time and lag of a recorded command and pressure.
 
@@ -374,8 +374,6 @@ def estimate_path(command_pa: FloatArray, pressure_pa: FloatArray, rate_hz: floa
         Command and measured pressure [Pa] at equidistant times.
     rate_hz : float
         Samples per second of both.
-    where : str
-        Place named in errors.
 
     Raises
     ------
@@ -387,7 +385,7 @@ def estimate_path(command_pa: FloatArray, pressure_pa: FloatArray, rate_hz: floa
     if command.ndim != 1 or command.shape != pressure.shape:
         raise InputError(
             f'command and pressure have shapes {command.shape} and {pressure.shape}; both must '
-            'be one equal row of samples', where)
+            'be one equal row of samples', 'recording')
     estimator = DelayEstimator(rate_hz)
     sure = estimator.steps(command, pressure)
     found = estimator.estimate(unsure=True)
@@ -395,10 +393,10 @@ def estimate_path(command_pa: FloatArray, pressure_pa: FloatArray, rate_hz: floa
         moved_s = 0.0 if found is None else found.moved_s
         raise InputError(
             f'the command moves for {moved_s:.1f} s; {LEAST_MOVED_S:g} s are needed to tell '
-            'dead time and lag', where)
+            'dead time and lag', 'recording')
     if not sure:
         raise InputError(
             'no dead time with a first order lag explains the pressure: '
             f'{100.0 * found.explained:.0f} % explained, dead time known to '
-            f'±{1e3 * found.uncertainty_s:.0f} ms', where)
+            f'±{1e3 * found.uncertainty_s:.0f} ms', 'recording')
     return found

@@ -31,7 +31,7 @@ from pam_sim.parameters import check_given
 from pam_sim.valve import VALVES
 
 
-def check_valve_type(valve_type: str, where: str = 'valve_type') -> str:
+def check_valve_type(valve_type: str) -> str:
     """
     Return the valve type if it is known.
 
@@ -43,7 +43,7 @@ def check_valve_type(valve_type: str, where: str = 'valve_type') -> str:
     """
     if valve_type not in VALVES:
         raise InputError(f'unknown valve type {valve_type!r}, choose {" or ".join(VALVES)}',
-                         where)
+                         'valve_type')
     return valve_type
 
 

@@ -53,8 +53,7 @@ _GAUGES_PA = np.arange(10e3, 601e3, 10e3)
 _PARTS = np.arange(1, 11) / 10      # of the pressures that lift the load: where it swings
 
 
-def driver_config(rig: 'Rig', changes: Mapping[str, object] | None = None,
-                  where: str = 'parameter') -> DriverConfig:
+def driver_config(rig: 'Rig', changes: Mapping[str, object] | None = None) -> DriverConfig:
     """
     Return the DriverConfig for a rig.
 
@@ -64,8 +63,6 @@ def driver_config(rig: 'Rig', changes: Mapping[str, object] | None = None,
         Any rig, PPR or HSV.
     changes : mapping, optional
         Parameters that differ from what the rig tells, by name.
-    where : str
-        Place of ``changes`` for the error text.
 
     Raises
     ------
@@ -93,12 +90,12 @@ def driver_config(rig: 'Rig', changes: Mapping[str, object] | None = None,
     told.update(_load(rig))
     place = f'rig {rig.name}'
     of_rig = DriverConfig.from_parameters(told, where=place)
-    config = DriverConfig.from_parameters(changes, of_rig, where)
+    config = DriverConfig.from_parameters(changes, of_rig, 'parameter')
     if rig.valve == 'hsv':
         if config.hsv.period_s == of_rig.hsv.period_s:
             check_pulses(config.hsv, place, _AS_STATED['hsv.period_s'])
         else:
-            check_pulses(config.hsv, where)
+            check_pulses(config.hsv, 'parameter')
     return config
 
 

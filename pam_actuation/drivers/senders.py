@@ -59,16 +59,9 @@ class Senders:
 
     A new writer in place of a former one is a restart. A writer that is heard again after
     another one shows that both send.
-
-    Parameters
-    ----------
-    clear_s : float
-        How long [s] a message tells that its writer sends.
-
     """
 
-    def __init__(self, clear_s: float = CLEAR_S) -> None:
-        self._clear_ns = round(clear_s * NS_PER_S)
+    def __init__(self) -> None:
         self._forget()
 
     def _forget(self) -> None:
@@ -95,7 +88,7 @@ class Senders:
         self._heard_ns[writer] = now_ns
 
     def _recent(self, time_ns: int | None, now_ns: int) -> bool:
-        return time_ns is not None and 0 <= now_ns - time_ns <= self._clear_ns
+        return time_ns is not None and 0 <= now_ns - time_ns <= CLEAR_S * NS_PER_S
 
     def replaced(self, writer: Hashable) -> bool:
         """Tell whether a writer has been heard before another one, and not since."""
@@ -122,14 +115,12 @@ class SignalSenders:
         The driver's own writer.
     watchdog : str
         Full name of the watchdog, whose safe signals do not count.
-    clear_s : float
-        As of ``Senders``.
 
     """
 
-    def __init__(self, own: Hashable, watchdog: str, clear_s: float = CLEAR_S) -> None:
+    def __init__(self, own: Hashable, watchdog: str) -> None:
         self.own, self._watchdog = own, watchdog
-        self._senders = Senders(clear_s)
+        self._senders = Senders()
         self._first_ns: dict[Hashable, int] = {}          # of writers without a name
 
     def heard(self, writer: Hashable, name: str, safe: bool, now_ns: int) -> bool:

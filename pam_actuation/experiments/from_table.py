@@ -280,12 +280,12 @@ def _smooth(path: FloatArray, cutoff_hz: float, rate_hz: float, repeats: bool) -
     return smooth
 
 
-def _in_lines(values: Collection[float], wide: int = 95) -> str:
+def _in_lines(values: Collection[float]) -> str:
     """Return a YAML list of numbers in lines, indented below its key."""
     lines, line = [], ''
     for value in values:
         word = np.format_float_positional(value, trim='0')      # YAML reads 1e-05 as a text
-        if len(line) + len(word) + 2 > wide:
+        if len(line) + len(word) + 2 > 95:
             lines.append(line)
             line = ''
         line += ('' if not line else ' ') + word + ','

@@ -42,12 +42,11 @@ def in_full(entries: list[dict[str, Any]]) -> str:
     return '\n\n'.join(_entry(entry) for entry in entries)
 
 
-def text_table(head: Sequence[object], rows: Sequence[Sequence[object]],
-               width: int | None = None) -> str:
+def text_table(head: Sequence[object], rows: Sequence[Sequence[object]]) -> str:
     """Return aligned columns; the last one is wrapped to the width of the terminal."""
     sizes = [max(len(str(row[k])) for row in (head, *rows)) for k in range(len(head) - 1)]
     indent = sum(sizes) + 2 * len(sizes) + 2
-    room = max((width or _width()) - indent, 30)
+    room = max(_width() - indent, 30)
     lines = []
     for row in (head, *rows):
         cells = '  '.join(f'{cell!s:{size}}' for cell, size in zip(row, sizes))

@@ -136,7 +136,7 @@ def grids(rules: 'RuleBase', before: 'RuleBase | None' = None) -> list[Grid]:
             for grid in _of_table(table, other, rate_hz)]
 
 
-def check_comparable(rules: 'RuleBase', other: 'RuleBase', where: str = '') -> None:
+def check_comparable(rules: 'RuleBase', other: 'RuleBase') -> None:
     """Raise InputError unless the rules of two bases stand for the same places."""
     mine, theirs = (one.tables() for one in (rules, other))
     for table, second in zip(mine, theirs):
@@ -144,11 +144,11 @@ def check_comparable(rules: 'RuleBase', other: 'RuleBase', where: str = '') -> N
             if len(a.knots) != len(b.knots):
                 raise InputError(
                     f'cannot be compared: {table.name} rules have {len(b.knots)} knots of '
-                    f'{a.name} there and {len(a.knots)} here', where)
+                    f'{a.name} there and {len(a.knots)} here')
             if not np.allclose(a.knots, b.knots, rtol=1e-9, atol=0.0):
                 raise InputError(
                     f'cannot be compared: the {a.name} of the {table.name} rules runs from '
-                    f'{_span(b)} there and from {_span(a)} here', where)
+                    f'{_span(b)} there and from {_span(a)} here')
 
 
 def _span(antecedent: 'Antecedent') -> str:

@@ -36,9 +36,8 @@ class Access:
     Parameters
     ----------
     host : str, optional
-        Address or name to listen on; default: this machine only, without a token.
-    token : str, optional
-        To be given by everybody; default: none on this machine only, else a random one.
+        Address or name to listen on; default: this machine only, without a token. Elsewhere
+        everybody gives a random one.
 
     Raises
     ------
@@ -47,12 +46,10 @@ class Access:
 
     """
 
-    def __init__(self, host: str | None = None, token: str | None = None) -> None:
+    def __init__(self, host: str | None = None) -> None:
         self.host = LOOPBACK if host is None else host
         self.is_local = is_loopback(self.host)
-        if token is None:
-            token = '' if self.is_local else secrets.token_urlsafe(TOKEN_BYTES)
-        self.token = token
+        self.token = '' if self.is_local else secrets.token_urlsafe(TOKEN_BYTES)
 
     def url(self, port: int) -> str:
         """Return what to open in a browser, the token included."""

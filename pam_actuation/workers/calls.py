@@ -67,11 +67,11 @@ def warm_up(*modules: str, threads: int = 1) -> None:
         importlib.import_module(name)
 
 
-def end_with(parent: int, every_s: float = 0.5) -> None:
+def end_with(parent: int) -> None:
     """End this process soon after its parent has ended; a task that is under way is lost."""
     def watch() -> None:
         while os.getppid() == parent:
-            time.sleep(every_s)
+            time.sleep(0.5)
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()

@@ -97,23 +97,20 @@ def judge(law: MuscleLaw, points: ForceMap) -> Fit:
 
 
 def fit_law(name: str, points: ForceMap, muscle: str | None = None,
-            fixed: dict[str, float] | None = None,
-            free: tuple[str, ...] | None = None) -> Fit:
+            fixed: dict[str, float] | None = None) -> Fit:
     """
     Return the Fit of a law to a map: bounded least squares, deterministic.
 
     Parameters
     ----------
     name : str
-        Law with an entry in ``FREE``, or any law with ``free`` given.
+        Law with an entry in ``FREE``.
     points : ForceMap
         What to fit to.
     muscle : str, optional
         Set to start from.
     fixed : dict, optional
         Values to hold, e.g. ``{'k_rise': 0.0}`` for a constant k.
-    free : tuple of str, optional
-        Parameters to fit instead of ``FREE[name]``.
 
     Raises
     ------
@@ -122,13 +119,13 @@ def fit_law(name: str, points: ForceMap, muscle: str | None = None,
 
     """
     kind = get_law(name)
-    if free is None and name not in FREE:
+    if name not in FREE:
         raise InputError(f'law `{name}` has no parameters to fit; it goes through its table')
     fixed = dict(fixed or {})
     bounds = {parameter.name: parameter for parameter in kind.PARAMETERS}
     if 'length_m' in bounds:
         fixed.setdefault('length_m', points.length_m)
-    names = [key for key in (FREE[name] if free is None else free) if key not in fixed]
+    names = [key for key in FREE[name] if key not in fixed]
     start = {**kind(None, muscle).values, **fixed}
     if 'shortest_length_m' in names:      # keep the start between no and full length
         start['shortest_length_m'] = 0.8 * points.length_m

@@ -49,7 +49,7 @@ STIFFER = 1.0, 4.0, 16.0     # times, until the coefficients make a muscle
 POINTS_PER_DEGREE, MOST_DEGREE, APART = 4, 2, 2
 
 
-def fit_near_shape(points: ForceMap, shape: str = SHAPE) -> Fit:
+def fit_near_shape(points: ForceMap) -> Fit:
     """
     Return the Fit of the law ``sarosi`` near the shape of a measured map; deterministic.
 
@@ -57,8 +57,6 @@ def fit_near_shape(points: ForceMap, shape: str = SHAPE) -> Fit:
     ----------
     points : ForceMap
         Static points at two lengths or more.
-    shape : str
-        A set of the law.
 
     Raises
     ------
@@ -71,9 +69,9 @@ def fit_near_shape(points: ForceMap, shape: str = SHAPE) -> Fit:
     if lengths < LEAST_LENGTHS:
         raise InputError(f'holds forces at {lengths} lengths; {LEAST_LENGTHS} or more are needed',
                          points.name)
-    base = np.array(list(Sarosi.SETS[shape].values.values()))
+    base = np.array(list(Sarosi.SETS[SHAPE].values.values()))
     largest_n = float(points.force_n.max())
-    at_most = Sarosi(None, shape).formula_n(points.pressure_gauge_pa, points.strain)
+    at_most = Sarosi(None, SHAPE).formula_n(points.pressure_gauge_pa, points.strain)
     begin = math.log(largest_n / max(float(np.max(at_most)), 1e-3 * largest_n))
     refusal = InputError('no coefficients', points.name)
     for times in STIFFER:
@@ -144,9 +142,9 @@ class NearShape:
         return np.maximum(force, 0.0)
 
 
-def near_shape(points: ForceMap, shape: str = SHAPE) -> NearShape:
-    """Return the NearShape of static points; arguments and errors as of ``fit_near_shape``."""
-    fit = fit_near_shape(points, shape)
+def near_shape(points: ForceMap) -> NearShape:
+    """Return the NearShape of static points; errors as of ``fit_near_shape``."""
+    fit = fit_near_shape(points)
     curves = []
     for strain in np.unique(points.strain[~points.censored]):
         own = some_points(points, (points.strain == strain) & ~points.censored)

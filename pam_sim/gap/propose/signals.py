@@ -117,8 +117,8 @@ class ForceError:
                 float(left @ left) - float(rest @ rest))
 
 
-def force_error(estimator: Estimator, recordings: Sequence[Recording], now: Fit, side: str,
-                noise_n: float = 0.0) -> ForceError | None:
+def force_error(estimator: Estimator, recordings: Sequence[Recording], now: Fit, side: str
+                ) -> ForceError | None:
     """
     Return the ForceError of a fit, None where there is hardly any motion.
 
@@ -132,14 +132,12 @@ def force_error(estimator: Estimator, recordings: Sequence[Recording], now: Fit,
         The model so far.
     side : str
         ``muscle`` or ``load``.
-    noise_n : float
-        Scale of the errors against the priors; the noise of the cell by default.
 
     """
     problem = next(p for p in estimator.problems if p.subsystem == 'muscle')
     rig = model_of(estimator, now)
     base = [_error(rig, r, side) for r in recordings]
-    noise_n = noise_n or max(float(np.std(np.concatenate(base))), 1e-3)
+    noise_n = max(float(np.std(np.concatenate(base))), 1e-3)
     slopes = []
     for known in problem.known:
         if known.of_rig:
