@@ -23,22 +23,15 @@ from typing import Any
 import numpy as np
 from pam_actuation.report import errors, figures, metrics, signals
 from pam_actuation.report.learning import learned_worse, times_rolled_back
-from pam_actuation.report.page import plot, render, Section, table
-from pam_actuation.report.pages import (
-    cycle_numbers, default_titles, early_section, implausible_section)
+from pam_actuation.report.page import plot, Section, table
+from pam_actuation.report.pages import cycle_numbers, default_titles, PageParts, write_page
 from pam_actuation.report.sections.cycles import cycle_chart
-from pam_actuation.report.sections.markers import markers_sections
 from pam_actuation.report.sections.metrics_table import (
     each_part, interrupted_text, rolled_back_text, told_of_learning)
-from pam_actuation.report.sections.over_seeds import over_seeds, seeds_section
 from pam_actuation.report.sections.overlaid import lines, read_topic, together
-from pam_actuation.report.sections.provenance import provenance
-from pam_actuation.report.sections.timing import timing
 from pam_actuation.report.steps import ANGLE, as_data, responses, settling_text, StepResponse
-from pam_actuation.report.tracked import tracked_sections
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
-from pam_sim.files import write_text
 from pam_sim.joint.parameters import SIDES
 from pam_sim.run import Run
 from pam_sim.units import P_ATM_PA
@@ -146,27 +139,14 @@ def joint_report(runs: Sequence[Run], out_path: str | os.PathLike[str],
         if 'joint_state' not in run:
             raise InputError('is no recording of a joint; give it a page of its own',
                              str(run.path))
-    titles = default_titles(runs)
-    found = [joint_metrics(run) for run in runs]
-    named = list(zip(titles, found))
-    spread = over_seeds(list(zip(titles, runs, found)))
-    sections = [*filter(None, [
-        early_section(runs), implausible_section(list(zip(titles, runs))),
-        *tracked_sections(list(zip(titles, runs))), _merits(named),
-        seeds_section(spread), cycle_chart([
-            (title, np.degrees(one.cycle_rmse_rad), one.cycle_parts) for title, one in named],
-            '°'), _overlaid(list(zip(titles, runs)))])]
-    for k, (title, run) in enumerate(zip(titles, runs)):
-        heading = 'Signals over time' + (f': {title}' if len(runs) > 1 else '')
-        sections.append(_plots(run, f'signals-{k}', heading))
-    sections += markers_sections(list(zip(titles, runs)))
-    sections += [timing(list(zip(titles, runs, found))), provenance(list(zip(titles, runs)))]
-    name = runs[0].metadata.get('experiment_name') or 'Recording'
-    write_text(out_path, render(
-        f'Experiment {name}', 'Tracking of a joint of two pneumatic muscles: what was asked, '
-        'what it did, and how well.', sections, _key_numbers(named), FOOTER, of))
-    return {**{title: one.to_dict() for title, one in named},
-            **({'over_seeds': spread} if spread else {})}
+    return write_page(PageParts(
+        'a joint of two pneumatic muscles', joint_metrics, _merits, _cycles, _overlaid, _plots,
+        _key_numbers, FOOTER), runs, default_titles(runs), out_path, of)
+
+
+def _cycles(named: Sequence[tuple[str, JointMetrics]]) -> Section | None:
+    return cycle_chart([(title, np.degrees(one.cycle_rmse_rad), one.cycle_parts)
+                        for title, one in named], '°')
 
 
 def _merits(named: Sequence[tuple[str, JointMetrics]]) -> Section:

@@ -14,8 +14,8 @@
 
 """The page about one experiment or several runs of it."""
 
-from collections.abc import Sequence
-from typing import Any, TYPE_CHECKING
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple, TYPE_CHECKING
 
 from pam_actuation.bags.facts import recorded_muscle
 from pam_actuation.bags.oddities import recording_remarks
@@ -77,28 +77,51 @@ def bag_report(runs: 'Sequence[Run]', out_path: StrPath, titles: Sequence[str] |
         No run was given.
 
     """
+    return write_page(PageParts(
+        'a pneumatic muscle on the rig', recorded_metrics, metrics, cycles, overlaid, time_plots,
+        run_numbers, FOOTER), runs, titles or default_titles(runs), out_path, of)
+
+
+class PageParts(NamedTuple):
+    """
+    What differs between the page of a muscle and that of a joint.
+
+    ``measured`` takes a run, ``plots`` also the name and heading of a section. ``merits``,
+    ``cycles`` and ``numbers`` take pairs of a title and what ``measured`` returned, ``overlaid``
+    pairs of a title and a run.
+    """
+
+    what: str
+    measured: Callable[[Any], Any]
+    merits: Callable[[Any], Section | None]
+    cycles: Callable[[Any], Section | None]
+    overlaid: Callable[[Any], Section | None]
+    plots: Callable[[Any, str, str], Section | None]
+    numbers: Callable[[Any], Any]
+    footer: str
+
+
+def write_page(parts: PageParts, runs: 'Sequence[Run]', titles: Sequence[str], out_path: StrPath,
+               of: str) -> dict[str, dict[str, Any]]:
+    """Write a page of runs with a title each; others, result and errors as of ``bag_report``."""
     if not runs:
         raise InputError('a report needs at least one recording')
-    titles = list(titles) if titles else default_titles(runs)
-    measured = [recorded_metrics(run) for run in runs]
-    named = list(zip(titles, measured))
-    spread = over_seeds(list(zip(titles, runs, measured)))
-    sections = [early_section(runs), implausible_section(list(zip(titles, runs))),
-                *tracked_sections(list(zip(titles, runs))),
-                metrics(named), seeds_section(spread), cycles(named),
-                overlaid(list(zip(titles, runs)))]
-    for k, (title, run) in enumerate(zip(titles, runs)):
+    titled = list(zip(titles, runs))
+    named = [(title, parts.measured(run)) for title, run in titled]
+    measured = [(*pair, found) for pair, (_, found) in zip(titled, named)]
+    spread = over_seeds(measured)
+    sections = [early_section(runs), implausible_section(titled), *tracked_sections(titled),
+                parts.merits(named), seeds_section(spread), parts.cycles(named),
+                parts.overlaid(titled)]
+    for k, (title, run) in enumerate(titled):
         heading = 'Signals over time' + (f': {title}' if len(runs) > 1 else '')
-        sections.append(time_plots(run, f'signals-{k}', heading))
-    sections += markers_sections(list(zip(titles, runs)))
-    sections.append(timing(list(zip(titles, runs, measured))))
-    sections.append(provenance(list(zip(titles, runs))))
+        sections.append(parts.plots(run, f'signals-{k}', heading))
+    sections += [*markers_sections(titled), timing(measured), provenance(titled)]
     name = (runs[0].metadata or {}).get('experiment_name') or 'Recording'
     write_text(out_path, render(
-        f'Experiment {name}', 'Tracking of a pneumatic muscle on the rig: '
-        'what was asked, what it did, and how well.', [s for s in sections if s],
-        run_numbers(named), FOOTER, of))
-    facts = {title: m.to_dict() for title, m in named}
+        f'Experiment {name}', f'Tracking of {parts.what}: what was asked, what it did, and how '
+        'well.', [one for one in sections if one], parts.numbers(named), parts.footer, of))
+    facts = {title: one.to_dict() for title, one in named}
     return {**facts, 'over_seeds': spread} if spread else facts
 
 
