@@ -97,6 +97,16 @@ def test_the_cell_of_the_model_reads_the_weight_at_rest(simulated, rig):
     assert np.array_equal(bare.measured['force'], seen.measured['force'])
 
 
+@pytest.mark.parametrize('known_to', [0.3, 0.5, 1.0])
+def test_a_mass_that_is_hardly_known_counts_as_unknown(simulated, real, known_to):
+    """Of a mass known to half of it nothing is certain, and no force is far below that."""
+    rig = nominal().with_(parameters={'mass_kg': 7.5}, tolerance={'mass_kg': known_to})
+    rest = rest_of(real[0], rig)
+    assert rest.text() == rest_of(real[0], UNKNOWN_MASS).text()
+    assert rest_of(simulated, rig) is None
+    assert rest_of(vented(nominal().with_(parameters={'mass_kg': 1.0})), rig) is None
+
+
 def test_a_load_that_moves_far_from_its_stop_is_light_and_at_no_rest():
     """There a line does not reach to zero contraction, and the stated mass is too heavy."""
     t = np.arange(16_000) * 1e-3

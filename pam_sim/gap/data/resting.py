@@ -79,7 +79,8 @@ def rest_of(run: Run, rig: Rig, criteria: Criteria = CRITERIA, added_kg: float =
     of a spring. So it must be far below what the same load cell reads of the moving load. A
     straight line carries that on to zero contraction; the median counts where the load moves too
     far from there for a line. Where the mass is known, the force must be far below its weight as
-    well.
+    well. A mass that may be less than half of what is stated says too little: there the line alone
+    counts, as where the mass is unknown.
 
     Parameters
     ----------
@@ -107,6 +108,8 @@ def rest_of(run: Run, rig: Rig, criteria: Criteria = CRITERIA, added_kg: float =
     resting = np.abs(moved) <= reach
     least = _weight_n(rig, added_kg, criteria)
     line = _carried_n(moved[~resting], force[~resting], criteria)
+    if line is not None and _is_loose(rig, criteria):
+        least = None
     known = least is not None
     if not known and line is None or np.count_nonzero(~resting) < LEAST_SAMPLES:
         return None
@@ -126,6 +129,12 @@ def _weight_n(rig: Rig, added_kg: float, criteria: Criteria) -> float | None:
         return None
     least = rig.parameters[MASS] - criteria.certain_sd * rig.prior_sd(MASS)
     return (max(least, 0.0) + added_kg) * GRAVITY_M_PER_S2
+
+
+def _is_loose(rig: Rig, criteria: Criteria) -> bool:
+    """Tell whether a known mass may be less than the greater part of what is stated."""
+    return MASS not in rig.unknown and criteria.certain_sd * rig.prior_sd(MASS) > (
+        criteria.greater_part * rig.parameters[MASS])
 
 
 def _carried_n(contraction_m: FloatArray, force_n: FloatArray, criteria: Criteria
