@@ -24,6 +24,7 @@ from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.resting import rest_of
 from pam_sim.identify.records import offer_of
 from pam_sim.run import Run, Series
+from pam_sim.tolerance import AbsoluteSd
 from pam_sim.units import GRAVITY_M_PER_S2
 import pytest
 
@@ -105,6 +106,20 @@ def test_a_mass_that_is_hardly_known_counts_as_unknown(simulated, real, known_to
     assert rest.text() == rest_of(real[0], UNKNOWN_MASS).text()
     assert rest_of(simulated, rig) is None
     assert rest_of(vented(nominal().with_(parameters={'mass_kg': 1.0})), rig) is None
+
+
+@pytest.mark.parametrize('known_to', [float('inf'), AbsoluteSd(0.001)])
+def test_a_zero_that_is_not_known_is_the_lowest_reading(simulated, real, known_to):
+    rig = nominal().with_(tolerance={'contraction_zero_m': known_to})
+    for run, rests in ((real[0], True), (simulated, False)):
+        read = run.topics['contraction']
+        moved = Run({**run.topics, 'contraction': Series(read.stamp_ns, {
+            'contraction_m': read.values['contraction_m'] - 0.0012})}, {}, '/muscle', 'moved')
+        assert rest_of(moved, nominal()) is None
+        found = rest_of(moved, rig)
+        assert (found is not None) is rests
+        if rests:
+            assert found.share == pytest.approx(rest_of(run, nominal()).share, abs=0.01)
 
 
 def test_a_load_that_moves_far_from_its_stop_is_light_and_at_no_rest():

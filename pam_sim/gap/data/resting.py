@@ -103,8 +103,8 @@ def rest_of(run: Run, rig: Rig, criteria: Criteria = CRITERIA, added_kg: float =
     at, contraction = ordered(run.topics['contraction'], FIELD['contraction'])
     if min(stamp.size, at.size) < LEAST_SAMPLES:
         return None
-    moved = np.interp(stamp, at, contraction - rig.number(ZERO))
     reach = criteria.rest_stroke_share * rig.muscle.stroke_m
+    moved = np.interp(stamp, at, contraction - _at_rest_m(contraction, rig, reach, criteria))
     resting = np.abs(moved) <= reach
     least = _weight_n(rig, added_kg, criteria)
     line = _carried_n(moved[~resting], force[~resting], criteria)
@@ -121,6 +121,17 @@ def rest_of(run: Run, rig: Rig, criteria: Criteria = CRITERIA, added_kg: float =
     weight = (rig.parameters[MASS] + added_kg) * GRAVITY_M_PER_S2 if known else float(line or 0.0)
     return Rest(float(np.mean(resting)), float(np.median(force[resting])), weight,
                 stamp[resting], known)
+
+
+def _at_rest_m(contraction_m: FloatArray, rig: Rig, reach_m: float, criteria: Criteria) -> float:
+    """
+    Return what the sensor reads at zero contraction [m].
+
+    Where that is not known well enough to tell a load at rest, it is the lowest that was read.
+    """
+    if ZERO not in rig.unknown and criteria.certain_sd * rig.prior_sd(ZERO) <= reach_m:
+        return rig.number(ZERO)
+    return float(np.min(contraction_m)) + criteria.certain_sd * noise_sd(contraction_m)
 
 
 def _weight_n(rig: Rig, added_kg: float, criteria: Criteria) -> float | None:
