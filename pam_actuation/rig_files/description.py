@@ -215,11 +215,17 @@ class Description:
         low_v, high_v = volts or (nominal['ppr_lowest_v'], nominal['ppr_highest_v'])
         low_pa, high_pa = gauge_pa or (0.0, nominal['K_m'] * (nominal['ppr_highest_v']
                                                               - nominal['ppr_lowest_v']))
+        own = {n: one.value for n, one in self.numbers.items() if one.value is not None}
+        if gauge_pa is None and volts is not None:      # volts alone tell no pressure
+            low_pa = own.get(ZERO, low_pa)
+            high_pa = low_pa + own[GAIN] * (high_v - low_v) if GAIN in own else high_pa
         gain = float(f'{(high_pa - low_pa) / (high_v - low_v):.9g}')
         values = dict(zip(REGULATOR_NUMBERS, (gain, low_v, high_v, low_pa)))
         if not is_stated:       # gain and range stay those of the nominal rig
             values = {ZERO: low_pa} if ZERO not in self.numbers else {}
             source = NOT_STATED
+        elif gauge_pa is None:
+            values = {n: v for n, v in values.items() if n not in (GAIN, ZERO) or n not in own}
         for name, value in values.items():
             unsure = self._zero_tolerance(low_pa, high_pa) if name == ZERO else None
             if name == GAIN and gauge_pa is None:
