@@ -62,8 +62,10 @@ def remarks_on(rig: Rig, problems: Sequence[SubsystemProblem], wanted: Sequence[
 
     """
     acting = [one.number for one in found]
-    starting = [n.name for n in acting if any(n.acts_in(p) for p, _, _ in left)]
-    told = _starting_values(left, [name for name in starting if name not in at_rest])
+    unexplained = [one for one in found if one.number.name not in at_rest
+                   and any(one.number.acts_in(p) for p, _, _ in left)]
+    told = _starting_values(left, [one.number.name for one in unexplained if one.is_bent])
+    told += _wider(left, [one.number.name for one in unexplained if not one.is_bent])
     told += [one.edge() for one in found if one.at_edge]
     told += of_another_law(rig, left)
     told += [f'{name}: from the holds, where the regulator has settled; no effect of '
@@ -85,13 +87,22 @@ def of_one_scale(acting: Sequence[Number]) -> list[str]:
 
 
 def _starting_values(left: Squares, names: Sequence[str]) -> list[str]:
-    """Return a sentence on the numbers whose signals are not explained even with effects."""
-    if not names:
-        return []
-    rests = ' and '.join(f'{name} {math.sqrt(square):.1f} noise floors (rms)'
-                         for _, name, square in left)
-    return [f'{", ".join(names)}: a starting value. No effect of the library explains what is '
-            f'left of {rests}, and it may act alike; the interval allows for that']
+    """Return a sentence on the numbers that what is missing has bent."""
+    return [f'{", ".join(names)}: a starting value, which stays unknown in the rig file. No effect '
+            f'of the library explains what is left of {_rests(left)}. pam gap fits it beside what '
+            'is missing'] if names else []
+
+
+def _wider(left: Squares, names: Sequence[str]) -> list[str]:
+    """Return a sentence on the numbers whose signals are not quite explained."""
+    return [f'{", ".join(names)}: no effect of the library explains what is left of '
+            f'{_rests(left)}, and it may act alike; the interval allows for that'] if names else []
+
+
+def _rests(left: Squares) -> str:
+    """Return what is left of each signal, in noise floors."""
+    return ' and '.join(f'{name} {math.sqrt(square):.1f} noise floors (rms)'
+                        for _, name, square in left)
 
 
 def of_another_law(rig: Rig, left: Squares) -> list[str]:

@@ -14,11 +14,11 @@
 
 """What an identification found, as data and as text for people."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from pam_sim.gap.verify.together import Combination
-from pam_sim.identify.judgement import DETERMINED, is_narrow
+from pam_sim.identify.judgement import DETERMINED, is_narrow, UNDETERMINED
 from pam_sim.identify.numbers import Number
 from pam_sim.identify.profile import Interval
 from pam_sim.rig import Rig
@@ -28,7 +28,7 @@ from pam_sim.units import behind_number
 # For people: factor from SI and unit.
 READABLE = {'Pa': (1e-3, 'kPa'), 'Pa/V': (1e-3, 'kPa/V'), 'm': (1e3, 'mm'), 's': (1e3, 'ms'),
             'N/m': (1e-3, 'N/mm')}
-AT_EDGE = 'at the edge'
+AT_EDGE, STARTING = 'at the edge', 'starting value'
 
 
 @dataclass(frozen=True)
@@ -48,6 +48,8 @@ class Found:
     at_edge : bool
         Whether the value lies at an end of its allowed range. It is then not determined, however
         short the interval.
+    is_bent : bool
+        Whether no effect explains a clear rest of its signals. It is then not determined either.
 
     """
 
@@ -56,6 +58,7 @@ class Found:
     interval: Interval
     status: str
     at_edge: bool = False
+    is_bent: bool = False
 
     @property
     def is_narrow(self) -> bool:
@@ -65,7 +68,20 @@ class Found:
     @property
     def verdict(self) -> str:
         """Return the status in words for people."""
-        return AT_EDGE if self.at_edge and self.is_narrow else self.status
+        if not self.is_narrow:
+            return self.status
+        return AT_EDGE if self.at_edge else STARTING if self.is_bent else self.status
+
+    @property
+    def is_open(self) -> bool:
+        """Tell whether another recording would tell more; another model may be what is needed."""
+        return not self.is_narrow and (
+            not self.is_bent or self.interval.open_low or self.interval.open_high)
+
+    def as_bent(self) -> 'Found':
+        """Return the same number as one that a missing effect has bent."""
+        return replace(self, is_bent=True,
+                       status=UNDETERMINED if self.status == DETERMINED else self.status)
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data; an open end of the interval is null."""

@@ -138,6 +138,8 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: str | Sequence[str] =
     # A small rest of another formulation bends little; a clear one bends the fit of every edge.
     bent = [n.name for n in acting if any(
         n.acts_in(p) for p, _, square in left if square > CRITERIA.clear_rest)]
+    numbers_found = [one.as_bent() if one.number.name in bent and one.number.name not in at_rest
+                     else one for one in numbers_found]
     result = Identification(
         _identified(rig, numbers_found), numbers_found, combinations,
         [{'path': one.path, 'kind': one.kind, 'added_kg': one.added_kg} for one in offers],
@@ -146,16 +148,16 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: str | Sequence[str] =
         *(f'{one.path}: {one.rest.text()}' for one in offers if one.rest),
         *of_commands, *of_offers, *([] if force_compared else of_one_scale(acting)),
         *remarks_on(rig, problems, wanted, numbers_found, left, at_rest)]
-    narrow = [one.number.name for one in numbers_found if one.is_narrow]
-    # What ends at the edge of its range needs another model rather than another recording.
-    if advise and (len(narrow) < len(numbers_found) or len(acting) < len(wanted)):
+    # What ends at the edge of its range, or was bent, needs another model, not another recording.
+    closed = [one.number.name for one in numbers_found if not one.is_open]
+    if advise and (len(closed) < len(numbers_found) or len(acting) < len(wanted)):
         x, information = where_open(
             acting, [one.interval for one in first],
             [DETERMINED if one.is_narrow else one.status for one in first], x, information)
         result.next_experiment = next_experiment(
             with_values(rig, numbers, weighted.values(x)), wanted, acting, information,
             offers, any('force' in one.recording.signals for one in offers),
-            _part(progress, 0.95, 1.0), narrow)
+            _part(progress, 0.95, 1.0), closed)
     progress(1.0)
     return result
 

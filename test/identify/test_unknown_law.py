@@ -110,6 +110,20 @@ def test_a_clear_gap_of_the_muscle_asks_about_a_stated_law():
         assert remarks.of_another_law(rig, [(problem, 'contraction', square)]) == []
 
 
+def test_a_number_bent_by_what_is_missing_is_a_starting_value_and_not_determined():
+    """The muscle has another law, so a mass from its contraction is off by more than it says."""
+    run = record(RIG.with_(law='tondu_lopez'), hold_s=1.0, keep=('pressure', 'contraction'))
+    found = identify(run, RIG, ['mass_kg', 'K_m'])
+    mass, gain = found['mass_kg'], found['K_m']
+    assert mass.is_bent and mass.is_narrow and not gain.is_bent
+    assert (mass.status, mass.verdict) == ('not determined', 'starting value')
+    assert found.rig.unknown == ('mass_kg',) and found.next_experiment is None
+    assert gain.status == 'determined' and found.open_names == ['mass_kg']
+    said, = [one for one in found.remarks if 'a starting value' in one]
+    assert said.startswith('mass_kg: a starting value, which stays unknown in the rig file')
+    assert '>starting value<' in page(found, [run])
+
+
 def test_a_static_map_is_no_possible_effect_beside_an_unknown_law():
     run = record(RIG, gauge_pa=(50e3, 400e3), hold_s=0.8, keep=('pressure', 'contraction'))
     for name, there in (('law.a3', False), ('mass_kg', True)):
