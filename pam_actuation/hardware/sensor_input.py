@@ -20,6 +20,7 @@ reading of each of its topics, once per period.
 """
 
 from collections.abc import Mapping
+import math
 import time
 from types import MappingProxyType
 from typing import Any
@@ -35,7 +36,7 @@ TOPICS = {
 PLACE = 'place'         # in ``values``, beside the parameters
 # Of a muscle or joint: highest speed [1/s], smallest step that is no noise, unit of the sentence.
 FASTEST = {'contraction': (1.0, 0.003, 1e3, 'mm'), 'joint_state': (30.0, 0.1, 1.0, 'rad')}
-SHOWN_NS = 60_000_000_000               # a jump
+SHOWN_NS = 60_000_000_000               # a jump, or a value that is no number
 LONGEST_WAIT_NS = 1_000_000_000         # for a new value
 ANOTHER_CLOCK_NS = 60_000_000_000       # so far off a time is not that of this computer
 Reading = float | tuple[float, int] | None
@@ -106,19 +107,23 @@ class NewReadings:
     ----------
     jumps : int
         How often a reading changed faster than any muscle or joint moves.
+    not_finite : int
+        How often a reading was NaN or infinite.
     waits : Waits
         What the back end took long for.
 
     """
 
-    jumps = 0
+    jumps = not_finite = 0
     _jump, _jumped_ns = '', 0
+    _no_number, _no_number_ns = ('', math.nan), 0
     _timed, _timed_ns = '', 0
 
     def __init__(self, sensors: SensorInput, begin_ns: int) -> None:
         self._sensors, self.waits = sensors, Waits()
         self._newest_ns = dict.fromkeys(sensors.topics, begin_ns)
-        self._last: dict[str, tuple[float, int]] = {}        # value and stamp
+        self._last_ns: dict[str, int] = {}                  # stamp
+        self._finite: dict[str, tuple[float, int]] = {}     # value and stamp
 
     def take(self, topic: str, now_ns: int) -> tuple[float, int] | None:
         """
@@ -142,8 +147,7 @@ class NewReadings:
             raise
         except BaseException as error:      # of a back end of somebody else
             raise device_error(error, type(self._sensors), self._sensors.values) from None
-        last = self._last.get(topic)
-        known = isinstance(reading, tuple) and last is not None and stamp_ns == last[1]
+        known = isinstance(reading, tuple) and stamp_ns == self._last_ns.get(topic)
         if value is None or known:
             # The clock may have been set back.
             self._newest_ns[topic] = min(self._newest_ns[topic], now_ns)
@@ -156,9 +160,14 @@ class NewReadings:
                 f'{topic} is stamped {stamp_ns} ns, which is not the time of this computer, and '
                 'counts for nobody: a reading has the time.time_ns() at which it was measured')
             self._timed_ns = now_ns
-        if last is not None and topic in FASTEST:
-            self._look_for_jump(topic, value - last[0], stamp_ns - last[1], now_ns)
-        self._newest_ns[topic], self._last[topic] = now_ns, (value, stamp_ns)
+        if not math.isfinite(value):        # published all the same: those who need it vent
+            self.not_finite += 1
+            self._no_number, self._no_number_ns = (topic, value), now_ns
+        elif topic in FASTEST:
+            before, before_ns = self._finite.get(topic, (value, stamp_ns))
+            self._look_for_jump(topic, value - before, stamp_ns - before_ns, now_ns)
+            self._finite[topic] = value, stamp_ns
+        self._newest_ns[topic], self._last_ns[topic] = now_ns, stamp_ns
         return value, stamp_ns
 
     def _look_for_jump(self, topic: str, step: float, elapsed_ns: int, now_ns: int) -> None:
@@ -173,6 +182,18 @@ class NewReadings:
     def jump(self, now_ns: int) -> str:
         """Return a sentence on a jump in the last minute, '' if there was none."""
         return self._jump if 0 <= now_ns - self._jumped_ns <= SHOWN_NS else ''
+
+    def no_number(self, now_ns: int) -> str:
+        """Return a sentence on a NaN or infinite reading of the last second, '' if none."""
+        topic, value = self._no_number
+        recent = 0 <= now_ns - self._no_number_ns <= LONGEST_WAIT_NS
+        return f'{topic} reads {value}, which is no number' if recent else ''
+
+    def was_no_number(self, now_ns: int) -> str:
+        """Return a sentence on a NaN or infinite reading of the last minute, '' if none."""
+        topic, value = self._no_number
+        recent = 0 <= now_ns - self._no_number_ns <= SHOWN_NS
+        return f'{topic} read {value} within the last minute' if recent else ''
 
     def another_clock(self, now_ns: int) -> str:
         """Return a sentence on readings of the last second stamped by another clock, else ''."""

@@ -87,9 +87,10 @@ class HardwareSensors(ManagedNode):
         self.add_loop(1.0 / self.value('publish_rate_hz'))
 
     def diagnostic_values(self) -> Values:
-        """Add how often a sensor did not answer, a reading jumped, and the back end waited."""
+        """Add how often a sensor did not answer, was no number, jumped, or made the node wait."""
         seen = () if self._readings is None else (
-            ('jumps', self._readings.jumps), ('long_reads', self._readings.waits.count))
+            ('jumps', self._readings.jumps), ('not_finite', self._readings.not_finite),
+            ('long_reads', self._readings.waits.count))
         return (*super().diagnostic_values(), ('read_failures', self.failures), *seen)
 
     def tick(self) -> None:
@@ -108,10 +109,12 @@ class HardwareSensors(ManagedNode):
                     value, stamp_ns = new
                     self.send(topic, topic_of(topic).content.message(stamp_ns, value))
         now_ns = self.now_ns()
-        problem = problem or self._readings.another_clock(now_ns)
+        readings = self._readings
+        problem = problem or readings.no_number(now_ns) or readings.another_clock(now_ns)
         # A sensor may seem silent because the back end waits for another one.
-        waited = self._readings.waits.says and f'{self._readings.waits.says}{WAITED}'
-        told = [waited, problem or self._readings.jump(now_ns)]
+        waited = readings.waits.says and f'{readings.waits.says}{WAITED}'
+        seen = readings.jump(now_ns) or readings.was_no_number(now_ns)
+        told = [waited, problem or seen]
         if any(told):
             self.diagnostics.update(
                 ERROR if problem else WARN, '; '.join(text for text in told if text))

@@ -15,6 +15,7 @@
 """Test analog inputs as sensors: straight lines, and refusals in one sentence."""
 
 from contextlib import suppress
+import math
 from types import SimpleNamespace
 
 from fake_sysfs import make_adc, put
@@ -144,6 +145,32 @@ def test_a_jump_that_is_no_motion_is_told_for_a_minute(topic, steps, sentence):
     assert readings.jump(now_ns).startswith(sentence) and readings.jumps == bool(sentence)
     assert bool(readings.jump(now_ns + 59_000 * ms)) == bool(sentence)
     assert readings.jump(now_ns + 61_000 * ms) == ''
+
+
+@pytest.mark.parametrize('value', [math.nan, math.inf, -math.inf])
+def test_a_reading_that_is_no_number_is_told_and_published(value):
+    ms = 10 ** 6
+    now_ns = 1_700_000_000 * 10 ** 9
+    cell = SlowCell({'next': [0.0, value, value, 0.0001, value, 0.028]})
+    cell.topics = ('contraction',)
+    readings = NewReadings(cell, now_ns)
+    readings.take('contraction', now_ns)
+    assert readings.no_number(now_ns) == ''
+    for _ in range(2):
+        now_ns += 4 * ms
+        # The driver is to notice it; without any pressure it would drive a regulator.
+        assert str(readings.take('contraction', now_ns)) == str((value, now_ns))
+    said = f'contraction reads {value}, which is no number'
+    assert readings.no_number(now_ns) == said and readings.not_finite == 2
+    assert readings.take('contraction', now_ns + 4 * ms) and readings.jumps == 0
+    assert readings.no_number(now_ns + 1001 * ms) == ''
+    said = f'contraction read {value} within the last minute'
+    assert readings.was_no_number(now_ns + 59_000 * ms) == said
+    assert readings.was_no_number(now_ns + 61_000 * ms) == ''
+    for later in (8, 12):                                   # lost its index behind it
+        readings.take('contraction', now_ns + later * ms)
+    assert readings.jumps == 1
+    assert readings.jump(now_ns + 12 * ms).startswith('contraction jumped by 27.9 mm in 8 ms')
 
 
 @pytest.mark.parametrize('stamp', [
