@@ -28,7 +28,7 @@ from pam_actuation.replay.difference import Difference, difference
 from pam_actuation.replay.driver import DriverReplay, replay_driver
 from pam_actuation.replay.model import GIVE_MODEL, other_model, with_model
 from pam_actuation.replay.plant import PlantReplay, replay_plant
-from pam_actuation.replay.settings import preview_remark, valve_remark
+from pam_actuation.replay.settings import check_given, preview_remark, valve_remark
 from pam_sim.errors import InputError
 from pam_sim.files import whole_file
 
@@ -170,11 +170,13 @@ def replay_run(run: 'RecordedRun', controller: 'Controller | str | os.PathLike[s
     Raises
     ------
     InputError
-        What was asked for cannot be replayed, or nothing can; the controller is unusable.
+        What was asked for cannot be replayed, or nothing can; the controller is unusable, or was
+        loaded for the other valve.
 
     """
     if only is not None and only not in PARTS:
         raise InputError(f'is `{only}`; allowed: {", ".join(PARTS)}', 'only')
+    check_given(run, controller, model)
     preview = () if chain else preview_remark(run, controller)
     result = Replay(counterfactual=controller is not None, start_ns=run.start_ns,
                     remarks=(*recording_remarks([run]), *other_model(run, model),

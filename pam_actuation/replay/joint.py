@@ -40,7 +40,7 @@ from pam_actuation.replay.chain import ChainReplay, recorded_seed, RepeatedLoops
 from pam_actuation.replay.controller import check_rate
 from pam_actuation.replay.joint_controller import replay_joint_controller, states_suffice
 from pam_actuation.replay.model import GIVE_MODEL, other_model, with_model
-from pam_actuation.replay.settings import preview_remark, valve_remark
+from pam_actuation.replay.settings import check_given, preview_remark, valve_remark
 from pam_sim.errors import InputError
 from pam_sim.files import whole_file
 from pam_sim.joint import JointRig, load_joint
@@ -154,10 +154,11 @@ def replay_joint(run: Run, controller: 'Controller | str | os.PathLike[str] | No
     Raises
     ------
     InputError
-        What was asked for cannot be replayed; the controller is unusable, or runs at another
-        rate than the recorded ticks.
+        What was asked for cannot be replayed; the controller is unusable, was loaded for the
+        other valve, or runs at another rate than the recorded ticks.
 
     """
+    check_given(run, controller, model)
     path = str(run.path)
     other = other_model(run, model)     # another joint asks for other commands
     remarks = (*recording_remarks([run]), *other, *valve_remark(controller))

@@ -15,18 +15,22 @@
 """Another tuning for a replay: a controller file, single changed numbers, or both."""
 
 import os
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
+from pam_actuation.control.compiled_controller import CompiledController
 from pam_actuation.control.config import load_controller
+from pam_actuation.control.made_for import check_valve
+from pam_actuation.control.modes.wrapped import WrappedLaw
 from pam_actuation.control.sofc.persistence import NO_FIT
+from pam_sim.declared import check_kind
 from pam_sim.errors import InputError
-from pam_sim.joint import load_rig_or_joint
+from pam_sim.joint import JointRig, load_rig_or_joint
 from pam_sim.located_yaml import dump_yaml, load_yaml
+from pam_sim.rig import Rig
+from pam_sim.run import Run
 
 if TYPE_CHECKING:
     from pam_actuation.control.config import Controller
-    from pam_sim.run import Run
-
 
 OTHER_RULES = ('; the rules have their meaning with the recorded value only: "pam tune" tunes it '
                'with new rules, and "pam simulate --controller FILE" begins with new rules')
@@ -112,3 +116,34 @@ def _number(text: str) -> float | str:
         return float(text)
     except ValueError:
         return text
+
+
+def check_given(run: Any, controller: Any, model: Any) -> None:
+    """
+    Refuse what cannot be replayed together.
+
+    Parameters
+    ----------
+    run : Run
+        A loaded bag.
+    controller : Controller, str, path or None
+        Another controller than that of the bag.
+    model : Rig, JointRig or None
+        Another model than that of the bag.
+
+    Raises
+    ------
+    InputError
+        Something of another kind, or a controller that was loaded for the other valve.
+
+    """
+    check_kind(run, Run, 'run', 'load_run(PATH)')
+    if model is not None:
+        check_kind(model, (Rig, JointRig), 'model', 'model_of(run, NAME)')
+    if controller is None or isinstance(controller, (str, os.PathLike)):
+        return
+    check_kind(controller, (CompiledController, WrappedLaw), 'controller',
+               'load_controller(NAME, rig)')
+    valve = run.metadata.get('valve') or getattr(model, 'valve', '')
+    if valve:
+        check_valve(controller, valve)

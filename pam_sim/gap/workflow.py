@@ -21,6 +21,7 @@ from pathlib import Path
 import time
 from typing import Any
 
+from pam_sim.errors import InputError
 from pam_sim.gap.criteria import CRITERIA, Criteria
 from pam_sim.gap.data.beyond_table import beyond_table
 from pam_sim.gap.data.checked import checked_runs, recording_of
@@ -49,6 +50,7 @@ from pam_sim.gap.verify.materiality import materiality_on
 from pam_sim.gap.verify.validation import Validation
 from pam_sim.rig import Rig
 from pam_sim.run import Run
+from pam_sim.runs_given import check_number, check_question
 
 PULSES = 'The pressure shows single pulses of the valves, so the model follows every pulse.'
 SHORT_STRETCHES = (
@@ -135,10 +137,17 @@ def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
     ------
     InputError
         No recording is given. Two of them, searched or for the validation, are the same one.
-        A name in ``effects`` is unknown.
+        A name in ``effects`` or ``unnamed`` is unknown. A budget, materiality or seed that cannot
+        be; something else in place of a recording or rig.
 
     """
     started = time.perf_counter() - spent_s
+    check_question(runs, rig, seed, certify)
+    check_number(seconds, 'seconds', 0.0)
+    check_number(materiality, 'materiality', 0.0, above=True)
+    for one in unnamed:
+        if one not in UNNAMED:
+            raise InputError(f'has {one!r}; allowed: {", ".join(UNNAMED)}', 'unnamed')
     effects = [effects] if isinstance(effects, str) else effects
     options = Options(effects, seconds, materiality, seed, criteria, started)
     result, found = _answered(runs, rig, certify, options, progress)

@@ -41,6 +41,7 @@ from pam_sim.identify.secant import settle, solve_from
 from pam_sim.identify.settled import beside_settled_zero, with_settled_zero
 from pam_sim.rig import Rig
 from pam_sim.run import Run
+from pam_sim.runs_given import check_number, check_question
 from pam_sim.tolerance import AbsoluteSd, UNKNOWN
 
 # Without a force, both bend the way from pressure to contraction.
@@ -91,6 +92,7 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: str | Sequence[str] =
         force was recorded and an effect is missing.
 
     """
+    check_question(runs, rig, seed)
     progress = _onward(progress)
     unknown = [unknown] if isinstance(unknown, str) else unknown
     added_kg = [added_kg] if isinstance(added_kg, (int, float)) else list(added_kg)
@@ -169,12 +171,14 @@ def _check_masses(added_kg: Sequence[float], count: int, rig: Rig) -> None:
     Raises
     ------
     InputError
-        Another number of masses than of recordings, or a load that has no mass.
+        Another number of masses than of recordings, a negative one, or a load without mass.
 
     """
     if added_kg and len(added_kg) != count:
         raise InputError(f'{len(added_kg)} masses for {count} recordings; give one for each, '
                          '0 for none', 'added mass')
+    for mass_kg in added_kg:
+        check_number(mass_kg, 'added_kg', 0.0)
     if any(added_kg) and 'mass_kg' not in rig.parameters:
         raise InputError(f'{max(added_kg):g} kg hung on load `{rig.load}`, which has no mass; a '
                          'held muscle takes 0', 'added mass')

@@ -177,6 +177,23 @@ def test_what_cannot_be_compared_is_refused_with_a_reason(spoil, word):
     json.dumps(result.to_dict(), allow_nan=False)
 
 
+@pytest.mark.parametrize('wrong, says', [
+    ({'runs': 'runs/first'}, "runs: is 'runs/first'; give what `load_run"),
+    ({'runs': ['first']}, "runs: is 'first'; give what `load_run"),
+    ({'rig': 'mine'}, "rig: is 'mine'; give what `load_rig"),
+    ({'certify': 'second'}, "certify: is 'second'; give what `load_run"),
+    ({'seconds': float('nan')}, 'seconds: is nan; allowed is from 0 on'),
+    ({'seconds': -1.0}, 'seconds: is -1'),
+    ({'materiality': float('nan')}, 'materiality: is nan; allowed is more than 0'),
+    ({'seed': -1}, 'seed: is -1; a whole number'),
+    ({'unnamed': ('name',)}, "unnamed: has 'name'; allowed: term, surrogate")])
+def test_a_question_that_cannot_be_asked_is_refused(wrong, says):
+    """Without a number for the materiality, a gap was none."""
+    asked = {'runs': recorded(nominal(), voltages(12.0)), 'rig': nominal(), **wrong}
+    with pytest.raises(InputError, match=says):
+        find_gap(**asked)
+
+
 def test_one_effect_may_be_given_by_its_name():
     with pytest.raises(InputError, match='unknown effect `hysteresys`'):
         find_gap(recorded(nominal(), voltages(12.0)), nominal(), effects='hysteresys')

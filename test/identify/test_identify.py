@@ -234,6 +234,11 @@ def test_a_stiffness_of_the_muscle_counts_as_spring_where_no_force_is_measured()
 def test_without_a_recording_nothing_is_identified():
     with pytest.raises(InputError, match='at least one recording is needed'):
         identify([], RIG, ['mass_kg'])
+    for runs, rig, seed, says in (('bag', RIG, 0, "runs: is 'bag'; give what `load_run"),
+                                  ([], 'mine', 0, "rig: is 'mine'; give what `load_rig"),
+                                  ([], RIG, -1, 'seed: is -1; a whole number')):
+        with pytest.raises(InputError, match=says):
+            identify(runs, rig, ['mass_kg'], seed=seed)
 
 
 @pytest.mark.parametrize('change, said', [
@@ -252,7 +257,9 @@ def test_a_recording_that_offers_nothing_is_refused(change, said):
     ([], (), 'no number is unknown'), (['mas_kg'], (), 'did you mean `mass_kg`'),
     (['no_effect.size'], (), 'no_effect'), (['creep.sise'], (), 'creep'),
     ('mas_kg', (), 'did you mean `mass_kg`'),
-    (['mass_kg'], (1.0, 2.0), '2 masses for 1 recordings')])
+    (['mass_kg'], (1.0, 2.0), '2 masses for 1 recordings'),
+    (['mass_kg'], -1.0, 'added_kg: is -1; allowed is from 0 on'),
+    (['mass_kg'], float('nan'), 'added_kg: is nan')])
 def test_a_mistake_is_told(unknown, masses, said):
     with pytest.raises(InputError) as caught:
         identify(record(RIG, hold_s=0.3), RIG, unknown, masses)

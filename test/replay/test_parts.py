@@ -229,7 +229,17 @@ def test_what_cannot_be_replayed_is_said_in_a_sentence(runs):
     with pytest.raises(InputError, match='nothing to replay: .* pam replay --model'):
         replay_run(bare, only='plant')
     with pytest.raises(InputError, match='changes nothing'):
-        replay_run(run, controller=object(), only='driver')
+        replay_run(run, controller='pid', only='driver')
+    for wrong, words in (({'controller': 3}, 'controller: is 3; give what `load_controller'),
+                         ({'model': 'mine'}, "model: is 'mine'; give what `model_of")):
+        with pytest.raises(InputError, match=words):
+            replay_run(run, **wrong)
+    with pytest.raises(InputError, match="run: is 'bag'; give what `load_run"):
+        replay_run('bag')
+    other = load_controller('pid_hsv', load_rig('dmsp_5_300_realistic', valve='hsv'))
+    for chain in (True, False):
+        with pytest.raises(InputError, match='was loaded for valve hsv, the rig has ppr'):
+            replay_run(run, other, chain=chain)
     without = Run({k: v for k, v in run.topics.items() if k != 'valve_signal'}, run.metadata,
                   run.namespace, run.path)
     with pytest.raises(InputError, match='valve_signal'):
