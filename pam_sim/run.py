@@ -89,7 +89,8 @@ class Series:
     Raises
     ------
     InputError
-        Stamps that are no whole numbers, such as seconds; a field with another number of samples.
+        Stamps that are no whole numbers, such as seconds; a field with another number of samples,
+        or of something else than numbers.
 
     """
 
@@ -112,6 +113,8 @@ class Series:
             if np.shape(samples) != self.stamp_ns.shape:
                 raise InputError(f'has shape {np.shape(samples)}; one number for each of '
                                  f'{len(self)} stamps is needed', name)
+            if np.asarray(samples).dtype.kind not in 'biuf':
+                raise InputError(f'has type {np.asarray(samples).dtype}; numbers are needed', name)
 
     def __len__(self) -> int:
         """Return the number of messages."""
@@ -429,10 +432,15 @@ class Grid:
     values: dict[str, dict[str, FloatArray]]
 
     def __getitem__(self, key: str | tuple[str, str]) -> Any:
-        """Return one field by ``(topic, field)``, or the dict of a topic."""
-        if isinstance(key, tuple):
-            return self.values[key[0]][key[1]]
-        return self.values[key]
+        """Return one field by ``(topic, field)``, or the dict of a topic; hints at mistakes."""
+        topic, *fields = key if isinstance(key, tuple) else (key,)
+        found: Any = self.values
+        for name in (topic, *fields):
+            if name not in found:
+                raise KeyError(f'{name}{did_you_mean(name, found)}; there are: '
+                               + ', '.join(found))
+            found = found[name]
+        return found
 
     def __contains__(self, topic: object) -> bool:
         """Return whether the topic is on the grid."""

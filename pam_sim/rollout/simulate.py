@@ -20,7 +20,7 @@ import warnings
 import numpy as np
 from numpy.typing import ArrayLike
 from pam_sim.annotations import FloatArray
-from pam_sim.declared import shown
+from pam_sim.declared import number_of, shown
 from pam_sim.effects.registry import own_files
 from pam_sim.errors import InputError
 from pam_sim.load import LOADS
@@ -58,7 +58,11 @@ def prepare(rig: 'Rig', valve_signal: ArrayLike,
             initial: dict[str, Any]) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return (state, par, inputs) of a rollout; arguments and errors as of ``Rig.simulate``."""
     inputs, start = input_array(rig, valve_signal, external_force_n, contraction_m)
-    if start is not None and initial.get('initial_contraction_m') is None:
+    if start is not None:
+        first_m = initial.get('initial_contraction_m')
+        if first_m is not None and number_of(first_m, 'initial_contraction_m') != start:
+            raise InputError(f'is {first_m:g}, and `contraction_m` begins at {start:g} m; leave '
+                             'it out', 'initial_contraction_m')
         initial = {**initial, 'initial_contraction_m': start}
     state, par = rig.pack(dt_s=dt_s, **initial)
     if start is None and not LOADS[rig.load].MOVES_FREELY:

@@ -146,6 +146,16 @@ def test_a_driven_contraction_must_be_one_of_the_muscle(path):
         load_rig('dmsp_5_300_driven').simulate([1.0, 1.0], contraction_m=path)
 
 
+def test_a_driven_contraction_has_one_beginning():
+    """A jump of 10 mm within the first step was a force of 270 N."""
+    rig = load_rig('dmsp_5_300_driven')
+    with pytest.raises(InputError, match='initial_contraction_m: is 0.02, and `contraction_m` '
+                                         'begins at 0.01 m; leave it out'):
+        rig.simulate([3.0, 3.0], contraction_m=0.01, initial_contraction_m=0.02)
+    same = rig.simulate([3.0, 3.0], contraction_m=0.01, initial_contraction_m=0.01)
+    assert np.array_equal(same.outputs, rig.simulate([3.0, 3.0], contraction_m=0.01).outputs)
+
+
 @pytest.mark.parametrize('valve', ['ppr', 'hsv'])
 def test_every_parameter_of_rig_and_effects_refuses_what_is_not_physical(valve):
     rig = load_rig(RIG, valve=valve)

@@ -128,6 +128,17 @@ def test_one_topic_may_be_given_by_its_name():
         assert list(frame) == ['stamp_ns', 'time_s', 'pressure.pressure_pa']
 
 
+def test_a_field_holds_numbers_and_a_wrong_name_is_told():
+    with pytest.raises(InputError, match='force_n: has type <U1; numbers are needed'):
+        Series(np.arange(2), {'force_n': np.array(['a', 'b'])})
+    grid = make_run().on_grid(0.01)
+    with pytest.raises(KeyError, match='pressur .did you mean `pressure`..; there are: '):
+        _ = grid['pressur', 'pressure_pa']
+    with pytest.raises(KeyError, match='pressure_p .did you mean `pressure_pa`..; there are: '):
+        _ = grid['pressure', 'pressure_p']
+    assert grid['pressure']['pressure_pa'] is grid['pressure', 'pressure_pa']
+
+
 def test_no_topics_are_not_all_topics():
     for table in (make_run().to_dataframe, make_run().on_grid):
         with pytest.raises(InputError, match='has no messages'):
