@@ -218,6 +218,16 @@ def test_a_law_without_with_settings_is_refused_in_a_sentence(monkeypatch):
         rebuild(load_controller('pid', StraightRig()), {})
 
 
+def test_rules_are_no_path_and_settings_no_list():
+    controller = load_controller('sofc_ppr', load_rig('dmsp_5_300_realistic'))
+    for take in (controller.take_rules, controller.replace_rules,
+                 lambda rules: controller.with_settings({}, rules)):
+        with pytest.raises(InputError, match=r"rules: is 'my.json'; give what `load_rules\(PATH"):
+            take('my.json')
+    with pytest.raises(InputError, match=r"settings: is \['lead_s'\]; write"):
+        controller.with_settings(['lead_s'])
+
+
 def test_unknown_preset_lists_the_known_ones():
     with pytest.raises(InputError, match='sofc_hsv'):
         load_controller('sofc_xyz', StraightRig())

@@ -33,6 +33,7 @@ from pam_actuation.control.sofc.rule_text import (
     ARRAYS, digest_of, MODEL_NUMBERS, NUMBERS, OLDER_NUMBERS, OPTIONAL, SCHEMA)
 from pam_actuation.control.sofc.settings import FADING_SCALING, PATH_SCALING, SCALING, SETTINGS
 from pam_sim.annotations import FloatArray
+from pam_sim.declared import check_kind
 from pam_sim.errors import InputError
 from pam_sim.files import refuse_pipe
 from pam_sim.keys import Key, names_of
@@ -243,8 +244,9 @@ def check_fit(rules: RuleBase, expected: RuleBase, where: str) -> None:
     """
     Raise InputError unless two rule bases agree in rig, valve, scaling and shapes.
 
-    The sentence names everything that differs.
+    The sentence names everything that differs. What is no rule base is refused as well.
     """
+    check_kind(rules, RuleBase, where, 'load_rules(PATH)')
     differences = _rig_differences(rules.scaling.get('rig'), expected.scaling.get('rig'))
     for key in sorted((set(rules.scaling) | set(expected.scaling)) - {'rig'}):
         mine, other = rules.scaling.get(key), expected.scaling.get(key)
