@@ -19,6 +19,8 @@ import time
 
 LONGEST_S = 0.1         # from then on the driver vents
 SHOWN_S = 60.0
+MEAN_OF = 50            # calls
+WELL_SHARE = 0.8        # of the period, below which a back end keeps up again
 
 
 class Waits:
@@ -35,6 +37,8 @@ class Waits:
     def __init__(self) -> None:
         self.count = 0
         self._longest_s, self._ended_s, self._says = 0.0, -math.inf, ''
+        self._calls, self._mean_s = 0, 0.0
+        self._behind_s, self._behind = 0.0, ''
 
     def note(self, begun_s: float, what: str) -> None:
         """
@@ -50,6 +54,8 @@ class Waits:
         """
         now_s = time.monotonic()
         took_s = now_s - begun_s
+        self._calls = min(self._calls + 1, MEAN_OF)
+        self._mean_s += (took_s - self._mean_s) / self._calls
         if took_s < LONGEST_S:
             return
         self.count += 1
@@ -62,3 +68,28 @@ class Waits:
     def says(self) -> str:
         """Return a sentence on the longest wait that is shown, for a minute after the last one."""
         return self._says if time.monotonic() - self._ended_s <= SHOWN_S else ''
+
+    def behind(self, period_s: float, calls: int, what: str) -> str:
+        """
+        Return a sentence on a back end that takes longer than the period, '' if it keeps up.
+
+        The number in it stays until it grows by half, so that nobody is told of every change.
+
+        Parameters
+        ----------
+        period_s : float
+            In which it is called [s].
+        calls : int
+            How often it is called in a period.
+        what : str
+            Completes the sentence "the back end takes 30 ms to ...".
+
+        """
+        usual_s = calls * self._mean_s
+        if self._calls < MEAN_OF or usual_s < WELL_SHARE * period_s:
+            self._behind = ''
+        elif usual_s > (1.5 * self._behind_s if self._behind else period_s):
+            self._behind_s = usual_s
+            self._behind = (f'the back end takes {1e3 * usual_s:.3g} ms to {what}, longer than '
+                            f'the period of {1e3 * period_s:.3g} ms')
+        return self._behind

@@ -35,6 +35,7 @@ from pam_sim.errors import InputError
 
 WAITED = (', and no sensor was read meanwhile: read must not wait, so read a slow device in a '
           'thread')
+BEHIND = ', so all are sent less often: read a slow device in a thread, or lower publish_rate_hz'
 
 
 class HardwareSensors(ManagedNode):
@@ -113,6 +114,10 @@ class HardwareSensors(ManagedNode):
         problem = problem or readings.no_number(now_ns) or readings.another_clock(now_ns)
         # A sensor may seem silent because the back end waits for another one.
         waited = readings.waits.says and f'{readings.waits.says}{WAITED}'
+        behind = readings.waits.behind(
+            1.0 / self.value('publish_rate_hz'), len(self.sensors.topics), 'read all sensors')
+        if behind and not waited:
+            waited = f'{behind}{BEHIND}'
         seen = readings.jump(now_ns) or readings.was_no_number(now_ns)
         told = [waited, problem or seen]
         if any(told):

@@ -287,10 +287,13 @@ class ValveDriver(ManagedNode):
         if self.output.unvented:
             level = ERROR
             message += f'; {MAY_NOT_BE_VENTED}: {self.output.unvented}'
-        if self.output.waits.says and self.value('backend') not in NO_DEVICE:
+        waits = self.output.waits
+        behind = waits.behind(self.loop.period_s, 1, 'take each signal')
+        if (waits.says or behind) and self.value('backend') not in NO_DEVICE:
             level = max(level, WARN)
-            message += (f'; {self.output.waits.says}, and the driver stood still meanwhile: give '
-                        'write a short time-out')
+            message += (f'; {waits.says}, and the driver stood still meanwhile: give '
+                        'write a short time-out') if waits.says else (
+                            f'; {behind}, so the driver does not keep its rate: use a faster line')
         self.diagnostics.update(level, message, self.loop.values)
 
     def safe_stop(self, why: str) -> None:

@@ -24,6 +24,7 @@ from pam_actuation.drivers.parameter import node_parameter
 from pam_actuation.hardware.valve_output import ValveOutput
 
 BLOCKED, TIMED_OUT, CANCELLED, EXITS = 'blocked', 'timed out', 'cancelled', 'exits'
+SLOW, SLOW_S = 'slow', 0.02
 OPENINGS = ' openings'      # behind one of these: only signals other than 0 V go wrong
 
 
@@ -45,6 +46,8 @@ class WriteOnly(ValveOutput):
                                (CANCELLED, asyncio.CancelledError())):
                 if told.startswith(how):
                     raise error
+        if told == SLOW:
+            time.sleep(SLOW_S)
         while self._told() == BLOCKED:
             time.sleep(0.01)
         put(self._file, ' '.join(f'{effort:g}' for effort in efforts))

@@ -19,7 +19,7 @@ import re
 import signal
 import time
 
-from own_dac import BLOCKED, CANCELLED, EXITS, OPENINGS, TIMED_OUT, WriteOnly
+from own_dac import BLOCKED, CANCELLED, EXITS, OPENINGS, SLOW, TIMED_OUT, WriteOnly
 from pam_actuation.drivers.config import DriverConfig
 from pam_actuation.hardware import back_ends
 from pam_actuation.messages import SAFE_EFFORTS
@@ -249,3 +249,17 @@ def test_a_device_that_blocked_for_a_moment_is_told_as_the_reason(bench, rig):
         'driver itself was stopped' in said.message and words in said.message
         for said in rig.health['valve_driver']), 10.0, 'the reason')
     rig.follows()
+
+
+@pytest.mark.ros
+def test_a_device_slower_than_the_period_is_told(bench, rig):
+    def said():
+        return rig.health['valve_driver'][-1].message
+
+    bench.breaks(SLOW)
+    words = (r'.*; the back end takes [\d.]+ ms to take each signal, longer than the period of '
+             '5 ms, so the driver does not keep its rate: use a faster line')
+    rig.wait_for(lambda: re.fullmatch(words, said()), 10.0, 'the warning')
+    assert rig.health['valve_driver'][-1].level == 1
+    bench.is_well()
+    rig.wait_for(lambda: 'back end' not in said(), 10.0, 'the end of it')

@@ -229,6 +229,27 @@ def test_a_read_that_waits_is_told_for_a_minute(fails, monkeypatch):
     assert read(0.3) == 'the back end took 0.3 s to read force'
 
 
+def test_a_back_end_slower_than_the_period_is_told_until_it_keeps_up(monkeypatch):
+    clock_s = [0.0]
+    monkeypatch.setattr(waits, 'time', SimpleNamespace(monotonic=lambda: clock_s[0]))
+    noted = waits.Waits()
+
+    def behind(call_s, times=400):
+        for _ in range(times):
+            begun_s = clock_s[0]
+            clock_s[0] += call_s
+            noted.note(begun_s, 'read force')
+        return noted.behind(0.004, 3, 'read all sensors')
+
+    assert behind(0.02, 49) == '' and behind(0.001) == ''       # at the start, and kept up
+    said = behind(0.0014)
+    assert said == ('the back end takes 4.2 ms to read all sensors, longer than the period of '
+                    '4 ms')
+    assert behind(0.0016) == said == behind(0.0012)             # no flood of numbers
+    assert behind(0.01).startswith('the back end takes 30 ms')
+    assert behind(0.001) == '' and noted.count == 0 and noted.says == ''
+
+
 def with_topics(topics):
     """Return a back end that publishes some topics, and notes that it was closed."""
     class Board(SensorInput):
