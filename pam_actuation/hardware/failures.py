@@ -38,7 +38,10 @@ def device_error(error: BaseException, back_end: 'type[ValveOutput] | type[Senso
     """
     if isinstance(error, DeviceError):
         return error
-    problem = f'{type(error).__name__}: {error}'.rstrip(': ')
+    name = type(error).__name__
+    if name == 'error':         # as of struct and termios
+        name = f'{type(error).__module__}.{name}'
+    problem = f'{name}: {error}'.rstrip(': ')
     if not isinstance(error, OSError):
         last = traceback.extract_tb(error.__traceback__)[-1]
         problem += f' ({Path(last.filename).name}:{last.lineno})'

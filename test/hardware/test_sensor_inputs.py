@@ -16,6 +16,7 @@
 
 from contextlib import suppress
 import math
+import struct
 from types import SimpleNamespace
 
 from fake_sysfs import make_adc, put
@@ -108,18 +109,18 @@ class SlowCell(SensorInput):
 def test_only_what_is_new_is_taken_with_the_time_it_was_measured():
     begin_ns, ms = 1_700_000_000 * 10 ** 9, 10 ** 6
     given = [None, (5.0, begin_ns + ms), (5.0, begin_ns + ms), (5.0, begin_ns + 9 * ms),
-             OSError('gone'), SystemExit(3), 'text', 7]
+             OSError('gone'), SystemExit(3), 'text', struct.error('4 bytes'), 7]
     readings = NewReadings(SlowCell({'next': given}), begin_ns)
-    now_ns = [begin_ns + k * 4 * ms for k in range(1, 9)]
+    now_ns = [begin_ns + k * 4 * ms for k in range(1, 10)]
     assert [readings.take('force', now_ns[k]) for k in range(4)] == [
         None, (5.0, begin_ns + ms), None, (5.0, begin_ns + 9 * ms)]
     for k, words in ((4, 'back end SlowCell: OSError: gone'), (5, 'SystemExit: 3'),
-                     (6, 'could not convert')):
+                     (6, 'could not convert'), (7, 'struct.error: 4 bytes')):
         with pytest.raises(DeviceError, match=words):
             readings.take('force', now_ns[k])
-    assert readings.take('force', now_ns[7]) == (7.0, now_ns[7])
+    assert readings.take('force', now_ns[8]) == (7.0, now_ns[8])
     given += [7.5, None, None]
-    back_ns = now_ns[7] - 3600 * 1000 * ms          # a clock that was set back
+    back_ns = now_ns[8] - 3600 * 1000 * ms          # a clock that was set back
     assert readings.take('force', back_ns) == (7.5, back_ns)
     now_ns[7] = back_ns
     assert readings.take('force', now_ns[7] + 900 * ms) is None
