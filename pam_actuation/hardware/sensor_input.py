@@ -26,6 +26,7 @@ from types import MappingProxyType
 from typing import Any
 
 from pam_actuation.hardware.failures import device_error
+from pam_actuation.hardware.reading_rate import NEEDED_OF, ReadingRate
 from pam_actuation.hardware.sysfs import DeviceError
 from pam_actuation.hardware.waits import Waits
 from pam_sim.parameters import Parameter
@@ -122,6 +123,7 @@ class NewReadings:
     def __init__(self, sensors: SensorInput, begin_ns: int) -> None:
         self._sensors, self.waits = sensors, Waits()
         self._newest_ns = dict.fromkeys(sensors.topics, begin_ns)
+        self._rates = {topic: ReadingRate(topic) for topic in NEEDED_OF}
         self._last_ns: dict[str, int] = {}                  # stamp
         self._finite: dict[str, tuple[float, int]] = {}     # value and stamp
 
@@ -154,6 +156,8 @@ class NewReadings:
             if now_ns - self._newest_ns[topic] > LONGEST_WAIT_NS:
                 raise DeviceError(f'no new value for {LONGEST_WAIT_NS // 10 ** 9} s', topic)
             return None
+        if topic in self._rates:
+            self._rates[topic].count(now_ns)
         if abs(now_ns - stamp_ns) > ANOTHER_CLOCK_NS:
             # Published all the same: of a pressure that arrives and is too old, the driver vents.
             self._timed = self.another_clock(now_ns) or (       # no flood of numbers
@@ -194,6 +198,11 @@ class NewReadings:
         topic, value = self._no_number
         recent = 0 <= now_ns - self._no_number_ns <= SHOWN_NS
         return f'{topic} read {value} within the last minute' if recent else ''
+
+    @property
+    def slow(self) -> str:
+        """Return a sentence on new values that come too seldom, '' if none do."""
+        return next((rate.says for rate in self._rates.values() if rate.says), '')
 
     def another_clock(self, now_ns: int) -> str:
         """Return a sentence on readings of the last second stamped by another clock, else ''."""

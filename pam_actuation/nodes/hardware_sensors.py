@@ -119,7 +119,7 @@ class HardwareSensors(ManagedNode):
         if behind and not waited:
             waited = f'{behind}{BEHIND}'
         seen = readings.jump(now_ns) or readings.was_no_number(now_ns)
-        told = [waited, problem or seen]
+        told = [waited, problem or seen or ('' if waited else readings.slow)]
         if any(told):
             self.diagnostics.update(
                 ERROR if problem else WARN, '; '.join(text for text in told if text))

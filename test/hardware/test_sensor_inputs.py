@@ -251,6 +251,32 @@ def test_a_back_end_slower_than_the_period_is_told_until_it_keeps_up(monkeypatch
     assert behind(0.001) == '' and noted.count == 0 and noted.says == ''
 
 
+@pytest.mark.parametrize('topic, told', [('contraction', True), ('force', False)])
+def test_new_values_that_come_too_seldom_are_told_until_they_come_faster(topic, told):
+    now_ns, every_ns = 1_700_000_000 * 10 ** 9, 4 * 10 ** 6
+    cell = SlowCell({})
+    cell.topics = (topic,)
+    readings = NewReadings(cell, now_ns)
+
+    def after(seconds, share):
+        """Ask at 250 Hz, where one of ``share`` values is new."""
+        nonlocal now_ns
+        for k in range(round(250 * seconds)):
+            now_ns += every_ns
+            cell.read = lambda topic, k=k: None if k % share else 0.001
+            readings.take(topic, now_ns)
+        return readings.slow
+
+    assert after(5, 1) == ''
+    said = after(5, 6)                      # 42 Hz
+    assert bool(said) == told
+    if told:
+        assert said == 'contraction has a new value at 42 Hz only, needed are 100 Hz or more'
+    assert after(5, 7) == said and after(5, 1) == ''        # no flood of numbers
+    now_ns += 10 ** 9
+    assert after(5, 1) == ''
+
+
 def with_topics(topics):
     """Return a back end that publishes some topics, and notes that it was closed."""
     class Board(SensorInput):
