@@ -68,8 +68,9 @@ class Weighted:
         Unknown ones first.
     temper : list of numpy.ndarray
         By how much the weight of each signal is lowered, by subsystem.
-    incomplete : bool
-        Whether the model misses an effect: what is left beyond noise then weighs less.
+    incomplete : frozenset of str
+        Subsystems in which the model misses an effect: what is left there beyond noise weighs
+        less.
 
     """
 
@@ -77,7 +78,7 @@ class Weighted:
     problems: Sequence[SubsystemProblem]
     numbers: Sequence[Number]
     temper: list[FloatArray] = field(default_factory=list)
-    incomplete: bool = False
+    incomplete: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         """Start from full weights."""
@@ -218,7 +219,7 @@ class Weighted:
         for s in range(len(problem.signals)):
             chosen = errors[(problem.signal == s) & used(problem)]
             square = float(np.mean(chosen ** 2))
-            if self.incomplete:
+            if problem.subsystem in self.incomplete:
                 found[s] = max(found[s], (square - 1.0) * chosen.size / FORMS)
             elif square < 1.0:      # the floor is too careful; an effect may hide below it
                 found[s] *= max(square, own[s])

@@ -17,7 +17,7 @@ Effects that may be in the recordings although nobody named them.
 
 An effect that the model misses bends the numbers: a dead time looks like a longer time constant.
 Where the calibrated model leaves more than noise, the effects of the library are therefore
-fitted along with the numbers. Each has a prior about zero as wide as its typical size. What they
+fitted along with the numbers: those of the valve, those of muscle and load, or both. Each has a prior about zero as wide as its typical size. What they
 could explain widens the intervals. Their sizes are no result: ``pam gap`` names effects, and
 proves them.
 
@@ -52,23 +52,24 @@ BETTER = 0.02                # of the sum of logarithms of misfits
 AS_GOOD = 0.3                # the same, within which formulations explain about as much
 
 
-def is_incomplete(weighted: Weighted, x: FloatArray) -> bool:
+def incomplete_subsystems(weighted: Weighted, x: FloatArray) -> frozenset[str]:
     """
-    Tell whether a fitted model leaves more than noise in some signal.
+    Return the subsystems in which a fitted model leaves more than noise in some signal.
 
     An effect smaller than the noise shows by its memory. What is left then stays alike for many
     samples. Noise of the averaged pressure does not last that long. What a recording without noise
     leaves stays alike too; far below the noise it says nothing.
     """
-    squares = [square for _, _, square in weighted.mean_squares(x)]
-    return any(square > SEEN_FLOORS2 or square > MATTERS_FLOORS2 and memory > LASTING
-               for square, memory in zip(squares, weighted.memories(x)))
+    return frozenset(
+        p.subsystem for (p, _, square), memory in zip(
+            weighted.mean_squares(x), weighted.memories(x))
+        if square > SEEN_FLOORS2 or square > MATTERS_FLOORS2 and memory > LASTING)
 
 
 def possible_effects(rig: Rig, problems: Sequence[SubsystemProblem], numbers: Sequence[Number]
                      ) -> list[Number]:
     """
-    Return the effects that may be missing, as numbers with a prior about zero.
+    Return the effects that may be missing in subsystems, as numbers with a prior about zero.
 
     Formulations of the same name, and what stands in the rig or among ``numbers``, are left out.
     So are sensors: they count as calibrated, unless their zero is asked for. An effect that acts
@@ -149,7 +150,7 @@ def in_other_forms(weighted: Weighted, x: FloatArray, count: int,
             if not fresh or base.rig.valve not in form.valves or form.name in there:
                 continue
             other = Weighted(base.rig, base.problems, [base.numbers[k] for k in kept] + fresh,
-                             base.temper, True)
+                             base.temper, base.incomplete)
             at = np.concatenate([start[kept], [
                 old.get(n.parameter, 0.0 if n.shape else SMALL) for n in fresh]])
             at = np.clip(at, other.low, other.high)

@@ -32,7 +32,7 @@ from pam_sim.identify.inputs import noise_beyond
 from pam_sim.identify.judgement import DETERMINED, is_at_edge, judge, UNDETERMINED
 from pam_sim.identify.numbers import known_numbers_of, Number, with_unknown, with_values
 from pam_sim.identify.possible import (
-    in_other_forms, is_incomplete, possible_effects, SEEN_FLOORS2)
+    in_other_forms, incomplete_subsystems, possible_effects, SEEN_FLOORS2)
 from pam_sim.identify.profile import Interval, profile
 from pam_sim.identify.records import offers_of, problems_of
 from pam_sim.identify.remarks import ANOTHER_LAW, of_one_scale, remarks_on, Squares
@@ -110,10 +110,11 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: str | Sequence[str] =
     before = _rms(weighted.mean_squares(np.zeros(len(numbers))))
     x = fit(weighted, seed, _part(progress, 0.0, 0.3))
     progress(0.3)
-    incomplete = is_incomplete(weighted, x)
+    incomplete = incomplete_subsystems(weighted, x)
     force_compared = any('force' in p.signals for p in problems)
+    missing = [p for p in problems if p.subsystem in incomplete]
     law = [n.name for n in acting if n.of_law]
-    if law and incomplete and not force_compared:
+    if any(n.of_law and n.acts_in(p) for n in acting for p in missing) and not force_compared:
         if len(law) == len(wanted):
             raise InputError(f'{LAW_AND_EFFECT}; record a force, or let pam gap fit both',
                              'force law')
@@ -126,8 +127,8 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: str | Sequence[str] =
         return found
     forms: FloatArray = np.zeros(len(acting))       # doubt by the formulation, in coordinates
     if incomplete:
-        possible = possible_effects(rig, problems, numbers)
-        weighted = Weighted(rig, problems, [*numbers, *possible], incomplete=True)
+        possible = possible_effects(rig, missing, numbers)
+        weighted = Weighted(rig, problems, [*numbers, *possible], incomplete=incomplete)
         x = np.concatenate([x, np.zeros(len(possible))])
         weighted, x, forms = _in_each_form(
             weighted, x, len(acting), _part(progress, 0.3, 0.6))
@@ -145,7 +146,7 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: str | Sequence[str] =
     result = Identification(
         _identified(rig, numbers_found), numbers_found, combinations,
         [{'path': one.path, 'kind': one.kind, 'added_kg': one.added_kg} for one in offers],
-        _signals(before, _rms(squares)), incomplete, [n.name for n in wanted], bent=bent)
+        _signals(before, _rms(squares)), bool(incomplete), [n.name for n in wanted], bent=bent)
     result.remarks += [
         *(f'{one.path}: {one.rest.text()}' for one in offers if one.rest),
         *of_commands, *of_offers, *([] if force_compared else of_one_scale(acting)),

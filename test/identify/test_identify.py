@@ -215,6 +215,20 @@ def test_a_missing_effect_widens_the_intervals_and_is_said():
     assert inside(found['mass_kg'], 3.3)
 
 
+def test_an_effect_of_the_valve_leaves_muscle_and_load_as_without_a_command():
+    """The pressure is measured, so what the valve does bends no mass and widens no interval."""
+    late = RIG.with_(effects=[{'name': 'valve_dead_time', 'parameters': {'delay_s': 0.04}}])
+    with_command, without = (
+        identify(record(late, hold_s=0.8, keep=('pressure', 'contraction'), command=command),
+                 RIG, ['mass_kg', 'K_m'], advise=False) for command in (True, False))
+    assert with_command.incomplete and not without.incomplete
+    mass, alone = with_command['mass_kg'], without['mass_kg']
+    assert inside(mass, 5.0) and with_command['K_m'].status == 'determined'
+    assert mass.value == pytest.approx(alone.value, rel=1e-3)
+    assert (mass.interval.high - mass.interval.low) < 1.2 * (
+        alone.interval.high - alone.interval.low)
+
+
 def test_nothing_is_missing_where_far_less_than_the_noise_is_left():
     found = identify(record(RIG, hold_s=1.0, noise=0.0), RIG, ['mass_kg'])
     assert not found.incomplete and inside(found['mass_kg'], 5.0)
