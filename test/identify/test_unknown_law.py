@@ -16,6 +16,7 @@
 
 import math
 from types import SimpleNamespace
+import warnings
 
 from made_records import inside, record, RIG
 import numpy as np
@@ -27,6 +28,7 @@ from pam_sim.identify.before_gap import numbers_first
 from pam_sim.identify.numbers import unknown_numbers
 from pam_sim.identify.possible import possible_effects
 from pam_sim.identify.records import offer_of, problems_of
+from pam_sim.muscle.law import ExtrapolationWarning
 from pam_sim.run import Series
 from pam_sim.units import P_ATM_PA
 import pytest
@@ -193,3 +195,16 @@ def test_an_unknown_held_length_stays_within_the_stroke_of_the_muscle():
     found = identify(run, ISOMETRIC, ['contraction_m'], advise=False)
     assert inside(found['contraction_m'], 0.02)
     assert found['contraction_m'].interval.high <= stroke_m
+
+
+def test_a_trial_beyond_a_table_is_not_told_and_a_recording_is():
+    rig = RIG.with_(muscle=RIG.muscle.with_law('lookup'))
+    valve = record(rig, gauge_pa=(50e3, 400e3), keep=('pressure',))
+    high = record(rig, gauge_pa=(50e3, 600e3, 0.0), hold_s=1.0, zero_pa=20e3,
+                  keep=('pressure', 'contraction'))
+    with warnings.catch_warnings():
+        warnings.simplefilter('error', ExtrapolationWarning)
+        inside = identify(valve, rig, ['K_m'], advise=False)      # 10 to 500 kPa/V are tried
+        outside = identify(high, rig, ['mass_kg'], advise=False)
+    assert inside['K_m'].status == 'determined' and not inside.remarks
+    assert sum('is outside the table of law `lookup`' in one for one in outside.remarks) == 1

@@ -28,8 +28,8 @@ LEAVES = ('In {:.3g} % of the recorded time pressure or contraction is {}. What 
 
 def beyond_table(recordings: Iterable[Recording], rig: Rig) -> list[str]:
     """Return a sentence where recordings leave the table of the rig's force law, or none."""
-    law = rig.muscle.law.law
-    if law.EXTRAPOLATES:
+    law, recordings = rig.muscle.law.law, list(recordings)
+    if law.EXTRAPOLATES or not recordings:
         return []
     beyond = np.concatenate([law.outside(
         np.maximum(one.measured['pressure'] - P_ATM_PA, 0.0),
