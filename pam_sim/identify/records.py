@@ -26,7 +26,7 @@ from pam_sim.gap.data.health import missed_pulses
 from pam_sim.gap.data.holes import stretches
 from pam_sim.gap.data.noise import noise_of
 from pam_sim.gap.data.recording import Recording
-from pam_sim.gap.data.resting import Rest, rest_of, ZERO
+from pam_sim.gap.data.resting import at_rest_m, Rest, rest_of
 from pam_sim.gap.data.signals import FIELD, ordered, recorded_valve, SIGNALS, tells_of
 from pam_sim.gap.subsystems.mechanics import MechanicsProblem
 from pam_sim.gap.subsystems.problem import SubsystemProblem
@@ -239,8 +239,9 @@ def _never_lifted(run: Run, rig: Rig) -> bool:
 
     In a simulation the load cell reads the weight there. On a real rig it reads the muscle.
     """
-    contraction = ordered(run['contraction'], FIELD['contraction'])[1] - rig.number(ZERO)
-    if np.median(np.abs(contraction)) > CRITERIA.rest_stroke_share * rig.muscle.stroke_m:
+    reach_m = CRITERIA.rest_stroke_share * rig.muscle.stroke_m
+    contraction = ordered(run['contraction'], FIELD['contraction'])[1]
+    if np.median(np.abs(contraction - at_rest_m(contraction, rig, reach_m, CRITERIA))) > reach_m:
         return False
     at, pressure = ordered(run['pressure'], FIELD['pressure'])
     stamp, force = ordered(run['force'], FIELD['force'])

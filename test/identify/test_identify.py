@@ -26,6 +26,7 @@ from pam_sim.identify.numbers import with_unknown
 from pam_sim.identify.records import offer_of, offers_of, ONE_LENGTH
 from pam_sim.identify.remarks import remarks_on
 from pam_sim.run import Run, Series
+from pam_sim.tolerance import UNKNOWN
 import pytest
 
 
@@ -140,6 +141,10 @@ def test_a_load_that_was_never_lifted_is_no_muscle_at_a_held_length():
     assert (offer.valve, offer.mechanics) == (True, False)
     assert offer.kind.startswith('valve; muscle and load are left out: ')
     assert 'the load was never lifted; raise the pressure' in offer.kind
+    read_m = low.topics['contraction'].values['contraction_m']
+    read_m += 0.001
+    assert offer_of(low, RIG.with_(tolerance={'contraction_zero_m': UNKNOWN})).kind == offer.kind
+    read_m -= 0.001
     found = identify(low, RIG, ['law'])
     assert found.found == [] and 'record a contraction that moves' in found.text()
     assert inside(identify([low, record(RIG)], RIG, ['mass_kg'])['mass_kg'], 5.0)

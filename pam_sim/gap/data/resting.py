@@ -104,7 +104,7 @@ def rest_of(run: Run, rig: Rig, criteria: Criteria = CRITERIA, added_kg: float =
     if min(stamp.size, at.size) < LEAST_SAMPLES:
         return None
     reach = criteria.rest_stroke_share * rig.muscle.stroke_m
-    moved = np.interp(stamp, at, contraction - _at_rest_m(contraction, rig, reach, criteria))
+    moved = np.interp(stamp, at, contraction - at_rest_m(contraction, rig, reach, criteria))
     resting = np.abs(moved) <= reach
     least = _weight_n(rig, added_kg, criteria)
     line = _carried_n(moved[~resting], force[~resting], criteria)
@@ -123,11 +123,23 @@ def rest_of(run: Run, rig: Rig, criteria: Criteria = CRITERIA, added_kg: float =
                 stamp[resting], known)
 
 
-def _at_rest_m(contraction_m: FloatArray, rig: Rig, reach_m: float, criteria: Criteria) -> float:
+def at_rest_m(contraction_m: FloatArray, rig: Rig, reach_m: float, criteria: Criteria) -> float:
     """
     Return what the sensor reads at zero contraction [m].
 
     Where that is not known well enough to tell a load at rest, it is the lowest that was read.
+
+    Parameters
+    ----------
+    contraction_m : numpy.ndarray
+        All readings.
+    rig : pam_sim.Rig
+        Tells the zero, and how well it is known.
+    reach_m : float
+        Contraction up to which a load may rest.
+    criteria : Criteria
+        Decision thresholds.
+
     """
     if ZERO not in rig.unknown and criteria.certain_sd * rig.prior_sd(ZERO) <= reach_m:
         return rig.number(ZERO)
