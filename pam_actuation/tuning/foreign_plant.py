@@ -36,6 +36,8 @@ from pam_sim.annotations import FloatArray
 from pam_sim.declared import shown
 from pam_sim.errors import InputError
 from pam_sim.records import cells, size_of
+from pam_sim.rollout.simulate import STRAIN_RANGE
+from pam_sim.units import HIGHEST_PA, LOWEST_PA
 
 if TYPE_CHECKING:
     from pam_actuation.control.compiled_controller import CompiledController
@@ -93,7 +95,8 @@ class ForeignLoop(ClosedLoop):
     ------
     InputError
         As of ``ClosedLoop``, or a plant instead of what returns one; from ``run``, as of
-        ``check_plant``, or where the plant becomes something that is not finite.
+        ``check_plant``, or where the plant becomes something that is not finite, or contracts
+        by more than a muscle of ``rig`` can, as in mm.
 
     """
 
@@ -155,7 +158,14 @@ class ForeignLoop(ClosedLoop):
                           if self.hsv else 0.0, measured_m)
         if not np.all(np.isfinite(rows)):
             raise InputError('becomes something that is not finite', 'plant')
-        return log.view(LOG)
+        found = log.view(LOG)
+        low, high = (share * self.rig.muscle.length_m for share in STRAIN_RANGE)
+        reached_m = found['contraction_m']
+        if reached_m.min() < low or reached_m.max() > high:
+            raise InputError(
+                f'has contraction_m from {reached_m.min():.3g} to {reached_m.max():.3g}; a muscle '
+                f'of {self.rig.muscle.length_m:g} m allows {low:g} to {high:g} m', 'plant')
+        return found
 
 
 def check_plant(plant: ForeignPlant) -> None:
@@ -165,7 +175,8 @@ def check_plant(plant: ForeignPlant) -> None:
     Raises
     ------
     InputError
-        A reading is no number, the method `step` is missing, or the step is another one.
+        A reading is no number, the pressure is not absolute and in Pa, the method `step` is
+        missing, or the step is another one.
 
     """
     for name in _NUMBERS:
@@ -177,6 +188,9 @@ def check_plant(plant: ForeignPlant) -> None:
     if not callable(getattr(plant, 'step', None)):
         raise InputError('has no method `step`; write `step(signal, external_force_n=0.0, *, '
                          'steps=1)`', 'plant')
+    if not LOWEST_PA <= float(plant.pressure_pa) <= HIGHEST_PA:
+        raise InputError(f'has pressure_pa = {shown(plant.pressure_pa)}; allowed is {LOWEST_PA:g} '
+                         f'to {HIGHEST_PA:g}, absolute and in Pa', 'plant')
     if plant.dt_s != PHYSICS_S:
         raise InputError(f'steps by {plant.dt_s:g} s, allowed is {PHYSICS_S:g} s', 'plant')
 

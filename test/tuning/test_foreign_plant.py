@@ -142,6 +142,14 @@ def test_a_plant_that_does_not_fit_is_refused(rig):
     controller = load_controller(f'sofc_{rig.valve}', rig)
     with pytest.raises(InputError, match='not finite'):
         ForeignLoop(Broken, rig, MOTION).run(controller)
+    for pressure_pa in (101.325, 0.0, math.nan):
+        other = type('Other', (Broken,), {'pressure_pa': pressure_pa})
+        with pytest.raises(InputError, match='has pressure_pa = .*, absolute and in Pa'):
+            ForeignLoop(other, rig, MOTION).run(controller)
+    in_mm = type('InMillimetres', (Broken,), {
+        'step': lambda self, *_, **__: setattr(self, 'contraction_m', 12.0)})
+    with pytest.raises(InputError, match='has contraction_m from 0 to 12; a muscle of 0.3 m allo'):
+        ForeignLoop(in_mm, rig, MOTION).run(controller)
     coarse = type('Coarse', (Broken,), {'dt_s': 2e-3})
     with pytest.raises(InputError, match='steps by 0.002 s, allowed is 0.001 s'):
         ForeignLoop(coarse, rig, MOTION).run(controller)
