@@ -32,7 +32,8 @@ from pam_actuation.control.modes.tracked import CONTRACTION
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.messages import VALVE_NAMES
 from pam_actuation.tuning.cost import tracking_cost
-from pam_actuation.tuning.loop_checks import check_controller, check_free, check_parts
+from pam_actuation.tuning.loop_checks import (
+    check_controller, check_drivers, check_free, check_parts)
 from pam_actuation.tuning.loop_parts import DISTURBANCE, Driver
 from pam_actuation.tuning.loop_setup import (
     Course, DriverLaw, first_periodic_tick, fresh_rise, latency_steps,
@@ -159,6 +160,8 @@ class MuscleLoop:
             preview_s, slow_start)
         from pam_sim.rig import Rig
         check_parts(rig, Rig, experiment, self.DOMAIN)
+        if driver is not None:
+            check_drivers([driver], 1, 'driver')
         steps = steps_per_tick(rate_hz)
         check_whole(seed, 0, 'seed')
         self.rig = rig

@@ -28,7 +28,8 @@ from pam_actuation.control.modes.joint import COMMANDS, JOINT_INPUT
 from pam_actuation.control.modes.tracked import JOINT
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.tuning.cost import tracking_cost
-from pam_actuation.tuning.loop_checks import check_not_negative, check_parts, check_wrapped
+from pam_actuation.tuning.loop_checks import (
+    check_drivers, check_not_negative, check_parts, check_wrapped)
 from pam_actuation.tuning.loop_parts import Driver, JOINT_READINGS, READINGS
 from pam_actuation.tuning.loop_setup import (
     Course, DriverLaw, first_periodic_tick, fresh_rise, latency_steps,
@@ -93,6 +94,8 @@ class JointLoop:
                  preview_s: float = math.inf, slow_start: bool = False) -> None:
         from pam_sim.joint.rig import JointRig
         check_parts(joint, JointRig, experiment, JOINT.topic)
+        if drivers is not None:
+            check_drivers(drivers, len(joint.muscles), 'drivers')
         check_not_negative(angle_noise_rad, 'angle_noise_rad', 'rad')
         check_not_negative(angle_step_rad, 'angle_step_rad', 'rad')
         experiment.check_reachable(joint)

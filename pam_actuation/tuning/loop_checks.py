@@ -21,7 +21,8 @@ from pam_actuation.control.compiled_controller import CompiledController
 from pam_actuation.control.made_for import check_valve
 from pam_actuation.control.modes.tracked import Tracked, tracked_by
 from pam_actuation.control.modes.wrapped import WrappedLaw
-from pam_sim.declared import check_kind, number_of
+from pam_actuation.drivers.config import DriverConfig
+from pam_sim.declared import check_kind, number_of, shown
 from pam_sim.errors import InputError
 
 if TYPE_CHECKING:
@@ -58,6 +59,32 @@ def check_parts(rig: Any, kind: type, experiment: Any, domain: str) -> None:
     if experiment.domain != domain:
         raise InputError(f'experiment {experiment.name} is in {experiment.domain}; this loop '
                          f'tracks {domain}')
+
+
+def check_drivers(drivers: Any, count: int, name: str) -> None:
+    """
+    Refuse what is no driver's knowledge for each muscle.
+
+    Parameters
+    ----------
+    drivers : sequence of DriverConfig
+        One for each muscle.
+    count : int
+        Number of muscles.
+    name : str
+        Name of the argument, for the message.
+
+    Raises
+    ------
+    InputError
+        Another number of them, or something else.
+
+    """
+    if not isinstance(drivers, Sequence) or len(drivers) != count:
+        raise InputError(f'is {shown(drivers)}; give {count}, as `driver_config(rig)` returns',
+                         name)
+    for one in drivers:
+        check_kind(one, DriverConfig, name, 'driver_config(rig)')
 
 
 def check_tracking(rigs: Sequence[Any], experiments: Sequence[Any], controller: Any) -> None:

@@ -207,6 +207,7 @@ def test_only_a_controller_of_the_valve_and_the_quantity_runs(loop):
 @pytest.mark.parametrize('wrong, told', [
     ({'latency_s': 0.01}, r'latency_s: is 0.01 s; allowed is 0 to less than .* 0.005 s'),
     ({'latency_s': -0.001}, 'latency_s: is -0.001 s'),
+    ({'driver': 3}, r'driver: is 3; give what `driver_config\(rig\)` returns'),
     ({'latency_s': 'x'}, "`latency_s` is 'x'; a number is needed"),
     ({'preview_s': 'x'}, "`preview_s` is 'x'; a number is needed"),
     ({'rate_hz': 'x'}, "`rate_hz` is 'x'; a number is needed"),

@@ -216,6 +216,9 @@ def test_what_cannot_be_tracked_is_refused():
     for wrong in ('x', np.zeros(2), lambda t: 'x'):
         with pytest.raises(InputError, match='contraction_m: is .* at 0 s; a number is needed'):
             ForceLoop(rig.with_(load='driven'), sine, contraction_m=wrong)
+    for drivers in ([driver_config(rig)], [3, 4], 3):
+        with pytest.raises(InputError, match=r'drivers: is .*as|drivers: is 3; give what'):
+            JointLoop(joint, load_experiment('joint_sine'), drivers=drivers)
     for wrong in ({'angle_noise_rad': np.nan}, {'angle_step_rad': -1.0}):
         with pytest.raises(InputError, match='rad; allowed is 0 or more'):
             JointLoop(joint, load_experiment('joint_sine'), **wrong)
