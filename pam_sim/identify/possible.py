@@ -17,9 +17,9 @@ Effects that may be in the recordings although nobody named them.
 
 An effect that the model misses bends the numbers: a dead time looks like a longer time constant.
 Where the calibrated model leaves more than noise, the effects of the library are therefore
-fitted along with the numbers: those of the valve, those of muscle and load, or both. Each has a prior about zero as wide as its typical size. What they
-could explain widens the intervals. Their sizes are no result: ``pam gap`` names effects, and
-proves them.
+fitted along with the numbers: those of the valve, those of muscle and load, or both. Each has a
+prior about zero as wide as its typical size. What they could explain widens the intervals. Their
+sizes are no result: ``pam gap`` names effects, and proves them.
 
 The hidden effect has a formulation of its own. Those that matter are therefore fitted in all
 formulations of the library, with their shapes free. The best one stays, with free shapes where

@@ -88,9 +88,9 @@ def of_one_scale(acting: Sequence[Number]) -> list[str]:
 
 def _starting_values(left: Squares, names: Sequence[str]) -> list[str]:
     """Return a sentence on the numbers that what is missing has bent."""
-    return [f'{", ".join(names)}: a starting value, which stays unknown in the rig file. No effect '
-            f'of the library explains what is left of {_rests(left)}. pam gap fits it beside what '
-            'is missing'] if names else []
+    return [f'{", ".join(names)}: a starting value, which stays unknown in the rig file. No '
+            f'effect of the library explains what is left of {_rests(left)}. pam gap fits it '
+            'beside what is missing'] if names else []
 
 
 def _wider(left: Squares, names: Sequence[str]) -> list[str]:

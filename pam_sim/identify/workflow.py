@@ -163,7 +163,8 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: str | Sequence[str] =
     result.remarks += [
         *(f'{one.path}: {one.rest.text()}' for one in offers if one.rest),
         *of_commands, *of_offers,
-        *beyond_table([one.recording for one in offers if one.mechanics], rig), *([] if force_compared else of_one_scale(acting)),
+        *beyond_table([one.recording for one in offers if one.mechanics], rig),
+        *([] if force_compared else of_one_scale(acting)),
         *remarks_on(rig, problems, wanted, numbers_found, left, at_rest)]
     # What ends at the edge of its range, or was bent, needs another model, not another recording.
     closed = [one.number.name for one in numbers_found if not one.is_open]
