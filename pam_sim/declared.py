@@ -76,8 +76,13 @@ def check_whole(value: Any, lowest: int, name: str) -> None:
 
 def check_mapping(value: Any, name: str, form: str = "{'NAME': NUMBER}") -> None:
     """Raise InputError for what is no mapping with texts as keys, placed at a name."""
-    if not (isinstance(value, Mapping) and all(isinstance(key, str) for key in value)):
-        raise InputError(f'is {shown(value)}; write `{form}`', name)
+    if isinstance(value, (dict, Mapping)):      # `dict` first: to ask a protocol takes longer
+        for key in value:
+            if not isinstance(key, str):
+                break
+        else:
+            return
+    raise InputError(f'is {shown(value)}; write `{form}`', name)
 
 
 def check_kind(value: Any, kind: Any, name: str, call: str) -> None:

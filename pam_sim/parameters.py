@@ -137,7 +137,7 @@ def check_given(
     """
     known = {parameter.name: parameter for parameter in parameters}
     place = getattr(values, 'where', where)
-    if not isinstance(values, Mapping):
+    if not isinstance(values, (dict, Mapping)):
         one, of, rest = what.partition(' of ')
         check_mapping(values, where if isinstance(where, str) and where else f'{one}s{of}{rest}')
     result = {}
