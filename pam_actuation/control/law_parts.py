@@ -16,8 +16,9 @@
 
 import math
 
+import numpy as np
 from pam_actuation.control.inputs import MAX_AGE_S
-from pam_sim.compiled import compiled
+from pam_sim.compiled import compiled, inlined
 from pam_sim.units import P_ATM_PA
 
 _OFFSET_FLOOR_M = 1e-9    # then it is gone, before it becomes a denormal number
@@ -89,6 +90,22 @@ def held_offset(
     return away_m - error_m * (time_s / (time_s + period_s))
 
 
+@inlined
+def tracked(par: np.record, st: np.record, inp: np.record, period_s: float
+            ) -> tuple[float, float]:
+    """
+    Return the error [m] and the offset of a bumpless start [m], and let that fade.
+
+    Records have the fields of ``PARAMETERS`` and ``STATE`` of a law, and of ``inputs.INPUT``.
+    """
+    offset = held_offset(st.offset_m, inp.held_back, inp.reference_m - inp.contraction_m,
+                         st.error_m, par.start_time_s, period_s)
+    st.offset_m = faded_offset(offset, par.start_time_s, period_s)
+    error = inp.reference_m - offset - inp.contraction_m
+    st.error_m = error
+    return error, offset
+
+
 @compiled
 def settled_part(error_m: float, offset_m: float) -> float:
     """
@@ -119,10 +136,24 @@ def integral_growth(by_error: float, by_limits: float, held_back: float) -> floa
     return 0.0
 
 
-@compiled
-def limited(
-        wanted_pa: float, former_pa: float, lowest_pa: float, highest_pa: float,
-        reach_pa: float) -> tuple[float, float]:
-    """Return a command within its limits, and the same within reach of the former command."""
-    inside = min(max(wanted_pa, lowest_pa), highest_pa)
-    return inside, min(max(inside, former_pa - reach_pa), former_pa + reach_pa)
+@inlined
+def sent(par: np.record, st: np.record, out: np.record, wanted_pa: float, period_s: float
+         ) -> tuple[float, float]:
+    """
+    Return the command within the limits of pressure, and the one that is sent, slow enough too.
+
+    Records have the fields of ``PARAMETERS``, ``STATE`` and ``OUTPUT`` of a law; both commands
+    and which limits acted are written.
+    """
+    lowest = P_ATM_PA + par.min_pressure_gauge_pa
+    highest = P_ATM_PA + par.max_pressure_gauge_pa
+    reach, former = par.slew_pa_per_s * period_s, st.command_pa
+    inside = min(max(wanted_pa, lowest), highest)
+    command = min(max(inside, former - reach), former + reach)
+    st.command_pa = command
+    out.command_pa = command
+    out.unlimited_command_pa = wanted_pa
+    out.saturated_low = 1.0 if wanted_pa < lowest else 0.0
+    out.saturated_high = 1.0 if wanted_pa > highest else 0.0
+    out.slew_limited = 1.0 if command != inside else 0.0
+    return inside, command

@@ -29,8 +29,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pam_actuation.control.fixed_law import FixedLawController
 from pam_actuation.control.inputs import INPUT, MAX_AGE_S
-from pam_actuation.control.law_parts import (
-    faded_offset, first_command_pa, held_offset, integral_growth, limited)
+from pam_actuation.control.law_parts import first_command_pa, integral_growth, sent, tracked
 from pam_actuation.control.lqi_gains import (
     MAX_DELAY_TICKS, MAX_ORDER, MODEL, observer_gains, pack, used_numbers)
 from pam_actuation.control.lqi_model import LinearModel
@@ -150,13 +149,11 @@ def _tick(par: np.record, model: np.record, observer: FloatArray, st: np.record,
     if begins:
         st.offset_m = inp.reference_m - x
     held_back = inp.held_back
-    offset = held_offset(st.offset_m, held_back, inp.reference_m - x, st.error_m,
-                         par.start_time_s, period)
+    error, offset = tracked(par, st, inp, period)
     feedforward = par.reference_feedforward * model.pa_per_m * (
         inp.lead_reference_m - offset - model.contraction_m)
     if begins:
         _start(par, model, st, inp, feedforward)
-    st.offset_m = faded_offset(offset, par.start_time_s, period)
 
     # Correct the estimate; the same measurement once more tells nothing new.
     elapsed = inp.elapsed_s
@@ -170,33 +167,23 @@ def _tick(par: np.record, model: np.record, observer: FloatArray, st: np.record,
             st.estimate_m[i] += observer[at + i] * innovation
         st.unread_ticks = 0.0
 
-    error = inp.reference_m - offset - x
-    st.error_m = error
     target = par.reference_feedforward * (inp.reference_m - offset - model.contraction_m)
     feedback = _state_feedback(model, st, target)
     integral = st.integral_pa
     estimate = st.estimate_m[0] + model.contraction_m
     wanted = model.pressure_pa + feedforward + feedback + integral
-    lowest = P_ATM_PA + par.min_pressure_gauge_pa
-    highest = P_ATM_PA + par.max_pressure_gauge_pa
-    inside, command = limited(wanted, st.command_pa, lowest, highest, par.slew_pa_per_s * period)
-    st.command_pa = command
+    _, command = sent(par, st, out, wanted, period)
     st.integral_pa = integral + period * integral_growth(
         model.integral_gain_pa_per_m_s * error, (command - wanted) / par.anti_windup_time_s,
         held_back)
     _predict(model, st, command - model.pressure_pa, feedforward)
     st.unread_ticks += 1.0
-    out.command_pa = command
     out.error_m = error
     out.estimated_contraction_m = estimate
     out.innovation_m = innovation
     out.feedforward_pa = feedforward
     out.state_feedback_pa = feedback
     out.integral_pa = integral
-    out.unlimited_command_pa = wanted
-    out.saturated_low = 1.0 if wanted < lowest else 0.0
-    out.saturated_high = 1.0 if wanted > highest else 0.0
-    out.slew_limited = 1.0 if command != inside else 0.0
     out.start_offset_m = offset
     return command
 

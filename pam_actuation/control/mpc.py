@@ -32,7 +32,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pam_actuation.control.fixed_law import FixedLawController
 from pam_actuation.control.inputs import INPUT, MAX_AGE_S
-from pam_actuation.control.law_parts import faded_offset, first_command_pa, held_offset, limited
+from pam_actuation.control.law_parts import first_command_pa, sent, tracked
 from pam_actuation.control.lqi_gains import MAX_DELAY_TICKS, MAX_ORDER
 from pam_actuation.control.lqi_model import LinearModel
 from pam_actuation.control.mpc_gains import HORIZON, MODEL, MOVES, observer_gains, pack
@@ -183,24 +183,22 @@ def _tick(par: np.record, model: np.record, inverse: FloatArray, observer: Float
     """Run one tick; see ``mpc_step``."""
     period = 1.0 / par.rate_hz
     n, d = int(model.order), int(model.delay_ticks)
-    lowest = P_ATM_PA + par.min_pressure_gauge_pa
-    highest = P_ATM_PA + par.max_pressure_gauge_pa
     x = inp.contraction_m
     y = x - model.contraction_m
     begins = st.started < 0.5
     if begins:
         st.started = 1.0
         st.offset_m = inp.reference_m - x
-        st.command_pa = first_command_pa(inp.pressure_pa, lowest, highest)
+        st.command_pa = first_command_pa(
+            inp.pressure_pa, P_ATM_PA + par.min_pressure_gauge_pa,
+            P_ATM_PA + par.max_pressure_gauge_pa)
         st.last_pa = _equivalent_pa(model, inverse, st.command_pa)
         st.disturbance_pa = model.rest_pa_per_m * y - st.last_pa
         st.calm_pa = st.disturbance_pa
         for i in range(d):
             st.acting_pa[i] = st.last_pa
     held_back = inp.held_back
-    offset = held_offset(st.offset_m, held_back, inp.reference_m - x, st.error_m,
-                         par.start_time_s, period)
-    st.offset_m = faded_offset(offset, par.start_time_s, period)
+    error, offset = tracked(par, st, inp, period)
 
     # Correct the estimate; the same measurement once more tells nothing new.
     elapsed = inp.elapsed_s
@@ -222,12 +220,10 @@ def _tick(par: np.record, model: np.record, inverse: FloatArray, observer: Float
     for i in range(d):
         _advance(model, st.predicted_m, st.acting_pa[i] + st.disturbance_pa)
 
-    error = inp.reference_m - offset - x
-    st.error_m = error
     _wanted(par, model, st, inp, offset)
     bounded = _plan(model, st)
     wanted = inverse_pressure_pa(inverse, model.contraction_m + st.plan_pa[0] / model.pa_per_m)
-    inside, command = limited(wanted, st.command_pa, lowest, highest, par.slew_pa_per_s * period)
+    _, command = sent(par, st, out, wanted, period)
     last = st.plan_pa[0] if command == wanted else _equivalent_pa(model, inverse, command)
     acting = last
     if d > 0:
@@ -237,20 +233,16 @@ def _tick(par: np.record, model: np.record, inverse: FloatArray, observer: Float
         st.acting_pa[d - 1] = last
     estimate = st.estimate_m[0] + model.contraction_m
     _advance(model, st.estimate_m, acting + st.disturbance_pa)
-    st.command_pa = command
     st.last_pa = last
     st.ticks += 1.0
     st.unread_ticks += 1.0
-    out.command_pa = command
     out.error_m = error
     out.estimated_contraction_m = estimate
     out.innovation_m = innovation
     out.disturbance_pa = st.disturbance_pa
     out.bounded = 1.0 if bounded else 0.0
-    out.unlimited_command_pa = wanted
     out.saturated_low = 1.0 if st.plan_pa[0] <= model.lowest_pa else 0.0
     out.saturated_high = 1.0 if st.plan_pa[0] >= model.highest_pa else 0.0
-    out.slew_limited = 1.0 if command != inside else 0.0
     out.start_offset_m = offset
     return command
 

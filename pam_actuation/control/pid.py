@@ -27,8 +27,7 @@ import numpy as np
 from pam_actuation.control.fixed_law import FixedLawController
 from pam_actuation.control.inputs import INPUT
 from pam_actuation.control.law_parts import (
-    faded_offset, filtered_change, first_command_pa, held_offset, integral_growth, limited,
-    settled_part)
+    filtered_change, first_command_pa, integral_growth, sent, settled_part, tracked)
 from pam_actuation.control.settings import checked_settings, parameter_record, setting, switch
 from pam_actuation.control.static_inverse import inverse_pressure_pa
 from pam_sim.annotations import FloatArray
@@ -106,12 +105,7 @@ def tracking_error(par: np.record, st: np.record, inp: np.record, has_former: bo
         st.change_m_per_s, par.change_filter_s, inp.reference_rate_m_per_s,
         x - st.contraction_m, inp.elapsed_s, period, has_former)
     st.contraction_m = x
-    offset = held_offset(st.offset_m, inp.held_back, inp.reference_m - x, st.error_m,
-                         par.start_time_s, period)
-    st.offset_m = faded_offset(offset, par.start_time_s, period)
-    error = inp.reference_m - offset - x
-    st.error_m = error
-    return error, offset
+    return tracked(par, st, inp, period)
 
 
 @inlined
@@ -129,24 +123,16 @@ def command_of(par: np.record, st: np.record, inp: np.record, out: np.record, er
     derivative = par.derivative_pa_s_per_m * st.change_m_per_s
     integral = st.integral_pa
     wanted = base_pa + proportional + integral + derivative + added_pa
-    lowest = P_ATM_PA + par.min_pressure_gauge_pa
-    highest = P_ATM_PA + par.max_pressure_gauge_pa
-    inside, command = limited(wanted, st.command_pa, lowest, highest, par.slew_pa_per_s * period)
-    st.command_pa = command
+    _, command = sent(par, st, out, wanted, period)
     st.integral_pa = integral + period * integral_growth(
         par.integral_pa_per_m_s * remembered,
         (command - wanted) / par.anti_windup_time_s, inp.held_back)
-    out.command_pa = command
     out.error_m = error
     out.change_of_error_m_per_s = st.change_m_per_s
     out.inverse_pa = base_pa
     out.proportional_pa = proportional
     out.integral_pa = integral
     out.derivative_pa = derivative
-    out.unlimited_command_pa = wanted
-    out.saturated_low = 1.0 if wanted < lowest else 0.0
-    out.saturated_high = 1.0 if wanted > highest else 0.0
-    out.slew_limited = 1.0 if command != inside else 0.0
     out.start_offset_m = offset
     return command
 

@@ -26,7 +26,7 @@ import math
 import numpy as np
 from pam_actuation.control.inputs import INPUT
 from pam_actuation.control.law_parts import (
-    faded_offset, filtered_change, first_command_pa, held_offset, integral_growth, limited)
+    faded_offset, filtered_change, first_command_pa, held_offset, integral_growth, sent)
 from pam_actuation.control.sofc import (
     credit, dynamics, guard, learning, modification, muscle_model, path_memory, predictor,
     rules_output, valve_lag)
@@ -214,18 +214,7 @@ def _command(par: np.record, values: Tables, st: np.record, rate_jumped: bool,
     wanted = (out.inverse_pa + dynamic + feedback + out.feedforward_rules_pa + out.motion_rules_pa
               + out.proportional_pa + out.integral_pa + out.derivative_pa
               + out.path_rules_pa + out.disturbance_pa + out.predicted_feedback_pa)
-    # The limits of the actuator, then of its speed.
-    lowest = P_ATM_PA + par.min_pressure_gauge_pa
-    highest = P_ATM_PA + par.max_pressure_gauge_pa
-    inside, command = limited(
-        wanted, st.command_pa, lowest, highest, par.slew_pa_per_s * par.period_s)
-    out.unlimited_command_pa = wanted
-    out.saturated_low = 1.0 if wanted < lowest else 0.0
-    out.saturated_high = 1.0 if wanted > highest else 0.0
-    out.slew_limited = 1.0 if command != inside else 0.0
-    out.command_pa = command
-    st.command_pa = command
-    return float(inside)
+    return sent(par, st, out, wanted, par.period_s)[0]
 
 
 @inlined
