@@ -19,7 +19,6 @@ import re
 import subprocess
 import sys
 
-from both_ways import compiled_and_not
 import numpy as np
 from pam_sim import load_rig
 from pam_sim.effects.registry import effects
@@ -191,26 +190,6 @@ def test_leak_loses_the_flow_it_reports(rig):
     assert lost == pytest.approx(reported, rel=0.01)
     droop = with_effect(rig, 'leakage', **values).simulate(np.full(3000, 4.0))
     assert 10.0 < P_ATM_PA + 400e3 - droop.pressure_pa[-1] < 5e3
-
-
-def test_interpreted_and_compiled_are_identical(tmp_path):
-    script = (
-        'import sys, numpy as np\n'
-        'from pam_sim import load_rig\n'
-        't = np.arange(60) * 1e-3\n'
-        'rows = []\n'
-        'for valve, fidelity in (("ppr", "averaged"), ("hsv", "averaged"),\n'
-        '                        ("hsv", "switching")):\n'
-        '    for name in ("dmsp_5_300_hanging_mass", "dmsp_5_300_realistic"):\n'
-        '        rig = load_rig(name, valve=valve, fidelity=fidelity)\n'
-        '        s = 4 + np.sin(40 * t)\n'
-        '        if valve == "hsv":\n'
-        '            s = np.sin(40 * t)\n'
-        '            s = np.stack([np.clip(s, 0, 1), np.clip(-s, 0, 1)], axis=1)\n'
-        '        rows.append(rig.simulate(s, initial_pressure_pa=501325.0).outputs)\n'
-        'np.save(sys.argv[1], np.array(rows))\n')
-    results = compiled_and_not(script, tmp_path)
-    assert np.array_equal(*results)
 
 
 def test_a_file_in_a_folder_is_a_new_effect(tmp_path):

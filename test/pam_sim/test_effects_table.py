@@ -119,7 +119,7 @@ def test_halving_the_step_changes_little_beside_the_realistic_effects(name, valv
             f'{key} depends on the step; return means over it, see pam_sim/rollout/hooks.py')
 
 
-def test_all_effects_at_once_interpreted_and_compiled(tmp_path):
+def test_no_the_realistic_and_all_effects_interpreted_and_compiled(tmp_path):
     script = (
         'import sys, numpy as np\n'
         'from pam_sim import load_rig\n'
@@ -133,13 +133,14 @@ def test_all_effects_at_once_interpreted_and_compiled(tmp_path):
         '    for name, effect in effects().items()]\n'
         'for valve, fidelity in (("ppr", "averaged"), ("hsv", "averaged"),\n'
         '                        ("hsv", "switching")):\n'
-        '    rig = load_rig("dmsp_5_300_hanging_mass", valve=valve, fidelity=fidelity)\n'
-        '    rig = rig.with_(effects=chosen)\n'
+        '    rig, realistic = [load_rig(f"dmsp_5_300_{name}", valve=valve, fidelity=fidelity)\n'
+        '                      for name in ("hanging_mass", "realistic")]\n'
         '    s = 4 + 2 * np.sin(40 * t)\n'
         '    if valve == "hsv":\n'
         '        s = np.sin(40 * t)\n'
         '        s = np.stack([np.clip(s, 0, 1), np.clip(-s, 0, 1)], axis=1)\n'
-        '    rows.append(rig.simulate(s, initial_pressure_pa=501325.0).outputs)\n'
+        '    for one in (rig, realistic, rig.with_(effects=chosen)):\n'
+        '        rows.append(one.simulate(s, initial_pressure_pa=501325.0).outputs)\n'
         'np.save(sys.argv[1], np.array(rows))\n')
     results = compiled_and_not(script, tmp_path)
     assert np.isfinite(results[0]).all()
