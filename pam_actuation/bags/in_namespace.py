@@ -17,6 +17,7 @@
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from pam_actuation.namespaces import lies_in
 from pam_sim.errors import InputError
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ def in_namespace(info: 'BagInfo', namespace: str) -> 'BagInfo':
         present = ', '.join(name or '/' for name in info.namespaces) or 'none of a muscle'
         raise InputError(f'no topics in the namespace {wanted}; the bag has {present}', info.path)
     others = {topic.name for topic in info.topics} - {topic.name for topic in topics}
-    others |= {name or '/' for name in info.namespaces if not _is_in(name, wanted)}
+    others |= {name or '/' for name in info.namespaces if not lies_in(name, wanted)}
 
     def kept(sentences: list[str]) -> list[str]:
         # Sentences on a topic or a namespace begin with its name.
@@ -58,11 +59,7 @@ def in_namespace(info: 'BagInfo', namespace: str) -> 'BagInfo':
 
     return replace(
         info, topics=topics, remarks=kept(info.remarks),
-        namespaces=[name for name in info.namespaces if _is_in(name, wanted)],
+        namespaces=[name for name in info.namespaces if lies_in(name, wanted)],
         notes=[*kept(info.notes), *([f'{len(topics)} of {len(info.topics)} topics are shown, '
                                      f'those in {wanted}.'] if others else [])],
-        markers=[one for one in info.markers if _is_in(one['namespace'], wanted)])
-
-
-def _is_in(name: str, wanted: str) -> bool:
-    return f'{name}/'.startswith(f'{wanted}/')
+        markers=[one for one in info.markers if lies_in(one['namespace'], wanted)])

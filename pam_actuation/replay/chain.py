@@ -26,7 +26,6 @@ from collections.abc import Callable, Collection, Mapping
 import copy
 from dataclasses import dataclass
 from functools import partial
-import math
 import os
 from typing import Any, TYPE_CHECKING
 
@@ -44,7 +43,7 @@ from pam_actuation.messages import ControllerState, JointAngle, Message, Pressur
 from pam_actuation.plant_loop import PlantLoop
 from pam_actuation.replay.arrivals import (
     ORDER, recorded_topics, recorded_topics_of_joint, RecordedTopic)
-from pam_actuation.replay.difference import Difference, difference
+from pam_actuation.replay.difference import Difference, difference, same_bits
 from pam_actuation.replay.tracking import Tracking, tracking
 from pam_actuation.topics.table import short_name
 from pam_sim.annotations import FloatArray, IntArray
@@ -283,11 +282,6 @@ class RepeatedLoops:
             {name: np.array(columns[k]) for name, columns in self.rows.items()}
             for k in range(3))
         return stamp_ns, recorded, replayed
-
-
-def same_bits(a: float, b: float) -> bool:
-    """Return whether two floats are the same bits, all NaN being one."""
-    return a == b and math.copysign(1.0, a) == math.copysign(1.0, b) or (a != a and b != b)
 
 
 def replay_chain(run: Run,

@@ -36,7 +36,7 @@ from pam_actuation.control.tick import (
     AGES, HELD_BACK, input_names, join_stamp, LIMIT, MuscleLaw, reference_names, RUNNING, STAMPED,
     TickCore, TickInputs)
 from pam_actuation.drivers.recorded import as_recorded, nearly_in
-from pam_actuation.replay.difference import difference
+from pam_actuation.replay.difference import difference, same_bits
 from pam_actuation.slow_rise import SlowRise
 from pam_sim import load_rig
 from pam_sim.annotations import FloatArray, IntArray
@@ -161,7 +161,7 @@ def replay_controller(run: 'Run', controller: 'Controller | str | os.PathLike[st
         if keep_states:
             kept[place] = values
         differing.update(name for (name, column), value in zip(compared.items(), values)
-                         if not _same(column[row], value))
+                         if not same_bits(column[row], value))
     stamp_ns = states.stamp_ns[order]
     largest_pa = difference('pressure_command', 'Pa', stamp_ns, recorded, replayed, 0).largest
     return ReplayResult(
@@ -221,11 +221,6 @@ class _SentCommands:
         sent_pa = self._command_at.get(int(self._stamp_ns[row]))
         self.missing += sent_pa is None
         return lost_pa if sent_pa is None else sent_pa
-
-
-def _same(a: float, b: float) -> bool:
-    """Return whether two floats are the same bits, all NaN being one."""
-    return a == b and math.copysign(1.0, a) == math.copysign(1.0, b) or (a != a and b != b)
 
 
 def columns_of(states: 'Series') -> dict[str, FloatArray]:

@@ -15,6 +15,7 @@
 """How far a replayed signal is from the recorded one: rms, largest, and where."""
 
 from dataclasses import asdict, dataclass
+import math
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,11 @@ from pam_sim.annotations import FloatArray, IntArray
 
 # SI unit -> what people read: factor, unit.
 _SHOWN = {'Pa': (1e-3, 'kPa'), 'm': (1e3, 'mm'), 'V': (1e3, 'mV')}
+
+
+def same_bits(a: float, b: float) -> bool:
+    """Return whether two floats are the same bits, all NaN being one."""
+    return a == b and math.copysign(1.0, a) == math.copysign(1.0, b) or (a != a and b != b)
 
 
 @dataclass(frozen=True)

@@ -28,8 +28,9 @@ from pam_actuation.control.joint_law import ADDED_NAMES, CO_CONTRACTION, JointLa
 from pam_actuation.control.tick import (
     AGES, Effort, HELD_BACK, join_stamp, LIMIT, reference_names, TickCore, TickInputs)
 from pam_actuation.drivers.recorded import as_recorded, nearly_in
-from pam_actuation.replay.chain import ChainReplay, same_bits
+from pam_actuation.replay.chain import ChainReplay
 from pam_actuation.replay.controller import check_complete, columns_of
+from pam_actuation.replay.difference import same_bits
 from pam_sim.annotations import FloatArray, IntArray
 from pam_sim.errors import InputError
 from pam_sim.joint.parameters import SIDES
