@@ -136,21 +136,11 @@ def test_a_static_map_is_no_possible_effect_beside_an_unknown_law():
 
 
 def test_beside_a_missing_effect_the_law_is_left_to_the_look_for_it():
-    creeping = RIG.with_(effects=['creep', 'coulomb_friction'])
-    run = record(creeping, gauge_pa=(50e3, 400e3, 150e3), hold_s=1.0,
-                 keep=('pressure', 'contraction'))
-    found = identify(run, RIG, ['law.a3', 'spring_n_per_m'], advise=False)
-    assert [one.number.name for one in found.found] == ['spring_n_per_m']
-    assert 'law.a3' in found.rig.unknown and 'law.a3' in found.open_names
-    assert found.rig.number('law.a3') == RIG.number('law.a3')
-    assert any('law.a3: as in the model' in remark for remark in found.remarks)
-    with pytest.raises(InputError, match='record a force, or let pam gap fit both'):
-        identify(run, RIG, ['law.a3'], advise=False)
-
-
-def test_a_hole_is_told_once_where_the_law_is_left_to_the_look():
+    """What is told of a recording with a hole, and of commands for a valve, is told once."""
     run = record(RIG.with_(effects=['creep', 'coulomb_friction']), gauge_pa=(50e3, 400e3, 150e3),
                  hold_s=1.5, keep=('pressure', 'contraction'))
+    with pytest.raises(InputError, match='record a force, or let pam gap fit both'):
+        identify(run, RIG, ['law.a3'], advise=False)
     pressure = run.topics['pressure']
     at_s = pressure.time_s(run.start_ns)
     kept = (at_s < 2.0) | (at_s > 2.4)
@@ -160,10 +150,13 @@ def test_a_hole_is_told_once_where_the_law_is_left_to_the_look():
     wanted_pa = P_ATM_PA + RIG.parameters['K_m'] * signal.values['ppr_voltage']
     run.topics['pressure_command'] = Series(
         signal.stamp_ns, {'pressure_pa': wanted_pa}, {'pressure_pa': 'Pa'})
-    said = identify(run, RIG, ['law.a3', 'spring_n_per_m'], advise=False).remarks
+    found = identify(run, RIG, ['law.a3', 'spring_n_per_m'], advise=False)
+    assert [one.number.name for one in found.found] == ['spring_n_per_m']
+    assert 'law.a3' in found.rig.unknown and 'law.a3' in found.open_names
+    assert found.rig.number('law.a3') == RIG.number('law.a3')
     for one in ('law.a3: as in the model', 'without a hole count as 2 recordings',
                 'the pressure command is taken'):
-        assert sum(one in remark for remark in said) == 1
+        assert sum(one in remark for remark in found.remarks) == 1
 
 
 def test_the_look_begins_with_all_unknown_numbers_but_the_law():
