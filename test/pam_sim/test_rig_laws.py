@@ -233,11 +233,18 @@ for name in laws():
     if name != 'lookup':
         rig = load_rig('dmsp_5_300_hanging_mass').with_(law=name)
         rows.append(rig.simulate(signal, initial_pressure_pa=4e5).outputs)
+drive = 0.3 * np.sin(np.arange(120) * 0.3)
+duties = np.clip(np.stack([drive, -drive], 1), 0.0, 1.0)
+for law in ('chou_hannaford', 'tondu_lopez', 'lookup'):
+    for effects in ((), ('thermal',)):
+        rig = load_rig('dmsp_5_300_hanging_mass', valve='hsv').with_(
+            law=law, volume='law', effects=effects)
+        rows.append(rig.simulate(duties, initial_pressure_pa=4e5).outputs)
 np.save(sys.argv[1], np.array(rows))
 """
 
 
-def test_laws_give_the_same_bits_with_the_compiler_off(tmp_path):
+def test_laws_and_their_volumes_give_the_same_bits_with_the_compiler_off(tmp_path):
     compiled, plain = compiled_and_not(SCRIPT, tmp_path)
     assert np.array_equal(compiled, plain)
 

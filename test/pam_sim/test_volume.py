@@ -19,7 +19,6 @@ import os
 import subprocess
 import sys
 
-from both_ways import compiled_and_not
 import numpy as np
 from pam_sim import load_rig
 from pam_sim.compiled import interpreted
@@ -281,26 +280,6 @@ def test_a_table_whose_air_cannot_be_simulated_is_refused():
     problem = refused(table_with(air_mass_kg=falling))
     assert 'holds no more air at higher pressure, at ' in problem
     assert 'allowed with this law is `volume: bore`' in problem
-
-
-SCRIPT = """
-import sys
-import numpy as np
-from pam_sim import load_rig
-signal = np.clip(np.stack([np.sin(np.arange(60) * 0.3), -np.sin(np.arange(60) * 0.3)], 1), 0, 1)
-rows = []
-for law in ('chou_hannaford', 'tondu_lopez', 'lookup'):
-    for effects in ((), ('thermal',)):
-        rig = load_rig('dmsp_5_300_hanging_mass', valve='hsv').with_(
-            law=law, volume='law', effects=effects)
-        rows.append(rig.simulate(0.3 * signal, initial_pressure_pa=4e5).outputs)
-np.save(sys.argv[1], np.array(rows))
-"""
-
-
-def test_volumes_give_the_same_bits_with_the_compiler_off(tmp_path):
-    compiled, plain = compiled_and_not(SCRIPT, tmp_path)
-    assert np.array_equal(compiled, plain)
 
 
 OWN_LAW = """
