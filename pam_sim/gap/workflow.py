@@ -23,7 +23,7 @@ from typing import Any
 
 from pam_sim.errors import InputError
 from pam_sim.gap.criteria import CRITERIA, Criteria
-from pam_sim.gap.data.beyond_table import beyond_table
+from pam_sim.gap.data.beyond_table import beyond_table, trials_unsaid
 from pam_sim.gap.data.checked import checked_runs, recording_of
 from pam_sim.gap.data.recording import Recording
 from pam_sim.gap.data.supply import with_recorded_supply
@@ -91,6 +91,7 @@ class Options:
     started: float
 
 
+@trials_unsaid()
 def find_gap(runs: Run | Sequence[Run], rig: Rig, certify: Run | None = None,
              effects: str | Sequence[str] | None = None, seconds: float = 120.0,
              materiality: float = 1.0, seed: int = 0,

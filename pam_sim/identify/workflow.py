@@ -14,17 +14,15 @@
 
 """From recordings to the unknown numbers of a rig."""
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 import math
 from typing import Any
-import warnings
 
 import numpy as np
 from pam_sim.annotations import FloatArray
 from pam_sim.errors import InputError
 from pam_sim.gap.criteria import CRITERIA
-from pam_sim.gap.data.beyond_table import beyond_table
+from pam_sim.gap.data.beyond_table import beyond_table, trials_unsaid
 from pam_sim.gap.data.commanded import commanded
 from pam_sim.gap.data.signals import UNIT
 from pam_sim.gap.fit.profile import NORMAL_95
@@ -42,7 +40,6 @@ from pam_sim.identify.remarks import ANOTHER_LAW, of_one_scale, remarks_on, Squa
 from pam_sim.identify.result import Found, half_width, Identification
 from pam_sim.identify.secant import settle, solve_from
 from pam_sim.identify.settled import beside_settled_zero, with_settled_zero
-from pam_sim.muscle.law import ExtrapolationWarning
 from pam_sim.rig import Rig
 from pam_sim.run import Run
 from pam_sim.runs_given import check_number, check_question
@@ -55,15 +52,7 @@ Progress = Callable[[float], object]
 RETURNS = 4                  # to the fit, where a profile met a better solution
 
 
-@contextmanager
-def _trials_unsaid() -> Iterator[None]:
-    """Keep back that a trial leaves the table of a force law: a remark tells of recordings."""
-    with warnings.catch_warnings():
-        warnings.simplefilter('ignore', ExtrapolationWarning)
-        yield
-
-
-@_trials_unsaid()
+@trials_unsaid()
 def identify(runs: Run | Sequence[Run], rig: Rig, unknown: str | Sequence[str] = (),
              added_kg: float | Sequence[float] = (), seed: int = 0, advise: bool = True,
              progress: Progress = lambda done: None,

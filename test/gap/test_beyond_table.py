@@ -15,11 +15,16 @@
 """Recordings that leave the table of a measured force law are told, with its range."""
 
 from types import SimpleNamespace
+import warnings
 
 import numpy as np
 from pam_sim import load_rig
+from pam_sim.errors import InputError
+from pam_sim.gap import find_gap, workflow
 from pam_sim.gap.data.beyond_table import beyond_table
+from pam_sim.muscle.law import ExtrapolationWarning
 from pam_sim.units import P_ATM_PA
+import pytest
 
 NOMINAL = 'dmsp_5_300_hanging_mass'
 
@@ -39,3 +44,14 @@ def test_the_share_and_the_range_of_the_table_are_told():
     assert told.startswith('In 25 % of the recorded time pressure or contraction is outside the '
                            'table of law `lookup`, 0 to 600 kPa and up to ')
     assert beyond_table([recording([9e5], [0.0])], load_rig(NOMINAL)) == []
+
+
+def test_a_trial_beyond_the_table_is_not_told(monkeypatch):
+    def trial(*_):
+        warnings.warn('100 % of the simulation lies outside', ExtrapolationWarning, stacklevel=2)
+        raise InputError('enough', 'trial')
+    monkeypatch.setattr(workflow, '_answered', trial)
+    with warnings.catch_warnings():
+        warnings.simplefilter('error')
+        with pytest.raises(InputError, match='enough'):
+            find_gap([], load_rig(NOMINAL))

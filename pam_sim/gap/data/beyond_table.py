@@ -14,11 +14,14 @@
 
 """Recordings that leave the table of a measured force law."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+import warnings
 
 import numpy as np
 from pam_sim.annotations import FloatArray
 from pam_sim.gap.data.recording import Recording
+from pam_sim.muscle.law import ExtrapolationWarning
 from pam_sim.rig import Rig
 from pam_sim.units import P_ATM_PA
 
@@ -37,6 +40,14 @@ def beyond_table(recordings: Iterable[Recording], rig: Rig) -> list[str]:
     if not beyond.any():
         return []
     return [LEAVES.format(100.0 * beyond.mean(), law.outside_table_text())]
+
+
+@contextmanager
+def trials_unsaid() -> Iterator[None]:
+    """Keep back that a trial leaves the table of a law: ``beyond_table`` tells what counts."""
+    with warnings.catch_warnings():
+        warnings.simplefilter('ignore', ExtrapolationWarning)
+        yield
 
 
 def _contraction_m(recording: Recording) -> FloatArray:
