@@ -40,6 +40,7 @@ SILENT_S = 3.0            # without a status, which comes twice in a second
 SENSORS = 'hardware_sensors'
 _FAULT, _LATCHED, _NOT_VENTED = 1, 2, 3   # how grave the fault of a node is
 HEARD_S = 1.5             # a watchdog that sent a status within this time vents
+CALM_S = 10.0             # of a device that vents again: then it is told anew that it does not
 SETTLED_S = 1.0           # from the last node active to the first command and reading of all
 
 
@@ -73,6 +74,7 @@ class Supervisor:
             for node in nodes}, domain_id=domain_id)
         self.faults: list[str] = []
         self._grades: dict[str, int] = {}       # of the fault that was told of a node
+        self._vented_s: dict[str, float] = {}   # since when a device that did not vent does
         self._waiting: set[str] = set()         # reference generators of which that was told
         self._silent: set[str] = set()
         self._unwatched: set[str] = set()       # drivers of which that was told
@@ -158,11 +160,12 @@ class Supervisor:
         statuses = self._group.started.statuses
         changes = self._group.started.changes_since(self._heard_s)
         self._heard_s = changes[-1][0] if changes else self._heard_s
-        told = [(name, level, message) for _, name, level, message in changes]
+        told = [*changes]
         if settled:
-            told += [(name, *statuses[name][:2]) for name in self._from_start & statuses.keys()]
+            told += [(self._heard_s, name, *statuses[name][:2])
+                     for name in self._from_start & statuses.keys()]
             self._from_start = set()
-        for name, level, message in told:
+        for heard_s, name, level, message in told:
             if message.startswith(NOT_BEGUN) and name not in self._waiting:
                 self._waiting.add(name)
                 tell(f'{name}: {message}')
@@ -170,6 +173,11 @@ class Supervisor:
             if name in self._from_start and grade:
                 continue
             self._from_start.discard(name)
+            if grade < _NOT_VENTED:
+                if before == _NOT_VENTED:
+                    self._vented_s.setdefault(name, heard_s)
+            elif heard_s - self._vented_s.pop(name, heard_s) > CALM_S:
+                before = 0
             if grade <= before and bool(grade) == bool(before):
                 continue
             self._grades[name] = grade

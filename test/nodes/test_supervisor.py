@@ -25,6 +25,7 @@ pytest.importorskip('rclpy')
 from pam_actuation.hardware.device_watchdog import OPENED                   # noqa: E402, I100
 from pam_actuation.messages import NOT_BEGUN, START_NS, Status              # noqa: E402
 from pam_actuation.nodes.parameters import COMMON_PARAMETERS                # noqa: E402
+from pam_actuation.rigging import supervisor                                # noqa: E402
 from pam_actuation.rigging.client import MOST_CHANGES, MOST_FAULTS, RigClient   # noqa: E402
 from pam_actuation.rigging.domain import DomainLock                         # noqa: E402
 from pam_actuation.rigging.node_spec import NodeSpec                        # noqa: E402
@@ -130,6 +131,21 @@ def test_what_becomes_graver_is_told_though_a_fault_was_told_before(rig):
         rig.hear(DRIVER, 2, message, fault='over_pressure', **LATCHES)
         assert rig.tell() == []
     assert len(rig.supervisor.faults) == 3
+
+
+def test_a_device_that_does_not_vent_again_after_a_while_is_told_anew(rig, monkeypatch):
+    refused = f'{REFUSES}; {UNVENTED}'
+    for calm_s, told in ((60.0, []), (0.0, [f'{DRIVER}: {refused}'])):
+        monkeypatch.setattr(supervisor, 'CALM_S', calm_s)
+        for message in (refused, REFUSES):
+            rig.hear(DRIVER, 2, message, fault='device_refuses', **LATCHES)
+            rig.tell()
+        rig.hear(DRIVER, 2, refused, fault='device_refuses', **LATCHES)
+        assert rig.tell() == told
+        rig.hear(DRIVER, 2, f'{refused} ', fault='device_refuses', **LATCHES)
+        assert rig.tell() == []
+    rig.hear(DRIVER, 0, 'following the pressure command', state='ok', fault='')
+    assert len(rig.tell()) == 1
 
 
 def test_an_emergency_stop_that_the_device_does_not_take_is_a_finding(rig):
