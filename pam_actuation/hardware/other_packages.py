@@ -29,6 +29,8 @@ from importlib.metadata import entry_points
 import sys
 from typing import TypeVar
 
+from pam_sim.parameters import Parameter
+
 VALVE_GROUP = 'pam_actuation.valve_outputs'
 SENSOR_GROUP = 'pam_actuation.sensor_inputs'
 Kind = TypeVar('Kind')
@@ -39,8 +41,8 @@ def with_others(own: Mapping[str, type[Kind]], group: str,
     """
     Return back ends by name: those of this package, then those of others.
 
-    One that cannot be loaded, is of another kind or takes a name of this package is left out.
-    Standard error says so in one line; the others stay usable.
+    One that cannot be loaded, is of another kind, has ``PARAMETERS`` that are none or takes a name
+    of this package is left out. Standard error says so in one line; the others stay usable.
 
     Parameters
     ----------
@@ -66,6 +68,12 @@ def with_others(own: Mapping[str, type[Kind]], group: str,
         if not (isinstance(loaded, type) and issubclass(loaded, kind)):
             print(f'{where} is left out: it is no class made from {kind.__name__}',
                   file=sys.stderr)
+            continue
+        given = getattr(loaded, 'PARAMETERS', ())
+        if not (isinstance(given, (tuple, list))
+                and all(isinstance(one, Parameter) for one in given)):
+            print(f'{where} is left out: its PARAMETERS are no tuple of what node_parameter '
+                  'returns; one alone needs a comma, as (PORT,)', file=sys.stderr)
             continue
         found[point.name] = loaded
     return found

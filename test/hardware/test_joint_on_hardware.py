@@ -15,6 +15,7 @@
 """A joint on hardware: back ends of another package, brought up by one option; a lost angle."""
 
 from pathlib import Path
+import sys
 import threading
 import time
 import tomllib
@@ -75,6 +76,21 @@ def test_a_back_end_that_cannot_be_loaded_hurts_no_other(tmp_path, monkeypatch, 
                  'dummy (os:sep) is left out: the name is taken',
                  'odd (os:sep) is left out: it is no class made from SensorInput'):
         assert part in told
+
+
+@pytest.mark.parametrize('parameters', ['PORT', "('port',)", '[PORT, 3]', "'port'", 'None'])
+def test_a_back_end_whose_parameters_are_none_hurts_no_other(
+        parameters, tmp_path, monkeypatch, capsys):
+    (tmp_path / 'bench_of_a_lab.py').write_text(
+        'from pam_actuation.drivers.parameter import node_parameter\n'
+        'from pam_actuation.hardware.sensor_input import SensorInput\n'
+        "PORT = node_parameter('port', '', 'Port.')\n"
+        f'class Sensors(SensorInput):\n    PARAMETERS = {parameters}\n')
+    installed(tmp_path, monkeypatch, bench='bench_of_a_lab:Sensors')
+    monkeypatch.delitem(sys.modules, 'bench_of_a_lab', raising=False)
+    assert 'bench' not in with_others(OWN_SENSOR_INPUTS, SENSOR_GROUP, SensorInput)
+    assert ('back end bench (bench_of_a_lab:Sensors) is left out: its PARAMETERS are no tuple of '
+            'what node_parameter returns; one alone needs a comma' in capsys.readouterr().err)
 
 
 def test_the_dummy_reads_a_muscle_or_a_joint():
