@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from pam_actuation.rigging.client import RigClient
 
 TRANSITION_TIMEOUT_S = 15.0
+REASON_S = 1.0                # a node answers, and writes why a moment later
 STOP_TIMEOUT_S = 5.0          # to deactivate: the driver, which vents, comes after others
 CLOSE_TIMEOUT_S = 60.0        # the recorder writes what is queued
 COMPILES = ('; the first start on a machine compiles: run `python3 -m pam_actuation.warm_up` '
@@ -70,11 +71,20 @@ def change(client: 'RigClient', processes: Iterable[NodeProcess], transition: st
         process = by_name[full_name]
         if not process.running:
             raise SessionFailed(process.how_it_ended())
-        last = process.last_line()
+        last = process.last_line() if is_late else _reason(process, transition)
         raise SessionFailed(
             f'{process.label} did not {transition}'
             + (f' within {timeout_s:g} s' if is_late else '') + (f': {last}' if last else '')
             + (COMPILES if is_late and transition == 'configure' else ''))
+
+
+def _reason(process: NodeProcess, transition: str) -> str:
+    """Return the last line of a node that refused, once it has written why."""
+    deadline_s = time.monotonic() + REASON_S
+    while (f'cannot {transition}' not in process.printed() and process.running
+           and time.monotonic() < deadline_s):
+        time.sleep(0.02)
+    return process.last_line()
 
 
 @contextmanager

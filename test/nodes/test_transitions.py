@@ -27,8 +27,16 @@ class Node:
 
     full_name, label, running = '/muscle/controller', 'controller', True
 
+    def __init__(self, writes=()):
+        self._lines, self._writes = ['reading the rig'], list(writes)
+
+    def printed(self):
+        self._lines += self._writes[:1]
+        del self._writes[:1]
+        return '\n'.join(self._lines)
+
     def last_line(self):
-        return 'reading the rig'
+        return self._lines[-1]
 
 
 class Client:
@@ -52,6 +60,13 @@ def test_a_node_that_is_too_slow_to_configure_may_be_compiling():
     text = said('configure', False, 0.02)
     assert text.startswith('controller did not configure within 0.02 s: reading the rig; ')
     assert 'python3 -m pam_actuation.warm_up' in text
+
+
+def test_the_reason_that_a_node_writes_after_its_answer_is_told():
+    node = Node(['numbers told by a rig', 'cannot configure: no such port'])
+    with pytest.raises(SessionFailed) as found:
+        change(Client(True), [node], 'configure', 60.0)
+    assert str(found.value) == 'controller did not configure: cannot configure: no such port'
 
 
 def test_other_failures_do_not_name_the_compiler():
