@@ -51,10 +51,10 @@ def bags(tmp_path_factory):
 
 
 @pytest.mark.parametrize('verb', VERBS)
-def test_help_has_an_example(verb):
-    done = pam(verb, '--help')
-    assert done.returncode == 0
-    assert f'pam {verb}' in done.stdout and 'Example:' in done.stdout and '--json' in done.stdout
+def test_help_has_an_example(verb, capsys):
+    assert pam_here(verb, '--help') == 0
+    shown = capsys.readouterr().out
+    assert f'pam {verb}' in shown and 'Example:' in shown and '--json' in shown
 
 
 @pytest.mark.parametrize('words, told', [
