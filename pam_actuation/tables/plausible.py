@@ -255,8 +255,8 @@ def _of_values(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Size
                               'is the sensor connected?')]
     looks = (_hardly_moves, _pulls_much, _pushes, _moves_no_muscle, _gauge_or_absolute,
              _other_unit, _is_a_share, _at_the_end)
-    doubted = [look(signal, mapped, finite, size) for look in looks]
-    return [*found, *(doubt for doubt in doubted if doubt is not None)]
+    return [*found, *(Doubt(said) for look in looks
+                      if (said := look(signal, mapped, finite, size)))]
 
 
 def _impossible(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Size,
@@ -281,44 +281,40 @@ def _moves_too_little(signal: Signal, finite: FloatArray) -> bool:
     return least is not None and float(finite.max()) - float(finite.min()) < least
 
 
-# Each of these returns a doubt on the values of a signal, None without.
+# Each of these returns what is doubtful in the values of a signal, '' without.
 
-def _hardly_moves(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Size
-                  ) -> Doubt | None:
+def _hardly_moves(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Size) -> str:
     if not _moves_too_little(signal, finite):
-        return None
+        return ''
     moved = float(finite.max()) - float(finite.min())
-    return Doubt(f'it moves by {_shown(signal, moved, difference=True)} only'
-                 f'{_fix(signal, mapped, finite, size)}')
+    return (f'it moves by {_shown(signal, moved, difference=True)} only'
+            f'{_fix(signal, mapped, finite, size)}')
 
 
-def _pulls_much(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Size
-                ) -> Doubt | None:
+def _pulls_much(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Size) -> str:
     most = max(float(finite.max()), -float(finite.min()))
     if signal.quantity != FORCE or most <= MUCH_N:
-        return None
-    return Doubt(f'it reaches {_shown(signal, most)}, more than a muscle pulls'
-                 f'{_fix(signal, mapped, finite, size)}')
+        return ''
+    return (f'it reaches {_shown(signal, most)}, more than a muscle pulls'
+            f'{_fix(signal, mapped, finite, size)}')
 
 
-def _pushes(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Size
-            ) -> Doubt | None:
+def _pushes(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Size) -> str:
     low, high = float(finite.min()), float(finite.max())
     if signal.name.rpartition('/')[2] != 'force' or not (
             float(np.median(finite)) < -PUSH_N and -low > FAR * high):
-        return None
+        return ''
     other = replace(mapped, gain=-mapped.gain)
-    return Doubt(f'it is negative nearly throughout, down to {_shown(signal, low)}, and a pull is '
-                 f'positive; if it counts the other way, write {other.option(signal.name)}')
+    return (f'it is negative nearly throughout, down to {_shown(signal, low)}, and a pull is '
+            f'positive; if it counts the other way, write {other.option(signal.name)}')
 
 
-def _moves_no_muscle(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Size
-                     ) -> Doubt | None:
+def _moves_no_muscle(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Size) -> str:
     high = float(finite.max())
     if _moves_too_little(signal, finite) or not _is_too_low(signal, high):
-        return None
-    return Doubt(f'it reaches {_shown(signal, high)} only, at which no muscle moves'
-                 f'{_fix(signal, mapped, finite, size)}')
+        return ''
+    return (f'it reaches {_shown(signal, high)} only, at which no muscle moves'
+            f'{_fix(signal, mapped, finite, size)}')
 
 
 def _is_too_low(signal: Signal, highest: float) -> bool:
@@ -326,40 +322,35 @@ def _is_too_low(signal: Signal, highest: float) -> bool:
     return signal.quantity == PRESSURE and P_ATM_PA < highest < P_ATM_PA + SMALL_GAUGE_PA
 
 
-def _gauge_or_absolute(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Size
-                       ) -> Doubt | None:
+def _gauge_or_absolute(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Size) -> str:
     """Ask about a gauge pressure that ends where an absolute one does when vented."""
     if signal.quantity != PRESSURE or not mapped.unit.name.endswith(GAUGE) or (
             abs(float(finite.min()) - 2.0 * P_ATM_PA) >= NEAR_ATMOSPHERE_PA):
-        return None
-    return Doubt('it falls to 1 atmosphere gauge and never below: is it absolute? '
-                 f'Then write {mapped.unit.name.replace(GAUGE, ABSOLUTE)}')
+        return ''
+    return ('it falls to 1 atmosphere gauge and never below: is it absolute? '
+            f'Then write {mapped.unit.name.replace(GAUGE, ABSOLUTE)}')
 
 
-def _other_unit(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Size
-                ) -> Doubt | None:
+def _other_unit(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Size) -> str:
     said = against(unit_in(mapped.column), mapped, signal.quantity)
     if not said and signal.quantity == PRESSURE:
         kind = kind_of_pressure(words_of(mapped.column))            # `Absolutdruck [bar]`
         said = '' if mapped.unit.name.endswith(kind) else kind
-    return Doubt(f'the name of the column says {said}') if said else None
+    return f'the name of the column says {said}' if said else ''
 
 
-def _is_a_share(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Size
-                ) -> Doubt | None:
+def _is_a_share(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Size) -> str:
     """Ask about a duty in % that is never more than 1, with which no valve opens."""
     share, raw = unit_of_text('1', DUTY), _raw(mapped, finite)
     if signal.quantity != DUTY or share is None or mapped.unit.name == share.name or (
             mapped.gain != 1.0 or mapped.zero != 0.0 or float(raw.max()) > MOST_SHARE):
-        return None
-    return Doubt(f'it reaches {float(raw.max()):.3g} % only, at which no valve opens: is it a '
-                 f'share of 1? Then write {replace(mapped, unit=share).option(signal.name)}')
+        return ''
+    return (f'it reaches {float(raw.max()):.3g} % only, at which no valve opens: is it a '
+            f'share of 1? Then write {replace(mapped, unit=share).option(signal.name)}')
 
 
-def _at_the_end(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Size
-                ) -> Doubt | None:
-    said = converter_end(_raw(mapped, finite), mapped.zero) if mapped.gain != 1.0 else ''
-    return Doubt(said) if said else None
+def _at_the_end(signal: Signal, mapped: ColumnMap, finite: FloatArray, size: Size) -> str:
+    return converter_end(_raw(mapped, finite), mapped.zero) if mapped.gain != 1.0 else ''
 
 
 def against(text: str, mapped: ColumnMap, quantity: str) -> str:
