@@ -87,6 +87,11 @@ class Difference:
                 f'{self.differing} of {self.count} messages differ{lost})')
 
 
+def same_bits(a: float, b: float) -> bool:
+    """Return whether two floats are the same bits, all NaN being one."""
+    return a == b and math.copysign(1.0, a) == math.copysign(1.0, b) or (a != a and b != b)
+
+
 def difference(signal: str, unit: str, stamp_ns: IntArray, recorded: FloatArray,
                replayed: FloatArray, start_ns: int) -> Difference:
     """
