@@ -25,10 +25,12 @@ the noise of the inputs already, as part of what is left: both together would co
 
 import numpy as np
 from pam_sim.annotations import FloatArray
-from pam_sim.identify.fit import Weighted
+from pam_sim.gap.data.noise import autocorrelation_time
+from pam_sim.identify.fit import used, Weighted
 from pam_sim.identify.secant import bounded_step
 
 DRAWS = 24
+CHANCE = 39                  # draws whose largest value noise exceeds once in 40 times
 INSIDE = 1e-6                # of the range of a number, from which on it is not at its end
 
 
@@ -94,4 +96,36 @@ def scatter_by_inputs(weighted: Weighted, x: FloatArray, count: int, slopes: Flo
         found += np.outer(moved, moved) / DRAWS
     for problem in weighted.problems:
         problem.disturb(None)
+    return found
+
+
+def memories_by_noise(weighted: Weighted, x: FloatArray) -> list[float]:
+    """
+    Return how many samples the errors of every signal may stay alike by noise alone.
+
+    A load that is hardly damped goes on swinging after noise of the measured pressure, so its
+    errors have a memory of their own. Noise of pressure and sensors gives a longer one than this
+    once in 40 times. A valve has none: its input is a command.
+
+    Parameters
+    ----------
+    weighted : Weighted
+        The problem.
+    x : numpy.ndarray
+        The solution.
+
+    """
+    random = np.random.default_rng(0)
+    found = []
+    for p, own in zip(weighted.problems, weighted.own):
+        base = weighted.errors(x, p)
+        most = np.ones(len(p.signals))
+        for _ in range(0 if p.subsystem == 'valve' else CHANCE):
+            p.disturb(random)
+            noise = weighted.errors(x, p) - base + np.sqrt(own)[p.signal] * (
+                random.standard_normal(p.signal.size))
+            most = np.maximum(most, [autocorrelation_time(noise[(p.signal == s) & used(p)])
+                                     for s in range(len(p.signals))])
+        p.disturb(None)
+        found += most.tolist()
     return found

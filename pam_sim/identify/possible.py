@@ -35,6 +35,7 @@ from pam_sim.effects.effect import Effect
 from pam_sim.effects.registry import effects
 from pam_sim.gap.subsystems.problem import RATE_HZ, SubsystemProblem
 from pam_sim.identify.fit import Weighted
+from pam_sim.identify.inputs import memories_by_noise
 from pam_sim.identify.numbers import Number
 from pam_sim.identify.quiet import SHORT_S
 from pam_sim.identify.secant import solve_from
@@ -57,13 +58,17 @@ def incomplete_subsystems(weighted: Weighted, x: FloatArray) -> frozenset[str]:
     Return the subsystems in which a fitted model leaves more than noise in some signal.
 
     An effect smaller than the noise shows by its memory. What is left then stays alike for many
-    samples. Noise of the averaged pressure does not last that long. What a recording without noise
-    leaves stays alike too; far below the noise it says nothing.
+    samples, more than noise does by chance. What a recording without noise leaves stays alike too;
+    far below the noise it says nothing.
     """
-    return frozenset(
-        p.subsystem for (p, _, square), memory in zip(
-            weighted.mean_squares(x), weighted.memories(x))
-        if square > SEEN_FLOORS2 or square > MATTERS_FLOORS2 and memory > LASTING)
+    squares = list(weighted.mean_squares(x))
+    found = {p.subsystem for p, _, square in squares if square > SEEN_FLOORS2}
+    lasting = [(place, memory) for place, ((p, _, square), memory) in enumerate(zip(
+        squares, weighted.memories(x))) if (
+            p.subsystem not in found and square > MATTERS_FLOORS2 and memory > LASTING)]
+    by_noise = memories_by_noise(weighted, x) if lasting else []
+    return frozenset(found | {
+        squares[place][0].subsystem for place, memory in lasting if memory > by_noise[place]})
 
 
 def possible_effects(rig: Rig, problems: Sequence[SubsystemProblem], numbers: Sequence[Number]

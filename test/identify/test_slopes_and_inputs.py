@@ -16,10 +16,11 @@
 
 from made_records import record, RIG
 import numpy as np
+from pam_sim import load_rig
 from pam_sim.identify.fit import fit, STEP_OF_KNOWN, Weighted
-from pam_sim.identify.inputs import scatter_by_inputs
+from pam_sim.identify.inputs import memories_by_noise, scatter_by_inputs
 from pam_sim.identify.numbers import known_numbers_of, unknown_numbers
-from pam_sim.identify.possible import incomplete_subsystems, possible_effects
+from pam_sim.identify.possible import incomplete_subsystems, LASTING, possible_effects
 from pam_sim.identify.records import offer_of, problems_of
 from pam_sim.run import Run, Series
 import pytest
@@ -86,3 +87,20 @@ def test_an_effect_below_the_noise_shows_by_its_memory(steps):
         x = np.zeros(len(weighted.numbers))
         assert all(square < 1.2 for _, _, square in weighted.mean_squares(x))
         assert incomplete_subsystems(weighted, x) == ({'muscle', 'valve'} if expected else set())
+
+
+def test_a_load_that_swings_after_noise_of_the_pressure_misses_no_effect():
+    """Its errors stay alike for more than ten samples, as noise of the pressure makes them."""
+    rig = load_rig('dmsp_20_300_hanging_mass').with_(
+        parameters={'mass_kg': 22.0, 'damping_n_s_per_m': 190.0})
+    stairs_pa = (50e3, 200e3, 400e3, 300e3, 100e3, 0.0)
+    rubs = rig.with_(effects=[{'name': 'coulomb_friction', 'parameters': {'force_n': 0.6}}])
+    for true, expected in ((rig, False), (rubs, True)):
+        run = record(true, stairs_pa, 1.0, ('pressure', 'contraction'), False, seed=8)
+        problems = problems_of(rig, [offer_of(run, rig)])
+        sought = unknown_numbers(rig, ['mass_kg'])
+        weighted = Weighted(rig, problems, [*sought, *known_numbers_of(problems, sought)])
+        x = fit(weighted)
+        memory, by_noise = weighted.memories(x)[0], memories_by_noise(weighted, x)[0]
+        assert LASTING < memory and (memory > by_noise) is expected
+        assert incomplete_subsystems(weighted, x) == ({'muscle'} if expected else set())
