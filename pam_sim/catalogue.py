@@ -57,8 +57,8 @@ def catalogue() -> list[dict[str, Any]]:
         source) and what its kind adds: laws ``chapter``, ``claims``, ``sets``; effects
         ``subsystem``, ``family``, ``valves``, ``variant_of``, ``relative_of``, ``reported``,
         ``fitted`` (what ``pam gap`` fits: name, typical, lower, upper), ``limits`` (simpler
-        look-alikes), ``same_as`` and ``same_without_force`` (parameters of the model); valves
-        ``signals``; rigs ``yaml``. A muscle's nominal numbers are its own. Plain data.
+        look-alikes), ``same_as``, ``same_without_force`` and ``same_without_command``
+        (parameters of the model); valves ``signals``; rigs ``yaml``. A muscle's nominal numbers are its own. Plain data.
 
     Raises
     ------
@@ -149,7 +149,8 @@ def _effect(effect: Effect) -> dict[str, Any]:
         fitted=[{'name': free.name, 'typical': free.typical, 'lower': free.lower,
                  'upper': free.upper} for free in fitted.values()],
         limits=list(effect.fitting.limits), same_as=effect.fitting.same_as,
-        same_without_force=effect.fitting.same_without_force)
+        same_without_force=effect.fitting.same_without_force,
+        same_without_command=effect.fitting.same_without_command)
 
 
 def _by_subsystem(found: Mapping[str, Effect]) -> list[Effect]:

@@ -60,6 +60,8 @@ def facts(entry: dict[str, Any]) -> list[tuple[str, str]]:
         ('does the same as the number', entry.get('same_as', '')),
         ('does the same, unless the force is measured, as the number',
          entry.get('same_without_force', '')),
+        ('does the same, unless the command is recorded, as the number',
+         entry.get('same_without_command', '')),
         ('fitted', '; '.join(
             f'{item["name"]} {_range((item["lower"], item["upper"]), 1.0)}, '
             f'typically {item["typical"]:g}' for item in entry.get('fitted', ()))),

@@ -78,7 +78,8 @@ def check_names(effect: 'Effect', found: Mapping[str, 'Effect'], of_rig: Collect
             ('relative_of', effect.relative_of, found),
             ('limits', fitting.limits, own_names), ('together', fitting.together, found),
             ('same_as', (fitting.same_as,), of_rig),
-            ('same_without_force', (fitting.same_without_force,), of_rig)):
+            ('same_without_force', (fitting.same_without_force,), of_rig),
+            ('same_without_command', (fitting.same_without_command,), of_rig)):
         for name in filter(None, names):
             if name == effect.name:
                 raise InputError(f'effect `{name}` names itself in `{key}`; leave it out', where)

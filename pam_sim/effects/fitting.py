@@ -102,6 +102,8 @@ class Fitting:
         Parameter of the model that does the same.
     same_without_force : str
         Parameter of the model that does the same to all signals but a measured force.
+    same_without_command : str
+        Parameter of the model that does the same where no command of a valve is recorded.
     delay : str
         Parameter by which the effect is late as a whole, as behind the filter of a sensor.
     pure_delay : bool
@@ -130,6 +132,7 @@ class Fitting:
     remembers: bool = False
     same_as: str = ''
     same_without_force: str = ''
+    same_without_command: str = ''
     delay: str = ''
     pure_delay: bool = False
     edges: tuple[str, ...] = ()

@@ -35,7 +35,8 @@ EFFECT = Effect(
     fitting=Fitting(
         free=(
             # It takes force; one that gave some would be an error of the force map.
-            FreeParameter('pressure_pa', 10e3, 0.0, 2e5),)),
+            FreeParameter('pressure_pa', 10e3, 0.0, 2e5),),
+        same_without_command='pressure_zero_pa'),
 )
 
 

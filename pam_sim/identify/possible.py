@@ -80,7 +80,7 @@ def possible_effects(rig: Rig, problems: Sequence[SubsystemProblem], numbers: Se
     So are sensors: they count as calibrated, unless their zero is asked for. An effect that acts
     as an unknown number does is left to that number, and a static map to an unknown force law.
     """
-    acts_as_unknown = {e.name for e, _ in counted_in(problems, numbers)}
+    acts_as_unknown = {e.name for e, *_ in counted_in(problems, numbers)}
     there = {e.name for e in rig.effects} | {n.effect for n in numbers if n.effect}
     unknown = {n.name for n in numbers if n.unknown}
     if 'spring_n_per_m' in unknown:
@@ -106,17 +106,26 @@ def possible_effects(rig: Rig, problems: Sequence[SubsystemProblem], numbers: Se
 
 
 def counted_in(problems: Sequence[SubsystemProblem], numbers: Sequence[Number]
-               ) -> list[tuple[Effect, str]]:
+               ) -> list[tuple[Effect, str, str]]:
     """
-    Return (effect, unknown number) where the recordings cannot tell one from the other.
+    Return (effect, unknown number, what tells) where recordings cannot tell one from the other.
 
     A tube that resists contraction is one with the spring of the load, unless the force between
-    them is measured.
+    them is measured. A pressure that gives no force is one with the zero of the pressure sensor,
+    unless the valve tells the pressure.
     """
     unknown = {n.name for n in numbers if n.unknown}
     with_force = any('force' in p.signals for p in problems)
-    return [(effect, effect.fitting.same_without_force) for effect in effects().values()
-            if not with_force and effect.fitting.same_without_force in unknown]
+    with_command = any(p.subsystem == 'valve' for p in problems)
+    found = []
+    for effect in effects().values():
+        for is_told, name, tells in (
+                (with_force, effect.fitting.same_without_force, 'a recorded force'),
+                (with_command, effect.fitting.same_without_command,
+                 'a recorded command of the valve')):
+            if not is_told and name in unknown:
+                found.append((effect, name, tells))
+    return found
 
 
 def in_other_forms(weighted: Weighted, x: FloatArray, count: int,

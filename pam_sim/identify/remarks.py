@@ -70,8 +70,8 @@ def remarks_on(rig: Rig, problems: Sequence[SubsystemProblem], wanted: Sequence[
     told += of_another_law(rig, left)
     told += [f'{name}: from the holds, where the regulator has settled; no effect of '
              'the library explains its edges' for name in at_rest]
-    told += [f'{name}: {effect.name} would look the same and counts in; a recorded force tells '
-             'them apart' for effect, name in counted_in(problems, acting)]
+    told += [f'{name}: {effect.name} would look the same and counts in; {tells} tells them '
+             'apart' for effect, name, tells in counted_in(problems, acting)]
     known = {n.name for n in acting}
     return told + [f'{n.name}: nothing in these recordings depends on it; {_what_shows(n, rig)}'
                    for n in wanted if n.name not in known]

@@ -250,6 +250,19 @@ def test_a_stiffness_of_the_muscle_counts_as_spring_where_no_force_is_measured()
     assert 'would look the same' not in identify(with_force, RIG, ['spring_n_per_m']).text()
 
 
+def test_a_threshold_of_the_muscle_counts_as_zero_where_no_command_is_recorded():
+    rig = RIG.with_(effects=[{'name': 'threshold_pressure', 'parameters': {'pressure_pa': 12e3}}])
+    run = record(rig, hold_s=0.6, command=False, zero_pa=-2e3)
+    found = identify(run, RIG, ['pressure_zero_pa'], advise=False)
+    assert inside(found['pressure_zero_pa'], 10e3)
+    assert 'pressure_zero_pa: threshold_pressure would look the same' in found.text()
+    assert 'a recorded command of the valve tells them apart' in found.text()
+    told = identify(record(rig, hold_s=0.6, zero_pa=-2e3), RIG, ['pressure_zero_pa'],
+                    advise=False)
+    assert abs(told['pressure_zero_pa'].value + 2e3) < 200.0
+    assert 'would look the same' not in told.text()
+
+
 def test_without_a_recording_nothing_is_identified():
     with pytest.raises(InputError, match='at least one recording is needed'):
         identify([], RIG, ['mass_kg'])
