@@ -58,7 +58,8 @@ def catalogue() -> list[dict[str, Any]]:
         ``subsystem``, ``family``, ``valves``, ``variant_of``, ``relative_of``, ``reported``,
         ``fitted`` (what ``pam gap`` fits: name, typical, lower, upper), ``limits`` (simpler
         look-alikes), ``same_as``, ``same_without_force`` and ``same_without_command``
-        (parameters of the model); valves ``signals``; rigs ``yaml``. A muscle's nominal numbers are its own. Plain data.
+        (parameters of the model); valves ``signals``; rigs ``yaml``. A muscle's nominal numbers
+        are its own. Plain data.
 
     Raises
     ------

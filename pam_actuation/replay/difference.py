@@ -25,11 +25,6 @@ from pam_sim.annotations import FloatArray, IntArray
 _SHOWN = {'Pa': (1e-3, 'kPa'), 'm': (1e3, 'mm'), 'V': (1e3, 'mV')}
 
 
-def same_bits(a: float, b: float) -> bool:
-    """Return whether two floats are the same bits, all NaN being one."""
-    return a == b and math.copysign(1.0, a) == math.copysign(1.0, b) or (a != a and b != b)
-
-
 @dataclass(frozen=True)
 class Difference:
     """

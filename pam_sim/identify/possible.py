@@ -27,7 +27,7 @@ it explains as much; how far the numbers move between those that explain about a
 intervals.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 import numpy as np
 from pam_sim.annotations import FloatArray
@@ -71,10 +71,13 @@ def incomplete_subsystems(weighted: Weighted, x: FloatArray) -> frozenset[str]:
         squares[place][0].subsystem for place, memory in lasting if memory > by_noise[place]})
 
 
-def possible_effects(rig: Rig, problems: Sequence[SubsystemProblem], numbers: Sequence[Number]
-                     ) -> list[Number]:
+def possible_effects(rig: Rig, problems: Sequence[SubsystemProblem], numbers: Sequence[Number],
+                     incomplete: Collection[str]) -> list[Number]:
     """
     Return the effects that may be missing in subsystems, as numbers with a prior about zero.
+
+    An unknown number that acts in two subsystems, such as the zero of the pressure, carries what
+    one of them misses into the other one. There the effects of both are returned.
 
     Formulations of the same name, and what stands in the rig or among ``numbers``, are left out.
     So are sensors: they count as calibrated, unless their zero is asked for. An effect that acts
@@ -86,6 +89,9 @@ def possible_effects(rig: Rig, problems: Sequence[SubsystemProblem], numbers: Se
     if 'spring_n_per_m' in unknown:
         there.add('parallel_spring')
     free_law = any(n.of_law and n.unknown for n in numbers)
+    own = [p for p in problems if p.subsystem in incomplete]
+    missing = [p for p in problems if p.subsystem in incomplete or any(
+        n.unknown and n.acts_in(p) and any(map(n.acts_in, own)) for n in numbers)]
     found = []
     for effect in effects().values():
         if (effect.variant_of or effect.subsystem == 'sensor' or effect.name in there
@@ -100,7 +106,7 @@ def possible_effects(rig: Rig, problems: Sequence[SubsystemProblem], numbers: Se
         for p in sizes:
             number = Number(f'{effect.name}.{p.name}', effect.name, p.name, p.unit, 0.0, p.lower,
                             p.upper, p.default, description=effect.sentence)
-            if any(number.acts_in(problem) for problem in problems):
+            if any(map(number.acts_in, missing)):
                 found.append(number)
     return found
 

@@ -129,7 +129,7 @@ def identify(runs: Run | Sequence[Run], rig: Rig, unknown: str | Sequence[str] =
         return found
     forms: FloatArray = np.zeros(len(acting))       # doubt by the formulation, in coordinates
     if incomplete:
-        possible = possible_effects(rig, missing, numbers)
+        possible = possible_effects(rig, problems, numbers, incomplete)
         weighted = Weighted(rig, problems, [*numbers, *possible], incomplete=incomplete)
         x = np.concatenate([x, np.zeros(len(possible))])
         weighted, x, forms = _in_each_form(

@@ -33,7 +33,8 @@ def weighted_of(run, names, effects=False):
     problems = problems_of(RIG, [offer_of(run, RIG)])
     sought = unknown_numbers(RIG, names)
     numbers = [*sought, *known_numbers_of(problems, sought)]
-    more = possible_effects(RIG, problems, numbers) if effects else []
+    more = possible_effects(RIG, problems, numbers, {p.subsystem for p in problems}) if (
+        effects) else []
     return Weighted(RIG, problems, [*numbers, *more],
                     incomplete=frozenset(p.subsystem for p in problems if effects))
 

@@ -130,7 +130,8 @@ def test_a_static_map_is_no_possible_effect_beside_an_unknown_law():
     run = record(RIG, gauge_pa=(50e3, 400e3), hold_s=0.8, keep=('pressure', 'contraction'))
     for name, there in (('law.a3', False), ('mass_kg', True)):
         problems = problems_of(RIG, [offer_of(run, RIG, 0.0)])
-        possible = possible_effects(RIG, problems, unknown_numbers(RIG, [name]))
+        possible = possible_effects(RIG, problems, unknown_numbers(RIG, [name]),
+                                    {p.subsystem for p in problems})
         names = {number.effect for number in possible}
         assert ('end_taper' in names) is there and 'creep' in names
 
