@@ -43,11 +43,6 @@ class StepFigures:
     overshoot: float
     error_pa: float
 
-    @property
-    def fills(self) -> bool:
-        """Return whether the step asks for more pressure."""
-        return self.to_pa > self.from_pa
-
 
 def step_figures(gauge_pa: FloatArray, from_pa: float, to_pa: float, dt_s: float) -> StepFigures:
     """

@@ -38,7 +38,6 @@ def test_figures_of_a_delayed_lag(ends):
     assert found.rise_s == pytest.approx(LAG_S * math.log(9.0), abs=1e-4)
     assert found.settling_s == pytest.approx(DELAY_S + LAG_S * math.log(50.0), abs=2 * DT_S)
     assert found.overshoot == 0.0 and abs(found.error_pa) < 1e-3
-    assert found.fills == (ends[1] > ends[0])
 
 
 def test_overshoot_error_and_what_is_never_reached():
