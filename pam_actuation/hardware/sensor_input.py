@@ -154,7 +154,9 @@ class NewReadings:
             # The clock may have been set back.
             self._newest_ns[topic] = min(self._newest_ns[topic], now_ns)
             if now_ns - self._newest_ns[topic] > LONGEST_WAIT_NS:
-                raise DeviceError(f'no new value for {LONGEST_WAIT_NS // 10 ** 9} s', topic)
+                raise DeviceError(
+                    f'no new value for {LONGEST_WAIT_NS // 10 ** 9} s; check cable, power and '
+                    'baud rate of the sensor', topic)
             return None
         if topic in self._rates:
             self._rates[topic].count(now_ns)

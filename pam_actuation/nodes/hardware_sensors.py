@@ -104,7 +104,8 @@ class HardwareSensors(ManagedNode):
                 new = self._readings.take(topic, now_ns)
             except DeviceError as error:
                 self.failures += 1
-                problem = problem or f'{topic} is not measured: {error}'
+                what = error.problem if error.where == topic else error     # said already
+                problem = problem or f'{topic} is not measured: {what}'
             else:
                 if new is not None:
                     value, stamp_ns = new

@@ -20,7 +20,7 @@ import time
 from typing import Any
 
 from pam_actuation.drivers.config import DRIVER_PARAMETERS, DriverConfig
-from pam_actuation.drivers.faults import MAY_NOT_BE_VENTED, NOT_VENTED
+from pam_actuation.drivers.faults import BY_HAND, MAY_NOT_BE_VENTED, NOT_VENTED
 from pam_actuation.drivers.limits import DEVICE_WATCHDOG_S
 from pam_actuation.drivers.parameter import node_parameter
 from pam_actuation.drivers.vented import check_vents
@@ -286,7 +286,7 @@ class ValveDriver(ManagedNode):
         level, message = self.loop.state()
         if self.output.unvented:
             level = ERROR
-            message += f'; {MAY_NOT_BE_VENTED}: {self.output.unvented}'
+            message += f'; {MAY_NOT_BE_VENTED}: {self.output.unvented}; {BY_HAND}'
         waits = self.output.waits
         behind = waits.behind(self.loop.period_s, 1, 'take each signal')
         if (waits.says or behind) and self.value('backend') not in NO_DEVICE:

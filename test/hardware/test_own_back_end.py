@@ -207,6 +207,7 @@ def test_a_library_that_cancels_every_write_is_told_as_not_vented(bench, rig):
     rig.wait_for(lambda: rig.heard['valve_signal'][-1].plain.efforts == (0.0,), 5.0, '0 V')
     rig.wait_for(lambda: 'the device may not be vented: back end WriteOnly' in
                  rig.health['valve_driver'][-1].message, 5.0, 'the word')
+    assert '; shut the supply and open the dump valve' in rig.health['valve_driver'][-1].message
     driver = rig.processes['valve_driver']
     driver.send_signal(signal.SIGTERM)
     assert driver.wait(10.0) and driver.exit_code == 1

@@ -124,7 +124,7 @@ def test_only_what_is_new_is_taken_with_the_time_it_was_measured():
     assert readings.take('force', back_ns) == (7.5, back_ns)
     now_ns[7] = back_ns
     assert readings.take('force', now_ns[7] + 900 * ms) is None
-    with pytest.raises(DeviceError, match='force: no new value for 1 s'):
+    with pytest.raises(DeviceError, match='force: no new value for 1 s; check cable'):
         readings.take('force', now_ns[7] + 1100 * ms)
 
 
