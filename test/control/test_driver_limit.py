@@ -75,7 +75,7 @@ def test_a_pair_gives_up_its_co_contraction_before_its_difference(difference_pa)
 
 @pytest.mark.parametrize('valve', ['ppr', 'hsv'])
 def test_a_joint_gets_as_near_as_the_limit_of_its_drivers_lets_it(valve):
-    """Before, it stood at 0.02 rad with 300 kPa in both muscles, and all was well, it said."""
+    """It may not stand at 0.02 rad with 300 kPa in both muscles and say that all is well."""
     joint = FaultyJoint(valve, lambda time_s: min(0.1 * time_s, 0.2), of_driver=OF_DRIVER)
     joint.run(6.0)
     assert abs(joint.angle_rad[-1] - 0.2) < 0.01

@@ -32,7 +32,7 @@ EVERY = [(valve, name) for valve, names in CONTROLLERS.items() for name in names
 @pytest.mark.parametrize('valve, controller', EVERY)
 def test_a_healed_pressure_sensor_brings_the_muscle_back_without_shooting_over(
         valve, controller):
-    """Before, the integral wound up for 3 s and the muscle went 12 to 20 mm too far."""
+    """An integral that winds up for 3 s moves the muscle 12 to 20 mm too far."""
     rig = FaultyRig(valve, controller).run(3.0, hold)
     rng = random.Random(controller)
     for fault in rng.sample(('nan', 'silent', 'past', 'future'), 2):
@@ -60,7 +60,7 @@ def test_a_controller_that_was_stopped_or_blind_comes_back_calmly(valve):
     ('hsv', 'pid_hsv', 6.13, 0.9), ('ppr', 'pid', 6.21, 2.7)])
 def test_an_integral_does_not_remember_the_way_back_to_a_moving_reference(
         valve, controller, at_s, lasts_s):
-    """Before, the muscle went 0.6 and 1.1 mm too far: the integral had grown on that error."""
+    """One that grows on that error moves the muscle 0.6 and 1.1 mm too far."""
     rig = FaultyRig(valve, controller).run(at_s, slow_sine)
     before = rig.excursion_m(3.0)
     rig.run(lasts_s, slow_sine, 'stopped')

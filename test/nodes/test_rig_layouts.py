@@ -178,7 +178,7 @@ def test_without_a_controller_the_rest_stays_as_it_is(tmp_path):
 
 
 def test_joints_in_namespaces_of_their_own_differ_in_name_and_noise():
-    """Before, /left/knee and /right/knee had one name in the URDF, and the same noise."""
+    """/left/knee and /right/knee have names of their own in the URDF, and noise of their own."""
     names_, seeds = set(), set()
     for namespace in ('/knee', '/left/knee', '/right/knee'):
         nodes = layouts.knee(namespace)
