@@ -250,6 +250,20 @@ def test_a_stiffness_of_the_muscle_counts_as_spring_where_no_force_is_measured()
     assert 'would look the same' not in identify(with_force, RIG, ['spring_n_per_m']).text()
 
 
+def test_a_valley_that_the_noise_makes_rugged_is_followed_to_its_ends(tmp_path):
+    """Pressure and force at one length are a straight line: two numbers, and three unknown."""
+    file = tmp_path / 'rig.yaml'
+    file.write_text('muscle: dmsp_20_300\nload: isometric\nparameters: {contraction_m: 0.02}\n')
+    true = load_rig(str(file))
+    run = record(true, (0.0, 300e3, 400e3, 200e3, 500e3, 300e3, 0.0),
+                 keep=('pressure', 'force'), command=False)
+    found = identify(run, true.with_(parameters={'contraction_m': 0.01}),
+                     ['force_map_gain', 'contraction_m', 'pressure_zero_pa'], advise=False)
+    assert set(statuses(found).values()) == {'only together'}
+    assert inside(found['force_map_gain'], 1.0) and inside(found['contraction_m'], 0.02)
+    assert inside(found['pressure_zero_pa'], 0.0)
+
+
 def test_a_threshold_of_the_muscle_counts_as_zero_where_no_command_is_recorded():
     rig = RIG.with_(effects=[{'name': 'threshold_pressure', 'parameters': {'pressure_pa': 12e3}}])
     run = record(rig, hold_s=0.6, command=False, zero_pa=-2e3)
