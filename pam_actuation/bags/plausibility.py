@@ -61,6 +61,8 @@ LEAST_LIMIT_M = 0.02                   # any muscle may shorten by this
 MOST_M = 0.5                           # and none of the usual ones by this
 MOST_N = 1e5
 SHARE_HINT = ' A share of the length? Multiply it by the length then; the topic is in m.'
+ZERO_HINT = (' If the muscle was as long as at rest then, the sensor has a zero: state '
+             '`contraction_zero_m: unknown` under `tolerance` in the rig file.')
 PSI_HINT = (' Is the unit right? psi that are taken for bar are 14.5 times too much, and kPa that '
             'are taken for psi 6.9 times.')
 GAUGE_HINT = ' If it was not, is it gauge pressure? Add 101325 Pa then.'
@@ -437,6 +439,8 @@ def _contraction(finite: FloatArray, low: float, high: float,
         hint = SHARE_HINT
     elif low < -CONTRACTION_MARGIN_M and float(np.median(finite)) < -CONTRACTION_MARGIN_M:
         hint = ' Is the sign turned round, or the zero not set? Shortening is positive.'
+    elif low < -CONTRACTION_MARGIN_M and high <= size.stroke_m + CONTRACTION_MARGIN_M:
+        hint = ZERO_HINT
     return (f'contraction from {1e3 * low:.1f} to {1e3 * high:.1f} mm leaves 0 to '
             f'{1e3 * size.stroke_m:.0f} mm ({size.said}).{hint}'), False
 

@@ -116,6 +116,10 @@ def test_what_a_rig_measures_is_left_alone():
             ('velocity_m_per_s', np.full(9, np.nan)), ('velocity_m_per_s', 30.0 * NOISE)):
         assert look(name, values) == ('', False), name
     assert look('pressure_pa', [1.1e6, 1.2e6], '/muscle/supply_pressure') == ('', False)
+    # A reading below 0 at rest is that of a zero, unless most of them are.
+    below = look('contraction_m', CONTRACTION_M - 1e-3)
+    assert '`contraction_zero_m: unknown`' in below[0] and not below[1]
+    assert 'Is the sign turned round' in look('contraction_m', -CONTRACTION_M)[0]
     # A long muscle may shorten by more.
     far = CONTRACTION_M * 5.0
     assert 'leaves 0 to 75 mm' in look('contraction_m', far)[0]
