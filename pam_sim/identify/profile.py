@@ -17,8 +17,8 @@ How well each number is known: the interval in which its profile likelihood stay
 
 The profile of a number is the least cost that the others reach while it is held. Its 95 % interval
 ends where that cost is 3.84 above the least one (Raue et al. 2009, Bioinformatics 25(15), 1923).
-Noise between the samples of an input makes the cost rugged in numbers such as a skew of the stamps.
-So where the others are caught, those with a prior begin once more from the solution.
+Noise between the samples of an input makes the cost rugged in numbers such as a skew of the
+stamps. So where the others are caught, those with a prior begin once more from the solution.
 
 An end that lies at the end of the range is open: the data do not exclude what is beyond.
 
