@@ -109,7 +109,8 @@ class Validation:
         # It is the same sensor, and a recording without rest hides its slow noise.
         self._slow = {s: 0.0 if seen[s].slow_sd > 0.0 else self._slow_elsewhere(s) for s in seen}
         self.noise = {s: float(np.hypot(seen[s].sd, self._slow[s])) for s in seen}
-        self.drift = self._drift()
+        self._random = np.random.default_rng(seed)
+        self.drift = self._drift(INPUT_DRAWS)
         # A valve that adds up its errors drifts: one run may be off by far more than the mean.
         self.floor, self.highest_floor = self._floors(self.drift)
 
@@ -246,7 +247,7 @@ class Validation:
     @cached_property
     def rare_floor(self) -> dict[str, float]:
         """The noise floors with the furthest drift of ``RARE_DRAWS``, by signal."""
-        return self._floors(self._drift(RARE_DRAWS))[1]
+        return self._floors([*self.drift, *self._drift(RARE_DRAWS - INPUT_DRAWS)])[1]
 
     def left(self) -> float:
         """Return what the final model leaves beyond the floor (rms), as of ``fall``."""
@@ -266,9 +267,9 @@ class Validation:
         error = (simulated[signal] - self.recording.measured[signal])[self.part[signal]]
         return float(np.sqrt(np.mean(error ** 2)))
 
-    def _drift(self, draws: int = INPUT_DRAWS) -> list[dict[str, FloatArray]]:
-        """Return by signal, for some draws, how far errors of the input move the final run."""
-        random, r = np.random.default_rng(self.seed), self.recording
+    def _drift(self, draws: int) -> list[dict[str, FloatArray]]:
+        """Return by signal, for further draws, how far errors of the input move the final run."""
+        random, r = self._random, self.recording
         found: list[dict[str, FloatArray]] = []
         start_sd = start_error_sd(r)
         noise = self._pressure_noise() if r.pressure_given else None
