@@ -99,6 +99,12 @@ def number_of(value: Any, name: str) -> float:
         raise InputError(f'`{name}` is {shown(value)}; a number is needed') from None
 
 
+def check_not_negative(value: float, name: str, unit: str) -> None:
+    """Refuse what is no finite number from 0 on, by its name and unit."""
+    if not 0.0 <= number_of(value, name) < float('inf'):
+        raise InputError(f'is {value:g} {unit}; allowed is 0 or more', name)
+
+
 def shown(value: object) -> str:
     """Return a value of any size as a short piece of one sentence."""
     text = repr(value)

@@ -23,7 +23,6 @@ seed, all stamps from the virtual clock.
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import partial
-import math
 import os
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
@@ -46,7 +45,7 @@ from pam_actuation.loops.wiring import (
 from pam_actuation.messages import HARDWARE_ID, LEVEL_OK, START_NS, Status
 from pam_actuation.namespaces import JOINT, MUSCLE
 from pam_actuation.plant_loop import PlantLoop
-from pam_sim.declared import check_kind, check_whole, number_of
+from pam_sim.declared import check_kind, check_not_negative, check_whole
 from pam_sim.errors import InputError
 from pam_sim.files import cannot_write
 
@@ -252,8 +251,8 @@ def _check_given(experiment: Any, rig: Any, controller: Any, seed: Any, preview_
     check_kind(experiment, Experiment, 'experiment', 'load_experiment(NAME)')
     check_kind(rig, (Rig, JointRig), 'rig', 'load_rig(NAME)')
     check_whole(seed, 0, 'seed')
-    if preview_s is not None and not 0.0 <= number_of(preview_s, 'preview_s') < math.inf:
-        raise InputError(f'is {preview_s:g} s; allowed is 0 or more', 'preview_s')
+    if preview_s is not None:
+        check_not_negative(preview_s, 'preview_s', 's')
     if isinstance(controller, (str, os.PathLike)):
         raise InputError(f'is {controller!r}; give what `load_controller(NAME, rig)` returns',
                          'controller')

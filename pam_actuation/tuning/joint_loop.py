@@ -28,8 +28,7 @@ from pam_actuation.control.modes.joint import COMMANDS, JOINT_INPUT
 from pam_actuation.control.modes.tracked import JOINT
 from pam_actuation.drivers.for_rig import driver_config
 from pam_actuation.tuning.cost import tracking_cost
-from pam_actuation.tuning.loop_checks import (
-    check_drivers, check_not_negative, check_parts, check_wrapped)
+from pam_actuation.tuning.loop_checks import check_drivers, check_parts, check_wrapped
 from pam_actuation.tuning.loop_parts import Driver, JOINT_READINGS, READINGS
 from pam_actuation.tuning.loop_setup import (
     Course, DriverLaw, first_periodic_tick, fresh_rise, latency_steps,
@@ -37,7 +36,7 @@ from pam_actuation.tuning.loop_setup import (
 from pam_actuation.tuning.mode_result import ModeResult
 from pam_actuation.tuning.sampled_reference import SampledReference
 from pam_sim.annotations import FloatArray
-from pam_sim.declared import check_whole
+from pam_sim.declared import check_not_negative, check_whole
 from pam_sim.errors import InputError
 from pam_sim.records import fields, size_of, zeros
 from pam_sim.sensors.encoder import ANGLE_NOISE_RAD, ANGLE_STEP_RAD

@@ -22,7 +22,7 @@ from pam_actuation.control.made_for import check_valve
 from pam_actuation.control.modes.tracked import Tracked, tracked_by
 from pam_actuation.control.modes.wrapped import WrappedLaw
 from pam_actuation.drivers.config import DriverConfig
-from pam_sim.declared import check_kind, number_of, shown
+from pam_sim.declared import check_kind, shown
 from pam_sim.errors import InputError
 
 if TYPE_CHECKING:
@@ -162,9 +162,3 @@ def check_wrapped(controller: Any, tracked: Tracked, valve: str, rate_hz: float)
     check_controller(controller, tracked, valve, rate_hz)
     if controller.kind != 'sofc':
         raise InputError(f'this loop runs sofc controllers, not {controller.kind}')
-
-
-def check_not_negative(value: float, name: str, unit: str) -> None:
-    """Refuse what is no finite number from 0 on, by its name and unit."""
-    if not 0.0 <= number_of(value, name) < float('inf'):
-        raise InputError(f'is {value:g} {unit}; allowed is 0 or more', name)
